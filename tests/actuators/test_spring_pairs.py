@@ -194,7 +194,7 @@ def test_demand_below_the_corridor_needs_no_bracketing(
 ):
     (law_1, curve_1), (law_2, curve_2) = first, second
     tau_e = loads(np.random.default_rng(6), curve_1, curve_2)
-    monkeypatch.setattr(solver, "_bracketed", None)  # what is called fails
+    monkeypatch.setattr(solver, "_bracket_preload", None)  # what is called fails
     found = make_pair(law_1, law_2).solve(tau_e, np.full_like(tau_e, 1e-9))
     carried = found.lower > 1e-9
     assert carried.any()

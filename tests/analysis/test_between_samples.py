@@ -24,7 +24,7 @@ from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -172,7 +172,7 @@ def three_joints(rate: float = 103.0) -> tuple[Robot, Trajectory]:
     lower = block.stiffness_min
     at_steps, everywhere = lower[::5].max(axis=0), lower.max(axis=0)
     stiffness = np.where(everywhere > at_steps + 1e-3, (at_steps + everywhere) / 2, 2 * everywhere)
-    constant = Constant(signal=STIFFNESS, span=(0.0, DURATION), value=tuple(stiffness.tolist()))
+    constant = ConstantProfile(signal=STIFFNESS, span=(0.0, DURATION), value=tuple(stiffness.tolist()))
     return robot, Trajectory(trajectory.times, trajectory.position, {"stiffness": constant}, name="three")
 
 
@@ -243,7 +243,7 @@ def test_a_spike_between_coarse_steps() -> None:
     times = UniformTimes(DURATION, 4.0)
 
     def zeros(stiffness: float) -> Trajectory:
-        constant = Constant(signal=STIFFNESS, span=span, value=(stiffness,))
+        constant = ConstantProfile(signal=STIFFNESS, span=span, value=(stiffness,))
         return Trajectory(times, position, {"stiffness": constant}, name="zeros")
 
     at_steps, everywhere = largest(robot, zeros(1500.0), "stiffness_min")

@@ -14,7 +14,7 @@ from vsacli.actuators.friction import Friction
 from vsacli.analysis.run import Run
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
 
@@ -34,7 +34,7 @@ def swing(rate: float) -> Trajectory:
     sines = Sinusoids(
         signal=POSITION, span=times.span, cycles=2.0, offset=(0.1,), sine=((0.3,),), cosine=((0.05,),)
     )
-    firm = Constant(signal=STIFFNESS, span=times.span, value=(1500.0,))
+    firm = ConstantProfile(signal=STIFFNESS, span=times.span, value=(1500.0,))
     return Trajectory(times, sines, {"stiffness": firm}, name="swing")
 
 

@@ -21,7 +21,7 @@ from vsacli.base.flags import LIMITS, Flag, has
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.base.variables import deviation
 from vsacli.robot.joint import Limits
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -43,7 +43,7 @@ def swinging(deviations, *, stiffness=1500.0, unreliable=(0.0, 0.0), known=True,
     covariances = np.repeat(np.diag(np.square(deviations, dtype=float))[None], 3, axis=0)
     if not known:
         covariances[2] = np.nan
-    firm = Constant(signal=STIFFNESS, span=SPAN, value=(stiffness,) * 3)
+    firm = ConstantProfile(signal=STIFFNESS, span=SPAN, value=(stiffness,) * 3)
     position = Blurred(sines, covariances, unreliable=unreliable)
     return Trajectory(UniformTimes(SPAN[1], rate), position, {"stiffness": firm}, name="swing")
 

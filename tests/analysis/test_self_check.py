@@ -27,7 +27,7 @@ from vsacli.compute.engine.engines import Kernel
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import Constant, RestToRest
+from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.times import UniformTimes
 
 ROOT = Path(__file__).parents[2]
@@ -129,8 +129,8 @@ def test_standing_still_passes(duration: float):
     span = (0.0, duration)
     hold = Trajectory(
         UniformTimes(duration, 20 / duration),
-        Constant(signal=POSITION, span=span, value=(0.3, 0.2, 0.1)),
-        {"stiffness": Constant(signal=STIFFNESS, span=span, value=(850.0,) * 3)},
+        ConstantProfile(signal=POSITION, span=span, value=(0.3, 0.2, 0.1)),
+        {"stiffness": ConstantProfile(signal=STIFFNESS, span=span, value=(850.0,) * 3)},
         name="hold",
     )
     assert_sound(inverse_dynamics(vsa_3r(), hold).report)
@@ -185,7 +185,8 @@ def test_blocks_of_long_chains_do_not_grow_in_number(joints: int):
     """A block is as much work as the chain is long, and the shorter; in blocks the check must not grow."""
     robot = random_chain(joints)
     position, stiffness = (
-        Constant(signal=each, span=(0.0, 1.0), value=(900.0,) * joints) for each in (POSITION, STIFFNESS)
+        ConstantProfile(signal=each, span=(0.0, 1.0), value=(900.0,) * joints)
+        for each in (POSITION, STIFFNESS)
     )
     hold = Trajectory(UniformTimes(1.0, 20.0), position, {"stiffness": stiffness}, name="hold")
     counted = Counted()
@@ -202,7 +203,7 @@ def test_memory_of_long_chains_is_that_of_the_times_computed_together(monkeypatc
     ]
     chain = replace(arm, gravity=(0.0, 0.0, 0.0), joints=tuple(joints))
     motion = RestToRest(signal=POSITION, span=(0.0, 3.0), start=(0.0,) * 40, end=(0.005,) * 40, degree=7)
-    stiffness = Constant(signal=STIFFNESS, span=(0.0, 3.0), value=(2200.0,) * 40)
+    stiffness = ConstantProfile(signal=STIFFNESS, span=(0.0, 3.0), value=(2200.0,) * 40)
     trajectory = Trajectory(UniformTimes(3.0, 300.0), motion, {"stiffness": stiffness}, name="chain")
     monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
     tracemalloc.start()

@@ -15,7 +15,7 @@ from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.rigid import Rigid
 from vsacli.cli.import_urdf import import_urdf as command
-from vsacli.robot.urdf import Placeholders, import_urdf, robot_text
+from vsacli.robot.urdf import Placeholders, converted_robot_text, import_urdf
 
 DESK_ARM = REPOSITORY / "robots" / "desk_arm.urdf"
 
@@ -30,7 +30,7 @@ def test_the_file_is_the_conversion(vsacli, tmp_path):
     done = converted(vsacli)
     conversion = import_urdf(DESK_ARM, tip="flange")
     assert load_robot(tmp_path / "arm.yaml") == conversion.robot
-    assert (tmp_path / "arm.yaml").read_text() == robot_text(conversion)
+    assert (tmp_path / "arm.yaml").read_text() == converted_robot_text(conversion)
     assert (done.out, done.err) == (f"{conversion}\n", "wrote arm.yaml\n")
 
 
@@ -41,7 +41,7 @@ def test_every_number_comes_back_from_the_file(tmp_path, actuator, seed):
     limits = '<limit lower="-0.7" upper="1.1" velocity="2.3" effort="17.5"/>'
     path = write(tmp_path / "arm.urdf", text.replace("</joint>", f"{limits}</joint>"))
     conversion = import_urdf(path, placeholders=Placeholders(actuator, 0.3, 123.4, (1.5, 2.5)))
-    loaded = load_robot(write(tmp_path / "arm.yaml", robot_text(conversion)))
+    loaded = load_robot(write(tmp_path / "arm.yaml", converted_robot_text(conversion)))
     assert loaded == conversion.robot
 
 
@@ -132,7 +132,7 @@ def test_implausible_links_are_reported(vsacli, tmp_path):
 def test_names_stay_in_their_place(tmp_path):
     text = robot(link("a"), link("b # } é"), joint("turn: [", "a", "b # } é"))
     conversion = import_urdf(write(tmp_path / "arm.urdf", text.replace('"sample"', '"a &quot;b: #c\\"')))
-    loaded = load_robot(write(tmp_path / "arm.yaml", robot_text(conversion)))
+    loaded = load_robot(write(tmp_path / "arm.yaml", converted_robot_text(conversion)))
     assert loaded == conversion.robot
     assert (loaded.name, loaded.joint_names) == ('a "b: #c\\', ("turn___",))
 

@@ -14,7 +14,7 @@ from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.dynamics import uncertainty
 from vsacli.dynamics.inverse import compute_block
 from vsacli.dynamics.uncertainty import MARGIN, Uncertainty
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.profile import WrenchProfile
@@ -47,8 +47,8 @@ def blurred(joints, *, stiffness=1500.0, uncertain=None, exerted=False):
         sine=(amplitudes,),
         cosine=((0.0,) * joints,),
     )
-    firm = Constant(signal=STIFFNESS, span=SPAN, value=(stiffness,) * joints)
-    push = Constant(signal=WRENCH, span=SPAN, value=(5.0, -3.0, 8.0, 0.5, 1.0, -0.7))
+    firm = ConstantProfile(signal=STIFFNESS, span=SPAN, value=(stiffness,) * joints)
+    push = ConstantProfile(signal=WRENCH, span=SPAN, value=(5.0, -3.0, 8.0, 0.5, 1.0, -0.7))
     covariances = random_covariances(1, joints, SIZES) if uncertain is None else uncertain
     return Trajectory(
         UniformTimes(SPAN[1], 1000.0),

@@ -17,7 +17,7 @@ from vsacli import load_robot, load_trajectory
 from vsacli.files import templates
 from vsacli.files.info import render
 from vsacli.files.recordings import describe_recording
-from vsacli.trajectory.recorded.header_words import JointNames, words_of
+from vsacli.trajectory.recorded.header_words import JointNames, words_of_column_name
 
 Command = Callable[..., Outcome]
 
@@ -213,7 +213,7 @@ def test_order_counts_only_where_there_are_as_many(tmp_path: Path) -> None:
     ],
 )
 def test_joints_in_names(joints: list[str], column: str, expected: str) -> None:
-    assert JointNames(joints).in_words(words_of(column)) == expected
+    assert JointNames(joints).in_words(words_of_column_name(column)) == expected
 
 
 ARM = ["base", "shoulder", "elbow"]

@@ -8,7 +8,7 @@ import pytest
 from samples.urdf import joint, link, robot, serial, write
 
 from vsacli.base.errors import InputError
-from vsacli.robot.urdf import Placeholders, import_urdf, robot_text
+from vsacli.robot.urdf import Placeholders, converted_robot_text, import_urdf
 
 LIMIT = '<limit effort="32" velocity="1"/>'
 
@@ -143,7 +143,7 @@ def test_two_motors_do_not_take_what_holds_for_one(notes, tmp_path):
         "effort limits (joint side) not taken over, since two motors share a joint: turn",
         "gear reductions not taken over, since two motors share a joint: turn 50",
     ]
-    text = robot_text(import_urdf(tmp_path / "arm.urdf"))
+    text = converted_robot_text(import_urdf(tmp_path / "arm.urdf"))
     assert "the URDF has an effort limit of 32 N m (joint side) and a gear reduction of 50" in text
 
 

@@ -18,7 +18,7 @@ from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import mass_matrix
 from vsacli.files.templates import trajectory_template
 from vsacli.robot.model import OF_PLACEHOLDERS, WITHOUT_MASSES
-from vsacli.robot.urdf import Placeholders, import_urdf, robot_text
+from vsacli.robot.urdf import Placeholders, converted_robot_text, import_urdf
 from vsacli.robot.urdf.placeholders import UNLOADED
 
 DESK_ARM = REPOSITORY / "robots" / "desk_arm.urdf"
@@ -89,11 +89,11 @@ def test_what_is_given_is_not_sized():
     conversion = import_urdf(DESK_ARM, tip="flange", placeholders=given)
     assert {each.actuator.motor[0].inertia for each in conversion.robot.joints} == {0.3}
     assert {each.actuator.spring[1].k_c for each in conversion.robot.joints} == {2.5}
-    assert robot_text(conversion).count("# placeholder: not from the URDF") == 8
+    assert converted_robot_text(conversion).count("# placeholder: not from the URDF") == 8
 
 
 def test_the_file_says_how_its_placeholders_were_found():
-    text = robot_text(import_urdf(DESK_ARM, tip="flange"))
+    text = converted_robot_text(import_urdf(DESK_ARM, tip="flange"))
     assert "# placeholder: 0.5 times the largest inertia that it moves; the URDF has an effort limit" in text
     assert "# placeholder: gives way by 0.1 rad under 17 N m, its largest load" in text
     assert "# placeholder: gives way by 0.01 m under 5.2 N, its largest load" in text
@@ -121,7 +121,7 @@ def test_a_robot_without_masses_is_told_in_one_line(tmp_path):
 def test_a_single_motor_takes_the_gear(tmp_path, actuator, ratio, expected):
     text = one_joint('<limit effort="32" velocity="1"/>', "C", SIMPLE.format("turn", ratio))
     conversion = import_urdf(write(tmp_path / "arm.urdf", text), placeholders=Placeholders(actuator))
-    (arm,) = load_robot(write(tmp_path / "arm.yaml", robot_text(conversion))).joints
+    (arm,) = load_robot(write(tmp_path / "arm.yaml", converted_robot_text(conversion))).joints
     assert arm.actuator.motor.gear_ratio == expected
     assert arm.actuator.motor.side == (expected and "shaft")
     # Divided and multiplied by the ratio: a rounding or two; the inertia has two digits, on the shaft.

@@ -19,9 +19,9 @@ from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.files.templates import trajectory_template
-from vsacli.robot.plausibility import strange_of_robot
+from vsacli.robot.plausibility import robot_rules_with_findings
 from vsacli.robot.urdf import Conversion, import_urdf
-from vsacli.robot.urdf.link_tree import MOVING, Urdf, below
+from vsacli.robot.urdf.link_tree import MOVING, Urdf, joints_below
 from vsacli.robot.urdf.reader import read_urdf
 
 try:
@@ -63,16 +63,16 @@ def check(path: Path, conversion: Conversion, held: Mapping[str, float] | None =
     np.testing.assert_allclose(found, expected, rtol=0, atol=BOUND * np.abs(expected).max())
     assert conversion.residual.position < BOUND
     # The rules on plausible numbers find nothing, even if the placeholders are taken for real.
-    assert strange_of_robot(dataclasses.replace(robot, placeholder=False).checked, ()) == frozenset()
+    assert robot_rules_with_findings(dataclasses.replace(robot, placeholder=False).checked, ()) == frozenset()
 
 
 def ends(urdf: Urdf) -> Iterator[str]:
     """A leaf for each different chain of moving joints from the root."""
-    joints = list(below(urdf.root, urdf.joints.values()))
+    joints = list(joints_below(urdf.root, urdf.joints.values()))
     parents = {joint.parent for joint in joints}
     seen: set[tuple[str, ...]] = set()
     for leaf in (joint.child for joint in joints if joint.child not in parents):
-        moving = tuple(joint.name for joint in urdf.above(leaf) if not joint.is_fixed)
+        moving = tuple(joint.name for joint in urdf.joints_above(leaf) if not joint.is_fixed)
         if moving and moving not in seen:
             seen.add(moving)
             yield leaf

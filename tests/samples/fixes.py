@@ -23,7 +23,7 @@ from vsacli.base.variables import Block
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
 from vsacli.robot.model import Robot
 from vsacli.studies.search import Fix, write_fixed
-from vsacli.trajectory.curves import Constant, RestToRest
+from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -50,7 +50,7 @@ def rest_to_rest(
     return Trajectory(
         times,
         RestToRest(signal=POSITION, span=times.span, degree=7, start=start, end=end),
-        {"stiffness": Constant(signal=STIFFNESS, span=times.span, value=values)},
+        {"stiffness": ConstantProfile(signal=STIFFNESS, span=times.span, value=values)},
         name="test",
     )
 

@@ -20,7 +20,7 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
 from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -130,7 +130,7 @@ def outcomes(motion: str, color: str, seed: int, rate: int) -> Iterator[Outcome]
     """Of each arm along a record."""
     of = record(MOTIONS[motion], color, seed, rate)
     recorded = Trajectory.from_samples(of.time, of.values[:, None])
-    firm = Constant(signal=STIFFNESS, span=(0.0, recorded.duration), value=(STIFFNESS_ASKED,))
+    firm = ConstantProfile(signal=STIFFNESS, span=(0.0, recorded.duration), value=(STIFFNESS_ASKED,))
     exact = _exact_motion(of, motion, seed)
     (estimate,) = recorded.estimates.values()
     start, end = estimate.fit.parts[0].inside

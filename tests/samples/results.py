@@ -24,13 +24,15 @@ from vsacli.documents.source import Source
 from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
 from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.profile import WrenchProfile
 
 REPORT = {"format": "vsacli-report/2", "verdict": "ok", "samples": 0, "complete": True, "warnings": ["µ: –"]}
 SOURCE = Source("robots/two.yaml", "0" * 64, "name: two\n# °\n")
 
-PUSH = WrenchProfile(Constant(signal=WRENCH, span=(0.0, 1.0), value=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)), "base")
+PUSH = WrenchProfile(
+    ConstantProfile(signal=WRENCH, span=(0.0, 1.0), value=(1.0, 0.0, 0.0, 0.0, 0.0, 0.0)), "base"
+)
 
 
 @dataclass(frozen=True)

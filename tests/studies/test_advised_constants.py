@@ -21,7 +21,7 @@ from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.fix_search import causes
 from vsacli.studies.search.task import Task
-from vsacli.trajectory.curves import Constant, RestToRest
+from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -42,7 +42,7 @@ def random_motion(seed: int) -> tuple[Robot, Motion, FloatArray]:
     position = RestToRest(signal=POSITION, span=(0.0, duration), degree=9, start=start, end=end)
 
     def motion(stiffness: FloatArray) -> Trajectory:
-        level = Constant(signal=STIFFNESS, span=position.span, value=tuple(stiffness.tolist()))
+        level = ConstantProfile(signal=STIFFNESS, span=position.span, value=tuple(stiffness.tolist()))
         return Trajectory(UniformTimes(duration, rate), position, {"stiffness": level}, name="random")
 
     rest = compute_block(robot, motion(np.full(len(reach), 1e5)).at(np.array([0.0])))

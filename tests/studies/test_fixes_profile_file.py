@@ -18,8 +18,8 @@ from vsacli.studies.search import Fix, check_fixed_target
 from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.changed_motion import with_changed_stiffness
 from vsacli.studies.search.task import AS_IT_IS, Task
-from vsacli.trajectory.curves import Constant, RestToRest
-from vsacli.trajectory.curves.steps import stepwise
+from vsacli.trajectory.curves import ConstantProfile, RestToRest
+from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.curves.via_points import ViaPoints
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.trajectory import Trajectory
@@ -27,7 +27,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 def still_and_soft():
     trajectory = rest_to_rest(1.0, 790.0, end=(0.0, 0.0, 0.0), rate=200)
-    position = Constant(signal=POSITION, span=trajectory.times.span, value=(0.1, 1e-5, -2.0))
+    position = ConstantProfile(signal=POSITION, span=trajectory.times.span, value=(0.1, 1e-5, -2.0))
     return Trajectory(trajectory.times, position, trajectory.commanded, name="still: & 'soft'")
 
 
@@ -44,7 +44,7 @@ def through_points(trajectory):
     span, nothing = trajectory.times.span, (0.0,) * 6
     points = ((0.0, 0.0, 0.0), (0.1, 0.1, -0.1), (0.1, 0.3, 0.2))
     position = ViaPoints(signal=POSITION, span=span, degree=9, shares=(0.0, 0.6, 1.0), points=points)
-    push = stepwise(WRENCH, span, 5, [nothing, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)], [(0.1, 0.4)])
+    push = profile_of_levels(WRENCH, span, 5, [nothing, (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)], [(0.1, 0.4)])
     return Trajectory(
         trajectory.times, position, trajectory.commanded, wrench=WrenchProfile(push, "base"), name="via"
     )
@@ -101,7 +101,7 @@ def test_files_read_back_bit_for_bit_and_run_clean(tmp_path, task):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("task", "kind"), [("polynomial", RestToRest), ("constant", Constant)])
+@pytest.mark.parametrize(("task", "kind"), [("polynomial", RestToRest), ("constant", ConstantProfile)])
 def test_position_stays_a_formula(tmp_path, task, kind):
     robot = vsa_3r()
     path, table = written(fixed(TASKS[task]), tmp_path / "fixed.yml")

@@ -9,7 +9,7 @@ from samples.marks import slow
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.arrays import samples_of_arrays
-from vsacli.trajectory.recorded.samples import SampledProfile, Samples
+from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples
 from vsacli.trajectory.trajectory import Trajectory
 
 TIME = np.arange(4001) / 1000
@@ -27,7 +27,7 @@ def complaints(*given, q=None, noise=0.0, time=TIME, method=None):
     q = q + noise * np.random.default_rng(0).standard_normal(q.shape)
     missing = [None] * (4 - len(given))
     record = samples_of_arrays(POSITION, time, q, *given, *missing)
-    named = Samples(**{**vars(record), "labels": ("base", "elbow")})
+    named = SignalSamples(**{**vars(record), "labels": ("base", "elbow")})
     return [w for w in SampledProfile.of(named, FitChoice(method)).warnings if "follow" in w]
 
 

@@ -11,7 +11,7 @@ import sympy
 
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.trajectory.curves import DEGREES, Constant, RestToRest
+from vsacli.trajectory.curves import DEGREES, ConstantProfile, RestToRest
 
 EPS = np.finfo(float).eps
 SPAN = (0.1, 0.8)  # neither these nor their difference are binary fractions
@@ -98,7 +98,7 @@ def test_rest_to_rest_does_not_overshoot():
 def test_shape_is_orders_joints_samples_with_contiguous_samples(signal, orders):
     time = np.linspace(*SPAN, 4)
     moving = rest_to_rest(7, signal=signal)
-    still = Constant(signal=signal, span=SPAN, value=(1.0, 2.0, 3.0))
+    still = ConstantProfile(signal=signal, span=SPAN, value=(1.0, 2.0, 3.0))
     for profile in (moving, still):
         rows = profile.at(time)
         assert rows.shape == (orders, 3, 4)
@@ -110,7 +110,7 @@ def test_shape_is_orders_joints_samples_with_contiguous_samples(signal, orders):
 
 
 def test_constant_has_no_derivatives():
-    rows = Constant(signal=STIFFNESS, span=SPAN, value=(850.0, 900.0)).at(np.linspace(*SPAN, 3))
+    rows = ConstantProfile(signal=STIFFNESS, span=SPAN, value=(850.0, 900.0)).at(np.linspace(*SPAN, 3))
     np.testing.assert_array_equal(rows[0], [[850.0] * 3, [900.0] * 3])
     np.testing.assert_array_equal(rows[1:], 0.0)
 

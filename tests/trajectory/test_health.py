@@ -11,19 +11,19 @@ from samples.clean_records import MOTIONS, SENSORS, clean_records
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.trajectory.recorded.even_stamps import elapsed_times, even_rate, resolution, rounding_notes
+from vsacli.trajectory.recorded.even_stamps import elapsed_times, even_rate, rounding_notes, stamp_resolution
 from vsacli.trajectory.recorded.health import check_health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem
-from vsacli.trajectory.recorded.samples import Samples
+from vsacli.trajectory.recorded.samples import SignalSamples
 
 RATE = 1000
 TIME = np.arange(5001) / RATE
 DEVIATION = 1e-5
 
 
-def record(time: FloatArray, *rows: FloatArray, signal=POSITION) -> Samples:
+def record(time: FloatArray, *rows: FloatArray, signal=POSITION) -> SignalSamples:
     labels = tuple(map(str, range(len(rows))))
-    return Samples.recorded(signal, time, np.array(rows), (None,) * (signal.orders - 1), labels)
+    return SignalSamples.recorded(signal, time, np.array(rows), (None,) * (signal.orders - 1), labels)
 
 
 def found(time: FloatArray, *rows: FloatArray, signal=POSITION) -> list[SampleProblem]:
@@ -237,7 +237,7 @@ def test_rounded_stamps_of_even_samples_are_even(start: float, digits: int, rate
     time = np.delete(np.arange(2001), np.arange(700, 700 + lost)) / rate
     stamps = np.round(start + time, digits)
     # The step is known from the ends, each rounded.
-    np.testing.assert_allclose(elapsed_times(stamps), time, atol=2 * resolution(stamps), rtol=0)
+    np.testing.assert_allclose(elapsed_times(stamps), time, atol=2 * stamp_resolution(stamps), rtol=0)
     even = np.diff(elapsed_times(stamps)) * rate
     assert np.abs(even - np.round(even)).max() < 1e-3
     assert rounding_notes(stamps)[0].endswith("s from even, which is their rounding, and are taken for even")

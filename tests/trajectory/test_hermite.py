@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vsacli import Trajectory
-from vsacli.trajectory.recorded.hermite import interpolated
+from vsacli.trajectory.recorded.hermite import interpolate_hermite
 
 FREQUENCY = 3.0
 GIVEN = ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")
@@ -62,7 +62,7 @@ def test_derivatives_that_do_not_belong_together_say_nothing_between_samples(tra
 def test_uneven_samples_are_met_at_both_ends():
     time = np.sort(np.random.default_rng(0).uniform(0, 1, 200))
     rows = np.stack([sine(time, order).T for order in range(5)])
-    before = interpolated(time, rows, np.nextafter(time[1:], 0))
+    before = interpolate_hermite(time, rows, np.nextafter(time[1:], 0))
     # the gap is up to 0.03 s: h^7 of the ninth derivative over 7! 46080/720
     for order in range(5):
         np.testing.assert_allclose(before[order], rows[order][:, 1:], atol=1e-11 * FREQUENCY**order)

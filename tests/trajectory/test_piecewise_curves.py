@@ -9,8 +9,8 @@ import pytest
 
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.trajectory.curves import Constant, RestToRest
-from vsacli.trajectory.curves.steps import Chain, Jump, stepwise
+from vsacli.trajectory.curves import ConstantProfile, RestToRest
+from vsacli.trajectory.curves.steps import Jump, PiecewiseProfile, profile_of_levels
 from vsacli.trajectory.curves.via_points import ViaPoints
 
 SPAN = (0.1, 2.8)  # times that are no binary fractions
@@ -21,11 +21,11 @@ def move(span, start, end, degree=9):
 
 
 def hold(span, value):
-    return Constant(signal=POSITION, span=span, value=value)
+    return ConstantProfile(signal=POSITION, span=span, value=value)
 
 
 def chain(*parts):
-    return Chain(signal=POSITION, span=(parts[0].span[0], parts[-1].span[1]), parts=parts)
+    return PiecewiseProfile(signal=POSITION, span=(parts[0].span[0], parts[-1].span[1]), parts=parts)
 
 
 HERE, THERE, BACK = (0.0, 1.0), (1.0, -0.5), (0.25, 0.5)
@@ -107,7 +107,7 @@ def test_rounding_does_not_count_as_a_jump():
 def test_steps_hold_their_levels():
     changes = [(1.0, 1.5), (1.5, 2.0), (2.5, 3.0)]
     levels = [(900.0,), (1200.0,), (800.0,), (1000.0,)]
-    profile = stepwise(STIFFNESS, (0.0, 4.0), 5, levels, changes)
+    profile = profile_of_levels(STIFFNESS, (0.0, 4.0), 5, levels, changes)
     time = np.array([0.0, 0.5, 1.0, 1.25, 1.5, 2.0, 2.25, 2.75, 3.0, 4.0])
     expected = [900, 900, 900, 1050, 1200, 800, 800, 900, 1000, 1000]
     np.testing.assert_array_equal(profile.at(time)[0, 0], expected)
@@ -116,7 +116,9 @@ def test_steps_hold_their_levels():
 
 
 def test_steps_may_fill_the_span():
-    profile = stepwise(STIFFNESS, (0.0, 2.0), 5, [(900.0,), (1200.0,), (800.0,)], [(0.0, 1.0), (1.0, 2.0)])
+    profile = profile_of_levels(
+        STIFFNESS, (0.0, 2.0), 5, [(900.0,), (1200.0,), (800.0,)], [(0.0, 1.0), (1.0, 2.0)]
+    )
     assert [type(part) for part in profile.parts] == [RestToRest, RestToRest]
 
 
@@ -124,7 +126,7 @@ def test_parts_must_adjoin():
     with pytest.raises(InputError, match="must adjoin and fill its span"):
         chain(hold((0.0, 1.0), HERE), hold((1.5, 2.0), HERE))
     with pytest.raises(InputError, match="must adjoin and fill its span"):
-        Chain(signal=POSITION, span=(0.0, 2.0), parts=(hold((0.0, 1.0), HERE),))
+        PiecewiseProfile(signal=POSITION, span=(0.0, 2.0), parts=(hold((0.0, 1.0), HERE),))
 
 
 def test_parts_must_have_the_same_joints():

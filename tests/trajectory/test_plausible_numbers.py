@@ -13,7 +13,7 @@ from samples.slips import FURTHER, REST, TYPICAL, Slip
 
 from vsacli import Robot, Trajectory, load_robot, load_trajectory
 from vsacli.base.errors import Problem
-from vsacli.robot.plausibility import ROBOT_RULES, strange_of_robot
+from vsacli.robot.plausibility import ROBOT_RULES, robot_rules_with_findings
 from vsacli.trajectory.plausibility import TRAJECTORY_RULES
 
 RULES = {rule.name: rule for rule in (*ROBOT_RULES, *TRAJECTORY_RULES)}
@@ -76,7 +76,7 @@ def test_a_rule_is_explained_by_rules_that_come_before():
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.name)
 def test_no_rule_finds_anything_in_what_comes_along(example):
-    assert strange_of_robot(example.robot.checked, example.robot.sources) == frozenset()
+    assert robot_rules_with_findings(example.robot.checked, example.robot.sources) == frozenset()
     for each in example.trajectories:
         trajectory = load_trajectory(each.path, example.robot)
         assert [warning for warning in trajectory.located_warnings if warning.line] == []

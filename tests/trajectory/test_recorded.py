@@ -11,7 +11,7 @@ from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.header_problems import RATE_INSTEAD
-from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
+from vsacli.trajectory.recorded.recording import read_recorded_signals, recorded_trajectory
 
 JOINTS = CommandedJoints({"base": "revolute", "elbow": "revolute"}, exempt={})
 TIME = np.arange(8) / 10
@@ -46,7 +46,7 @@ def by_number(*names):
 
 def problems(path, wanted=(POSITION, STIFFNESS)):
     with pytest.raises(InputError) as caught:
-        read_recording(path, JOINTS, dict.fromkeys(wanted, FitChoice()))
+        read_recorded_signals(path, JOINTS, dict.fromkeys(wanted, FitChoice()))
     assert {problem.file for problem in caught.value.problems} == {str(path)}
     return [(problem.line, problem.message) for problem in caught.value.problems]
 
@@ -81,18 +81,18 @@ def test_trajectory_is_named_after_the_file_and_says_what_was_fitted(csv):
 
 
 def test_only_wanted_signals_are_needed_and_unused_ones_are_noted(csv):
-    position = read_recording(csv(columns(*by_joint("q"))), JOINTS, {POSITION: FitChoice()})
+    position = read_recorded_signals(csv(columns(*by_joint("q"))), JOINTS, {POSITION: FitChoice()})
     assert [profile.signal for profile in position.profiles] == [POSITION]
     assert position.notes == ()
 
     path = csv(columns(*by_joint("q", "stiffness", "dq")))
-    stiffness = read_recording(path, JOINTS, {STIFFNESS: FitChoice()})
+    stiffness = read_recorded_signals(path, JOINTS, {STIFFNESS: FitChoice()})
     assert [profile.signal for profile in stiffness.profiles] == [STIFFNESS]
     assert stiffness.notes == (f"{path}: its columns of q are not used",)
 
 
 def test_profiles_come_in_the_order_asked_for(csv):
-    recording = read_recording(
+    recording = read_recorded_signals(
         csv(columns(*by_joint("q", "stiffness"))), JOINTS, dict.fromkeys([STIFFNESS, POSITION], FitChoice())
     )
     assert [profile.signal for profile in recording.profiles] == [STIFFNESS, POSITION]
@@ -230,7 +230,9 @@ def test_too_few_rows(csv):
 
 
 def recording(csv, time, name):
-    return read_recording(csv(columns(*by_joint("q"), time=time), name), JOINTS, {POSITION: FitChoice()})
+    return read_recorded_signals(
+        csv(columns(*by_joint("q"), time=time), name), JOINTS, {POSITION: FitChoice()}
+    )
 
 
 def test_files_with_equal_times_may_be_combined(csv):

@@ -12,7 +12,7 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.fits import FitChoice
-from vsacli.trajectory.recorded.recording import read_recording, recorded_trajectory
+from vsacli.trajectory.recorded.recording import read_recorded_signals, recorded_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
 pytestmark = pytest.mark.usefixtures("own_folder")
@@ -119,7 +119,7 @@ def test_columns_with_the_same_wrong_unit_share_a_message():
 def test_a_column_with_two_units_appears_twice():
     write("m.csv", ["time", "q1[rad]", "q1[deg]", "q2"], TIME, motion(), motion()[:, :1])
     with pytest.raises(InputError, match=r"m.csv:1: column 'q1' appears 2 times"):
-        read_recording("m.csv", JOINTS, {POSITION: FitChoice()})
+        read_recorded_signals("m.csv", JOINTS, {POSITION: FitChoice()})
 
 
 def test_lines_are_those_of_the_file_with_comments():
@@ -128,7 +128,7 @@ def test_lines_are_those_of_the_file_with_comments():
     lines[10] = lines[9]
     Path("m.csv").write_text("\n".join(["# made by hand", *lines[:5], "# a pause", *lines[5:]]))
     with pytest.raises(InputError, match=r"^m.csv:13: time must increase, but 0.008 s appears twice"):
-        read_recording("m.csv", JOINTS, {POSITION: FitChoice()})
+        read_recorded_signals("m.csv", JOINTS, {POSITION: FitChoice()})
 
 
 @pytest.mark.parametrize("derivatives", [False, True])
@@ -217,7 +217,7 @@ def test_rate_that_is_not_possible(robot):
 def test_fit_that_is_asked_for():
     write("m.csv", ["time", "q1", "q2"], TIME, motion())
     for method, exact in (("lsq", False), ("interpolate", True), (None, True)):
-        (profile,) = read_recording("m.csv", JOINTS, {POSITION: FitChoice(method)}).profiles
+        (profile,) = read_recorded_signals("m.csv", JOINTS, {POSITION: FitChoice(method)}).profiles
         assert profile.fit.exact.all() == exact
     with pytest.raises(InputError, match="fit must be one of lsq, interpolate, smooth, not 'spline'"):
         Trajectory.from_samples(TIME, motion(), fit="spline")

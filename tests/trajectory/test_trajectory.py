@@ -10,8 +10,8 @@ import pytest
 from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.documents.source import Source
-from vsacli.trajectory.curves import Constant, RestToRest
-from vsacli.trajectory.curves.steps import Chain
+from vsacli.trajectory.curves import ConstantProfile, RestToRest
+from vsacli.trajectory.curves.steps import PiecewiseProfile
 from vsacli.trajectory.recorded.arrays import samples_of_arrays
 from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
@@ -73,8 +73,8 @@ def test_block_is_the_function_at_the_steps():
 
 def test_warnings_and_notes_of_all_parts_and_sources_are_collected():
     times = UniformTimes(0.25, 10.0)
-    still = Constant(signal=POSITION, span=times.span, value=(0.0,))
-    firm = Constant(signal=STIFFNESS, span=times.span, value=(850.0,))
+    still = ConstantProfile(signal=POSITION, span=times.span, value=(0.0,))
+    firm = ConstantProfile(signal=STIFFNESS, span=times.span, value=(850.0,))
     source = Source("a.yaml", "0" * 64, "")
     trajectory = Trajectory(
         times, still, {"stiffness": firm}, name="hold", warnings=["odd"], notes=["first"], sources=[source]
@@ -88,8 +88,8 @@ def test_warnings_and_notes_of_all_parts_and_sources_are_collected():
 
 def test_parts_have_the_same_joints():
     times = UniformTimes(1.0, 10.0)
-    still = Constant(signal=POSITION, span=times.span, value=(0.0, 0.0, 0.0))
-    firm = Constant(signal=STIFFNESS, span=times.span, value=(850.0,))
+    still = ConstantProfile(signal=POSITION, span=times.span, value=(0.0, 0.0, 0.0))
+    firm = ConstantProfile(signal=STIFFNESS, span=times.span, value=(850.0,))
     with pytest.raises(InputError, match="the position has 3 joints, the stiffness 1"):
         Trajectory(times, still, {"stiffness": firm}, name="test")
 
@@ -98,8 +98,8 @@ def test_parts_have_the_same_joints():
 def test_parts_have_the_span_of_the_steps(part):
     times = UniformTimes(1.0, 10.0)
     spans = {"position": times.span, "stiffness": times.span, part: (0.0, 2.0)}
-    still = Constant(signal=POSITION, span=spans["position"], value=(0.0,))
-    firm = Constant(signal=STIFFNESS, span=spans["stiffness"], value=(850.0,))
+    still = ConstantProfile(signal=POSITION, span=spans["position"], value=(0.0,))
+    firm = ConstantProfile(signal=STIFFNESS, span=spans["stiffness"], value=(850.0,))
     with pytest.raises(InputError, match=f"the {part} spans 0 to 2 s, the steps 0 to 1 s"):
         Trajectory(times, still, {"stiffness": firm}, name="test")
 
@@ -194,8 +194,8 @@ def test_check_points_pass_over_pieces_as_narrow_as_rounding():
 
     def halves(signal, middle):
         spans = (0.0, middle), (middle, 2.0)
-        parts = tuple(Constant(signal=signal, span=span, value=level) for span in spans)
-        return Chain(signal=signal, span=(0.0, 2.0), parts=parts)
+        parts = tuple(ConstantProfile(signal=signal, span=span, value=level) for span in spans)
+        return PiecewiseProfile(signal=signal, span=(0.0, 2.0), parts=parts)
 
     stiffness = halves(STIFFNESS, 1.0 + EPS)
     trajectory = Trajectory(
@@ -281,12 +281,12 @@ def test_scipy_is_loaded_only_for_splines():
     script = """
 import sys
 import numpy as np
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.base.signals import POSITION
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 times = UniformTimes(7.0, 1.0)
-still = Constant(signal=POSITION, span=times.span, value=(0.0,))
+still = ConstantProfile(signal=POSITION, span=times.span, value=(0.0,))
 closed = Trajectory(times, still, {}, name="still")
 closed.block(0, 8), closed.check_points(3), closed.at(np.arange(8.0))
 assert "scipy" not in sys.modules

@@ -12,7 +12,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES
 from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.trajectory.curves import Constant, RestToRest
+from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
 
@@ -74,7 +74,7 @@ def test_without_a_wrench_the_result_has_none() -> None:
 
 @frames
 def test_a_run_that_ends_early_keeps_the_wrench_so_far(frame: str) -> None:
-    heavy = Constant(signal=WRENCH, span=SPAN, value=(0, 0, -900, 0, 0, 0))
+    heavy = ConstantProfile(signal=WRENCH, span=SPAN, value=(0, 0, -900, 0, 0, 0))
     result = inverse_dynamics(vsa_3r(), trajectory(WrenchProfile(heavy, frame)), stop_on_infeasible=True)
     assert not result.report.complete
     assert result.wrench.shape == (len(result.time), 6)
@@ -90,11 +90,11 @@ def test_a_stretched_trajectory_stretches_its_wrench() -> None:
 
 def test_a_wrench_has_six_components_over_the_span_of_the_steps() -> None:
     with pytest.raises(InputError, match=r"the wrench has 3 components, not 6 \(fx, fy, fz, mx, my, mz\)"):
-        WrenchProfile(Constant(signal=WRENCH, span=SPAN, value=(1, 2, 3)))
+        WrenchProfile(ConstantProfile(signal=WRENCH, span=SPAN, value=(1, 2, 3)))
     with pytest.raises(InputError, match=r"the wrench spans 0 to 3 s, the steps 0 to 2 s"):
-        trajectory(WrenchProfile(Constant(signal=WRENCH, span=(0, 3), value=(0,) * 6)))
+        trajectory(WrenchProfile(ConstantProfile(signal=WRENCH, span=(0, 3), value=(0,) * 6)))
     with pytest.raises(InputError, match=r"unknown frame 'tool' of the wrench; valid: end_effector, base"):
-        WrenchProfile(Constant(signal=WRENCH, span=SPAN, value=(0,) * 6), "tool")
+        WrenchProfile(ConstantProfile(signal=WRENCH, span=SPAN, value=(0,) * 6), "tool")
 
 
 def sampled(**arrays: object) -> Trajectory:

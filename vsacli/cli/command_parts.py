@@ -206,9 +206,9 @@ def _divided(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
     if not changes:
         return {}, {}
     from vsacli.documents.reading import read_changes
-    from vsacli.trajectory.changes import divided
+    from vsacli.trajectory.changes import divide_changes_by_file
 
-    return divided(read_changes(changes))
+    return divide_changes_by_file(read_changes(changes))
 
 
 def compute(run: Run, talk: Talk, writer: ResultWriter | None = None) -> Report:

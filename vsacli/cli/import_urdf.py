@@ -149,6 +149,6 @@ def import_urdf(
             file = outputs.file(path)
             with naming_option("--spring", InvalidRecordError):  # constants from the load are valid
                 conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold, srdf, group)
-        file.write_text(conversions.robot_text(conversion))
+        file.write_text(conversions.converted_robot_text(conversion))
     click.echo(str(conversion))
     talk.wrote(outputs)

@@ -32,10 +32,10 @@ from vsacli.dynamics.drive import ACTUATED, OF_DEVICES, drive
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
 from vsacli.dynamics.limits import limit_checks
 from vsacli.dynamics.losses import dissipated_power
-from vsacli.robot.commanded_joints import takers
+from vsacli.robot.commanded_joints import describe_commanded_joints
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot, check_robot
-from vsacli.trajectory.devices import with_devices
+from vsacli.trajectory.devices import set_uncommanded_dampers
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -344,7 +344,7 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
     if trajectory.joints != len(robot.joints):
         joints = f"{trajectory.joints} joints, the robot {robot.name} {len(robot.joints)}"
         raise InputError.one(f"the trajectory {trajectory.name} has {joints}")
-    trajectory = with_devices(trajectory, robot)
+    trajectory = set_uncommanded_dampers(trajectory, robot)
     for key, signal in COMMANDED.items():
         lacking = [
             joint.name
@@ -354,7 +354,7 @@ def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
         if lacking:
             raise InputError.one(
                 f"the trajectory {trajectory.name} has no {key} for {', '.join(lacking)}; "
-                f"each {takers(signal)} needs one"
+                f"each {describe_commanded_joints(signal)} needs one"
             )
     return trajectory
 

@@ -33,7 +33,7 @@ def unattainable(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
         fault = f"is {value:.4g} {unit} at t = {time_text(time)}, outside {ends}; {ADVICE}"
         groups.setdefault(f"position of {{}} {fault}", []).append(index)
     if not any(warning.message.startswith(STIFFNESS.key) for warning in trajectory.located_warnings):
-        for index, (joint, found) in enumerate(zip(robot.joints, robot.checked.corridors, strict=True)):
+        for index, (joint, found) in enumerate(zip(robot.joints, robot.checked.unloaded_ranges, strict=True)):
             if found is not None and low[index] < found.lower:
                 unit = units.STIFFNESS.unit(joint.type)
                 minimum = f"below the minimum of {found.lower:.4g} {unit} without load"

@@ -221,7 +221,11 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
     }
     if stiffness:
         values["stiffness"] = {"type": "polynomial", "degree": STIFFNESS_DEGREE, **stiffness}
-    further = [] if robot is None else sorted(CommandedJoints.of(robot).taken - {"stiffness", "damping"})
+    further = (
+        []
+        if robot is None
+        else sorted(CommandedJoints.of(robot).commanding_signals - {"stiffness", "damping"})
+    )
     values |= {key: {"type": "constant", "value": 1} for key in further}
     if robot is not None and (damping := _damping(robot)):
         values["damping"] = {"type": "constant", "value": damping}

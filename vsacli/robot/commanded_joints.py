@@ -43,22 +43,24 @@ class CommandedJoints:
         return tuple(self.types)
 
     @property
-    def taken(self) -> frozenset[str]:
+    def commanding_signals(self) -> frozenset[str]:
         """Keys of the signals that command at least one joint."""
         return frozenset(key for key, exempt in self.exempt.items() if len(exempt) < len(self.types))
 
     @property
-    def untaken_devices(self) -> tuple[Signal, ...]:
+    def absent_device_signals(self) -> tuple[Signal, ...]:
         """Signals of devices that are on no joint."""
-        return tuple(each for each in COMMANDED.values() if each.device and each.key not in self.taken)
+        return tuple(
+            each for each in COMMANDED.values() if each.device and each.key not in self.commanding_signals
+        )
 
-    def taking(self, signal: Signal) -> dict[int, str]:
+    def joints_of(self, signal: Signal) -> dict[int, str]:
         """Return the names of the joints that a signal commands, by index."""
         exempt = self.exempt.get(signal.key, {})
         return {index: name for index, name in enumerate(self.types) if name not in exempt}
 
 
-def takers(signal: Signal, joint: str = "joint") -> str:
+def describe_commanded_joints(signal: Signal, joint: str = "joint") -> str:
     """Return a phrase for the joints that a signal commands, built on the word "joint" or "joints"."""
     if signal.device is not None:
         return f"{joint} with a {signal.device}"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-class Row(Protocol):
+class DhJoint(Protocol):
     """The part of a joint that determines its frame."""
 
     @property
@@ -42,11 +42,11 @@ class Geometry(Protocol):
         """Pose of the end effector in the last DH frame."""
 
     @property
-    def joints(self) -> Sequence[Row]:
+    def joints(self) -> Sequence[DhJoint]:
         """Joints from the base to the tip."""
 
 
-class Frame(NamedTuple):
+class FramePose(NamedTuple):
     """A frame in another one: axes as columns, ([samples,] 3, 3), and origin, ([samples,] 3), m."""
 
     axes: FloatArray
@@ -56,28 +56,28 @@ class Frame(NamedTuple):
         """Return a point of this frame in the outer frame, (samples, 3), m."""
         return np.asarray(self.axes @ np.array(local) + self.origin)
 
-    def holding(self, inner: Frame) -> Frame:
+    def compose(self, inner: FramePose) -> FramePose:
         """Return a frame that is given in this one as a frame of the outer one."""
         origin = (self.axes @ inner.origin[..., None])[..., 0] + self.origin
-        return Frame(self.axes @ inner.axes, origin)
+        return FramePose(self.axes @ inner.axes, origin)
 
 
-def frames(robot: Geometry, q: FloatArray) -> Iterator[Frame]:
+def frames(robot: Geometry, q: FloatArray) -> Iterator[FramePose]:
     """Yield frames 0 to N in DH frame 0, at joint positions q, (samples, joints)."""
-    frame = Frame(np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))
+    frame = FramePose(np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))
     yield frame
     for joint, variable in zip(robot.joints, q.T, strict=True):
-        frame = frame.holding(_link_frame(joint, variable))
+        frame = frame.compose(_link_frame(joint, variable))
         yield frame
 
 
-def _link_frame(joint: Row, variable: FloatArray) -> Frame:
+def _link_frame(joint: DhJoint, variable: FloatArray) -> FramePose:
     """Return frame i in frame i-1: Rz(theta) Tz(d) Tx(a) Rx(alpha)."""
     dh, zero = joint.dh, np.zeros_like(variable)
     theta, d = (dh.theta + variable, dh.d + zero) if joint.is_revolute else (dh.theta + zero, dh.d + variable)
     c, s, ca, sa = np.cos(theta), np.sin(theta), math.cos(dh.alpha), math.sin(dh.alpha)
     rows = [[c, -s * ca, s * sa], [s, c * ca, -c * sa], [zero, zero + sa, zero + ca]]
-    return Frame(np.moveaxis(np.array(rows), -1, 0), np.stack([dh.a * c, dh.a * s, d], axis=-1))
+    return FramePose(np.moveaxis(np.array(rows), -1, 0), np.stack([dh.a * c, dh.a * s, d], axis=-1))
 
 
 def forward_kinematics(robot: Robot, q: ArrayLike) -> FloatArray:
@@ -138,17 +138,17 @@ def jacobian(robot: Robot, q: ArrayLike, frame: str = "end_effector") -> FloatAr
     return columns.reshape(*positions.shape[:-1], *columns.shape[1:])
 
 
-def frames_in_base(robot: Geometry, q: FloatArray) -> Iterator[Frame]:
+def frames_in_base(robot: Geometry, q: FloatArray) -> Iterator[FramePose]:
     """Yield frames 0 to N and the end effector's in the base frame, at positions q, (samples, joints)."""
     base, tool = _constant_frame(robot.base), _constant_frame(robot.tool)
     for frame in frames(robot, q):
-        last = base.holding(frame)
+        last = base.compose(frame)
         yield last
-    yield last.holding(tool)
+    yield last.compose(tool)
 
 
-def _constant_frame(pose: Pose) -> Frame:
-    return Frame(np.array(rotation_matrix(pose), dtype=np.float64), np.array(pose.xyz))
+def _constant_frame(pose: Pose) -> FramePose:
+    return FramePose(np.array(rotation_matrix(pose), dtype=np.float64), np.array(pose.xyz))
 
 
 def tip_position(robot: Robot, q: FloatArray) -> FloatArray:

@@ -141,13 +141,13 @@ class Robot(DeclaredRecord):
     @property
     def located_warnings(self) -> tuple[Problem, ...]:
         """Warnings about implausible values, with the line if they concern a number of the robot file."""
-        from vsacli.robot.plausibility import implausible
+        from vsacli.robot.plausibility import robot_findings
 
         massless = not any(joint.link.mass for joint in self.joints)
         of_robot = {OF_PLACEHOLDERS: self.placeholder, WITHOUT_MASSES: massless}
         of_joints = (warning for joint in self.joints for warning in joint.warnings())
         whole = (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
-        return (*(Problem("", 0, warning) for warning in whole), *implausible(self.checked, self.sources))
+        return (*(Problem("", 0, warning) for warning in whole), *robot_findings(self.checked, self.sources))
 
 
 def check_robot(value: object) -> None:

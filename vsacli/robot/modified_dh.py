@@ -36,15 +36,17 @@ def as_standard(robot: Robot) -> Robot:
         _standard_joint(joint, row, next_row)
         for joint, (row, next_row) in zip(robot.joints, pairwise(rows), strict=True)
     )
-    return dataclasses.replace(robot, base=_moved(robot.base, rows[0]), joints=tuple(joints))
+    return dataclasses.replace(
+        robot, base=_append_link_twist_and_length(robot.base, rows[0]), joints=tuple(joints)
+    )
 
 
 def modified_link(joint: Joint) -> Link:
     """Return the link of a standard joint in its modified frame, as in a file of that convention."""
-    return _moved_link(joint.link, DenavitHartenberg(a=-joint.dh.a, alpha=-joint.dh.alpha))
+    return _link_in_shifted_frame(joint.link, DenavitHartenberg(a=-joint.dh.a, alpha=-joint.dh.alpha))
 
 
-def _moved(base: Pose, row: DenavitHartenberg) -> Pose:
+def _append_link_twist_and_length(base: Pose, row: DenavitHartenberg) -> Pose:
     """Return the pose followed by Rx(alpha) Tx(a); alpha adds to the roll, which is about the same axis."""
     shift = rotation_matrix(base).times(Vector(exact(row.a), 0, 0))
     x, y, z = (float(start + step) for start, step in zip(base.xyz, shift, strict=True))
@@ -54,24 +56,24 @@ def _moved(base: Pose, row: DenavitHartenberg) -> Pose:
 
 def _standard_joint(joint: Joint, row: DenavitHartenberg, next_row: DenavitHartenberg) -> Joint:
     dh = DenavitHartenberg(a=next_row.a, alpha=next_row.alpha, d=row.d, theta=row.theta)
-    return dataclasses.replace(joint, dh=dh, link=_moved_link(joint.link, next_row))
+    return dataclasses.replace(joint, dh=dh, link=_link_in_shifted_frame(joint.link, next_row))
 
 
-def _moved_link(link: Link, row: DenavitHartenberg) -> Link:
+def _link_in_shifted_frame(link: Link, row: DenavitHartenberg) -> Link:
     """Return the link expressed in the frame at Tx(a) Rx(alpha)."""
     c, s = trigonometric("cos", row.alpha), trigonometric("sin", row.alpha)
-    x, (y, z) = link.com[0] - row.a, _turned(c, s, *link.com[1:])
-    return Link(mass=link.mass, com=(x, y, z), inertia=_turned_inertia(link.inertia, c, s))
+    x, (y, z) = link.com[0] - row.a, _rotate_about_x(c, s, *link.com[1:])
+    return Link(mass=link.mass, com=(x, y, z), inertia=_rotate_inertia_about_x(link.inertia, c, s))
 
 
-def _turned(c: Scalar, s: Scalar, y: float, z: float) -> tuple[float, float]:
+def _rotate_about_x(c: Scalar, s: Scalar, y: float, z: float) -> tuple[float, float]:
     """Return components y and z in axes rotated about x by the angle with this cosine and sine."""
     return float(add(mul(c, y), mul(s, z))), float(sub(mul(c, z), mul(s, y)))
 
 
-def _turned_inertia(inertia: Inertia, c: Scalar, s: Scalar) -> Inertia:
-    xy, xz = _turned(c, s, inertia.xy, inertia.xz)
-    yy, zy = _turned(c, s, inertia.yy, inertia.yz)
-    yz, zz = _turned(c, s, inertia.yz, inertia.zz)
-    (new_yy, new_yz), (_, new_zz) = _turned(c, s, yy, yz), _turned(c, s, zy, zz)
+def _rotate_inertia_about_x(inertia: Inertia, c: Scalar, s: Scalar) -> Inertia:
+    xy, xz = _rotate_about_x(c, s, inertia.xy, inertia.xz)
+    yy, zy = _rotate_about_x(c, s, inertia.yy, inertia.yz)
+    yz, zz = _rotate_about_x(c, s, inertia.yz, inertia.zz)
+    (new_yy, new_yz), (_, new_zz) = _rotate_about_x(c, s, yy, yz), _rotate_about_x(c, s, zy, zz)
     return Inertia(xx=inertia.xx, yy=new_yy, zz=new_zz, xy=xy, xz=xz, yz=new_yz)

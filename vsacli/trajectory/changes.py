@@ -14,14 +14,14 @@ from vsacli.robot.file import RobotFile
 from vsacli.trajectory.file import OF_ANY_ROBOT
 
 
-class Divided(NamedTuple):
+class ChangesByFile(NamedTuple):
     """Changes of the robot file and of the trajectory file."""
 
     robot: Changes
     trajectory: Changes
 
 
-def divided(changes: Changes) -> Divided:
+def divide_changes_by_file(changes: Changes) -> ChangesByFile:
     """Divide changes by the file that has the first key of their path.
 
     No key occurs in both files, except the ones in `KEPT`, which cannot be changed.
@@ -30,16 +30,16 @@ def divided(changes: Changes) -> Divided:
         ChangeError: neither file has such a key, or the key is in `KEPT`.
     """
     robot, trajectory = declared(RobotFile), declared(OF_ANY_ROBOT)
-    found = Divided({}, {})
+    by_file = ChangesByFile({}, {})
     for (path, value), change in zip(changes.items(), written(changes), strict=True):
         check_path_of_change(path, change)
         first = path.partition(".")[0]
         if first not in robot and first not in trajectory:
             hint = _hint(path, [key for key in (*robot, *trajectory) if key not in KEPT])
             raise ChangeError.of(change, f"neither robot nor trajectory has {first!r} at the top level{hint}")
-        of = found.robot if first in robot else found.trajectory
+        of = by_file.robot if first in robot else by_file.trajectory
         of[path] = value  # type: ignore[index]
-    return found
+    return by_file
 
 
 def _hint(path: str, keys: Sequence[str]) -> str:

@@ -24,7 +24,7 @@ VANISHING = 1e-12
 """Share of the largest damping below which a minimum counts as zero: rounding."""
 
 
-def with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
+def set_uncommanded_dampers(trajectory: Trajectory, robot: Robot) -> Trajectory:
     """Return the trajectory with uncommanded dampers at their minimum, and a note on them.
 
     Raises:
@@ -37,8 +37,10 @@ def with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
     if inside:
         time = np.union1d(np.linspace(*trajectory.times.span, SEEN), trajectory.breakpoints)
         for index in inside:
-            with_dips = np.union1d(time, _dips(trajectory, time, index))
-            _check_damping(robot.joints[index], with_dips, _damping(trajectory, with_dips, index)[0])
+            with_dips = np.union1d(time, _damping_minima(trajectory, time, index))
+            _check_damping(
+                robot.joints[index], with_dips, _commanded_damping(trajectory, with_dips, index)[0]
+            )
     return trajectory
 
 
@@ -54,17 +56,17 @@ def _with_least_damping(trajectory: Trajectory, robot: Robot) -> Trajectory:
     return trajectory.commanding(DAMPING, least, note)
 
 
-def _damping(trajectory: Trajectory, time: FloatArray, joint: int) -> list[FloatArray]:
+def _commanded_damping(trajectory: Trajectory, time: FloatArray, joint: int) -> list[FloatArray]:
     commanded = trajectory.at(time).commanded
     return [commanded[name][:, joint] for name in DAMPING.names]
 
 
-def _dips(trajectory: Trajectory, time: FloatArray, joint: int) -> FloatArray:
+def _damping_minima(trajectory: Trajectory, time: FloatArray, joint: int) -> FloatArray:
     """Return the times of local minima of the damping, by Newton's method on its rate."""
-    before = np.flatnonzero(np.diff(np.sign(_damping(trajectory, time, joint)[1])) > 0)
+    before = np.flatnonzero(np.diff(np.sign(_commanded_damping(trajectory, time, joint)[1])) > 0)
     dips = time[before]
     for _ in range(NEWTON_STEPS):
-        _, rate, bend = _damping(trajectory, dips, joint)
+        _, rate, bend = _commanded_damping(trajectory, dips, joint)
         dips = np.clip(dips - rate / np.where(bend > 0, bend, np.inf), time[before], time[before + 1])
     return dips
 

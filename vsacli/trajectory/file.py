@@ -24,15 +24,15 @@ from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.curves.types import Declaration, Formula, Recorded, Use, declared_as
-from vsacli.trajectory.devices import with_devices
-from vsacli.trajectory.plausibility import CheckedTrajectory, implausible
+from vsacli.trajectory.devices import set_uncommanded_dampers
+from vsacli.trajectory.plausibility import CheckedTrajectory, trajectory_findings
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from vsacli.trajectory.fits import FitChoice
-    from vsacli.trajectory.recorded.recording import Recording
+    from vsacli.trajectory.recorded.recording import RecordedSignals
 
 DEFAULT_RATE = 1000.0
 
@@ -186,7 +186,7 @@ def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tu
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
+    cls = content(joints.commanding_signals, rigid=joints.rigid, untaken=joints.absent_device_signals)
     return read_document(path, cls, file_formats.TRAJECTORY, joints.types, joints.exempt)
 
 
@@ -233,7 +233,7 @@ def declared_trajectory(
         warnings=[
             *(warning for recording in recordings for warning in recording.warnings),
             *_warnings(document, declared, joints),
-            *implausible(checked, source),
+            *trajectory_findings(checked, source),
         ],
         notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, declared)],
         sources=[source, *(recording.source for recording in recordings)],
@@ -271,19 +271,19 @@ def _blaming(changes: Changes, path: str) -> Iterator[None]:
 
 def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
     try:
-        return with_devices(trajectory, robot)
+        return set_uncommanded_dampers(trajectory, robot)
     except InputError as error:
         raise InputError.one(str(error), trajectory.sources[0].path) from None
 
 
 def _read_recordings(
     document: TrajectoryFile, folder: Path, joints: CommandedJoints, progress: Progress
-) -> list[Recording]:
+) -> list[RecordedSignals]:
     """Read each CSV file once, for all signals declared from it; check that all files have equal times."""
     if not document.recorded:
         return []
     from vsacli.documents.column_mapping import ColumnMapping
-    from vsacli.trajectory.recorded.recording import read_recording
+    from vsacli.trajectory.recorded.recording import read_recorded_signals
 
     wanted: dict[Path, dict[Signal, FitChoice]] = defaultdict(dict)
     mappings: dict[Path, ColumnMapping] = defaultdict(lambda: ColumnMapping(rate=document.rate))
@@ -294,7 +294,7 @@ def _read_recordings(
 
     resampled, unwrap = document.rate is not None, getattr(document.recorded.get(POSITION), "unwrap", False)
     recordings = [
-        read_recording(
+        read_recorded_signals(
             file, joints, fits, mappings[file], resampled=resampled, unwrap=unwrap, progress=progress
         )
         for file, fits in wanted.items()
@@ -304,17 +304,21 @@ def _read_recordings(
     return recordings
 
 
-def _times(document: TrajectoryFile, recordings: Sequence[Recording], file: str) -> Times:
+def _times(document: TrajectoryFile, recordings: Sequence[RecordedSignals], file: str) -> Times:
     if recordings:
         return recordings[0].times_at(document.rate, file)
     assert document.lasts is not None, "see TrajectoryFile"
     return UniformTimes(document.lasts, document.rate or DEFAULT_RATE)
 
 
-def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recording]) -> dict[str, Profile]:
+def _profiles(
+    document: TrajectoryFile, times: Times, recordings: Sequence[RecordedSignals]
+) -> dict[str, Profile]:
     """Return the profiles by signal key, at the declared pace."""
     first, last = times.span
-    formulas = {signal.key: each.over((0.0, last - first)) for signal, each in document.formulas.items()}
+    formulas = {
+        signal.key: each.profile_over((0.0, last - first)) for signal, each in document.formulas.items()
+    }
     return {**formulas, **{each.signal.key: each for one in recordings for each in one.profiles}}
 
 

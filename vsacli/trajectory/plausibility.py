@@ -19,7 +19,7 @@ from vsacli.documents.record_values import Entry, Number
 from vsacli.documents.source import Source
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.robot.plausibility import strange_of_robot
+from vsacli.robot.plausibility import robot_rules_with_findings
 from vsacli.robot.plausibility.bodies import (
     CENTIMETERS,
     DEGREES,
@@ -28,7 +28,7 @@ from vsacli.robot.plausibility.bodies import (
     SIZES,
     turns,
 )
-from vsacli.robot.plausibility.checked_robot import BodySizes, Corridor, ratio
+from vsacli.robot.plausibility.checked_robot import BodySizes, UnloadedStiffnessRange, ratio_or_nan
 from vsacli.robot.plausibility.springs import NEWTON_MILLIMETERS, TOO_SOFT
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import Times
@@ -62,10 +62,10 @@ RANGES = ("ranges of revolute joints", "ranges of prismatic joints")
 POSITIONS = ("positions of revolute joints", "positions of prismatic joints", *RANGES)
 
 
-def implausible(checked: CheckedTrajectory, source: Source) -> tuple[Problem, ...]:
+def trajectory_findings(checked: CheckedTrajectory, source: Source) -> tuple[Problem, ...]:
     """Return the findings of the rules, each with its line of the trajectory file."""
-    known = strange_of_robot(checked.robot.checked, checked.robot.sources)
-    return findings(TRAJECTORY_RULES, checked, Written(source), known)
+    robot_rules = robot_rules_with_findings(checked.robot.checked, checked.robot.sources)
+    return findings(TRAJECTORY_RULES, checked, Written(source), robot_rules)
 
 
 @dataclass(frozen=True)
@@ -90,14 +90,14 @@ class CheckedTrajectory:
         return self.robot.checked.sizes
 
     @cached_property
-    def moved(self) -> FloatArray | None:
+    def sampled_motion(self) -> FloatArray | None:
         """Position and its derivatives, (orders, joints, instants); None if they are recorded."""
         return None if self.motion is None else self.motion.at(np.linspace(*self.times.span, INSTANTS))
 
     @property
-    def corridors(self) -> tuple[Corridor | None, ...]:
+    def unloaded_ranges(self) -> tuple[UnloadedStiffnessRange | None, ...]:
         """Attainable stiffness of each joint at rest; None if it has no commanded stiffness."""
-        return self.robot.checked.corridors
+        return self.robot.checked.unloaded_ranges
 
     @property
     def revolute(self) -> BoolArray:
@@ -123,12 +123,12 @@ class CheckedTrajectory:
                 unit = quantity.unit(self.robot.joints[joint].type)
                 yield Measured(path, value, unit, abs(value)), joint
 
-    def paced(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
+    def measure_timing(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
         """Yield the time or frequency that sets the timing, with the largest size of all joints."""
         of_motion = [each for each in self.numbers if each.path[0] in ("duration", POSITION.key)]
-        given = [each for each in of_motion if each.path[-1] == "frequency"]
-        given = given or [each for each in of_motion if each.quantity == units.TIME]
-        longest = max(given, key=lambda each: each.value, default=None)
+        timings = [each for each in of_motion if each.path[-1] == "frequency"]
+        timings = timings or [each for each in of_motion if each.quantity == units.TIME]
+        longest = max(timings, key=lambda each: each.value, default=None)
         if longest is not None and longest.quantity == quantity:
             joint = int(np.argmax(sizes))
             names = {"joint": self.robot.joint_names[joint], **beside}
@@ -136,101 +136,110 @@ class CheckedTrajectory:
             yield Measured(longest.path, longest.value, unit, float(sizes[joint]), names)
 
 
-def _positions(checked: CheckedTrajectory, unit: str) -> Iterator[Measured]:
+def _measure_joint_positions(checked: CheckedTrajectory, unit: str) -> Iterator[Measured]:
     """Yield positions in a unit, in turns or reaches of the robot, except those within joint limits."""
     for measured, joint in checked.of_joints(units.POSITION):
         low, high = checked.robot.joints[joint].limits.position
         if measured.unit == unit and not -math.inf < low <= measured.value <= high < math.inf:
-            in_reaches = ratio(measured.size, checked.sizes.extent)
+            in_reaches = ratio_or_nan(measured.size, checked.sizes.extent)
             yield measured._replace(size=turns(measured.value) if unit == "rad" else in_reaches)
 
 
-def _slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
+def _measure_slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
     """Yield the mean velocity of the joint that moves most, of prismatic ones in reaches of the robot."""
-    if checked.moved is not None and checked.duration > LONG:
-        way = np.abs(np.diff(checked.moved[0])).sum(axis=1) / checked.travels
-        if way.any():
-            yield from checked.paced(units.TIME, way / checked.duration)
+    if checked.sampled_motion is not None and checked.duration > LONG:
+        travel = np.abs(np.diff(checked.sampled_motion[0])).sum(axis=1) / checked.travels
+        if travel.any():
+            yield from checked.measure_timing(units.TIME, travel / checked.duration)
 
 
-def _accelerations(checked: CheckedTrajectory, quantity: Quantity) -> Iterator[Measured]:
+def _measure_accelerations(checked: CheckedTrajectory, quantity: Quantity) -> Iterator[Measured]:
     """Yield the largest acceleration of the point farthest from a joint, m/s^2."""
-    if checked.moved is not None and not checked.robot.placeholder:
+    if checked.sampled_motion is not None and not checked.robot.placeholder:
         levers = np.where(checked.revolute, checked.sizes.levers, 1.0)
-        yield from checked.paced(quantity, np.abs(checked.moved[2]).max(axis=1) * levers)
+        yield from checked.measure_timing(quantity, np.abs(checked.sampled_motion[2]).max(axis=1) * levers)
 
 
-def _samples(checked: CheckedTrajectory) -> Iterator[Measured]:
+def _measure_rate(checked: CheckedTrajectory) -> Iterator[Measured]:
     """Yield the rate, with the number of samples as size."""
     for path, quantity, value, _ in checked.numbers:
         if quantity == units.RATE and path == ("rate",):
             yield Measured(path, value, PER_SECOND, value * checked.duration)
 
 
-def _wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[Measured]:
+def _measure_wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[Measured]:
     """Yield force components relative to the robot's weight, or moments relative to weight times reach."""
     scale = checked.sizes.weight * (1.0 if forces else checked.sizes.extent)
     common, unit = (COMMON_FORCE, "N") if forces else (COMMON_MOMENT, "N m")
     for path, quantity, value, _ in checked.numbers if not checked.robot.placeholder else ():
         if quantity == units.WRENCH and isinstance(path[-1], Entry) and (path[-1].number < 3) == forces:
-            size = ratio(abs(value), scale) if value else math.nan
+            size = ratio_or_nan(abs(value), scale) if value else math.nan
             yield Measured(path, value, unit, min(size, 1.0) if abs(value) < common else size)
 
 
-def _commanded(checked: CheckedTrajectory) -> Iterator[tuple[Measured, Joint, Corridor]]:
+def _commanded_stiffness(
+    checked: CheckedTrajectory,
+) -> Iterator[tuple[Measured, Joint, UnloadedStiffnessRange]]:
     """Yield every stiffness except amplitudes, with its joint and the attainable range at rest."""
     for measured, number in checked.of_joints(units.STIFFNESS) if not checked.robot.placeholder else ():
-        found = checked.corridors[number]
-        if found is not None and AMPLITUDES.isdisjoint(measured.path):
-            ends = {"lower": f"{found.lower:.4g}", "upper": f"{found.upper:.4g}", "unit": measured.unit}
-            yield measured._replace(beside=ends), checked.robot.joints[number], found
+        attainable = checked.unloaded_ranges[number]
+        if attainable is not None and AMPLITUDES.isdisjoint(measured.path):
+            ends = {
+                "lower": f"{attainable.lower:.4g}",
+                "upper": f"{attainable.upper:.4g}",
+                "unit": measured.unit,
+            }
+            yield measured._replace(beside=ends), checked.robot.joints[number], attainable
 
 
-def _above_lowest(checked: CheckedTrajectory, *, linear: bool) -> Iterator[Measured]:
+def _stiffness_over_minimum(checked: CheckedTrajectory, *, linear: bool) -> Iterator[Measured]:
     """Yield stiffness over its minimum, at joints whose springs all have a linear part, or at the others."""
-    for measured, joint, found in _commanded(checked):
+    for measured, joint, attainable in _commanded_stiffness(checked):
         laws = getattr(joint.actuator, "spring", ())
         each_linear = bool(laws) and all(
             law.polynomial is not None for law in laws
         )  # polynomial laws have a linear part
         if each_linear == linear:
-            yield measured._replace(size=ratio(measured.size, found.lower))
+            yield measured._replace(size=ratio_or_nan(measured.size, attainable.lower))
 
 
-def _above_highest(checked: CheckedTrajectory) -> Iterator[Measured]:
-    for measured, _, found in _commanded(checked):
-        yield measured._replace(size=measured.size / found.upper)
+def _stiffness_over_maximum(checked: CheckedTrajectory) -> Iterator[Measured]:
+    for measured, _, attainable in _commanded_stiffness(checked):
+        yield measured._replace(size=measured.size / attainable.upper)
 
 
 MOTION_RULES: tuple[Rule[CheckedTrajectory], ...] = (
-    Rule("positions of revolute joints", "`position`: all values", lambda checked: _positions(checked, "rad"),
+    Rule("positions of revolute joints", "`position`: all values",
+        lambda checked: _measure_joint_positions(checked, "rad"),
         size="turns", high=1 + ROUNDED, usual=0.2,
         reason="few joints turn further; positions within the limits pass",
         finding="is {size} turns", units=(DEGREES,), in_angles=True),
-    Rule("positions of prismatic joints", "`position`: all values", lambda checked: _positions(checked, "m"),
+    Rule("positions of prismatic joints", "`position`: all values",
+        lambda checked: _measure_joint_positions(checked, "m"),
         size="over the reach", high=40, usual=0.1,
         reason="tracks are shorter; positions within the limits pass",
         finding="is {size} times the reach of the robot",
         units=(MILLIMETERS, CENTIMETERS), explained_by=SIZES),
-    Rule("slow motions", "`duration`, `times`", _slowness,
+    Rule("slow motions", "`duration`, `times`", _measure_slowness,
         size=f"1/s, mean velocity in rad (reaches) of motions longer than {LONG:g} s",
         low=1e-3, usual=0.5, reason="a turn would take more than an hour and a half",
         finding="lets no joint move faster than {size} rad (reaches) a second in the mean",
         units=UNITS_OF_TIME),
-    Rule("accelerations", "`duration`, `times`", lambda checked: _accelerations(checked, units.TIME),
+    Rule("accelerations", "`duration`, `times`", lambda checked: _measure_accelerations(checked, units.TIME),
         size="m/s^2, largest acceleration of the farthest point", high=300, usual=3,
         reason="the fastest parallel robots reach half",
         finding="makes what is farthest from {joint} accelerate at up to {size} m/s^2",
         units=tuple(each._replace(power=-2) for each in UNITS_OF_TIME),
         advice="check it, and the positions",
         explained_by=(*POSITIONS, *SIZES)),
-    Rule("accelerations of sinusoids", "`frequency`", lambda checked: _accelerations(checked, units.RATE),
+    Rule("accelerations of sinusoids", "`frequency`",
+        lambda checked: _measure_accelerations(checked, units.RATE),
         size="m/s^2, largest acceleration of the farthest point", high=300, usual=3,
         reason="the fastest parallel robots reach half",
         finding="makes what is farthest from {joint} accelerate at up to {size} m/s^2",
         units=(OtherUnit("rad/s", 0.5 / math.pi, 2),), advice="it counts periods in a second",
         explained_by=(*POSITIONS, *SIZES)),
-    Rule("numbers of samples", "`rate`", _samples,
+    Rule("numbers of samples", "`rate`", _measure_rate,
         size="samples in all", low=10, usual=4000,
         reason="too few to show anything",
         finding="gives only {size} samples of the whole motion",
@@ -239,30 +248,30 @@ MOTION_RULES: tuple[Rule[CheckedTrajectory], ...] = (
 )  # fmt: skip
 
 EFFORT_RULES: tuple[Rule[CheckedTrajectory], ...] = (
-    Rule("forces on the end effector", "`wrench`", lambda checked: _wrenches(checked, forces=True),
+    Rule("forces on the end effector", "`wrench`", lambda checked: _measure_wrenches(checked, forces=True),
         size=f"over the weight; above 1 only from {COMMON_FORCE:g} N on",
         low=1e-4, high=10, usual=0.2, reason="the robot could not bear more, and would not feel less",
         finding="is {size} of the weight of the robot",
         units=(OtherUnit("kN", 1e3), OtherUnit("g", 9.81e-3), OtherUnit("mN", 1e-3)), explained_by=SIZES),
-    Rule("moments on the end effector", "`wrench`", lambda checked: _wrenches(checked, forces=False),
+    Rule("moments on the end effector", "`wrench`", lambda checked: _measure_wrenches(checked, forces=False),
         size=f"over weight times reach; above 1 only from {COMMON_MOMENT:g} N m on",
         low=1e-5, high=10, usual=0.02, reason="the robot could not bear more, and would not feel less",
         finding="is {size} of the weight of the robot at its reach",
         units=(OtherUnit("kN m", 1e3), OtherUnit("N mm", 1e-3), OtherUnit("N cm", 1e-2)), explained_by=SIZES),
     Rule("stiffness compared with linear parts of springs", "`stiffness`: all values",
-        lambda checked: _above_lowest(checked, linear=True),
+        lambda checked: _stiffness_over_minimum(checked, linear=True),
         size="over the lowest of cubic and polynomial springs at rest",
         low=LOWEST_SHARE, high=20, usual=1.5,
         reason="below, unattainable; far above, the linear part would not matter",
         finding="is {size} times the minimum of {lower} {unit} without load",
         units=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
     Rule("stiffness compared with other springs", "`stiffness`: all values",
-        lambda checked: _above_lowest(checked, linear=False),
+        lambda checked: _stiffness_over_minimum(checked, linear=False),
         size="over the lowest of springs of other laws at rest", low=LOWEST_SHARE, high=1000, usual=3,
         reason="below, unattainable; bundled robots: up to 300",
         finding="is {size} times the minimum of {lower} {unit} without load",
         units=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
-    Rule("stiffness beyond the springs", "`stiffness`: all values", _above_highest,
+    Rule("stiffness beyond the springs", "`stiffness`: all values", _stiffness_over_maximum,
         size="over the highest of the springs at rest", high=5, usual=0.5,
         reason="unattainable",
         finding="is {size} times the maximum of {upper} {unit} without load",

@@ -51,7 +51,7 @@ class Profile(Protocol):
 
 
 @dataclass(frozen=True)
-class Continued:
+class ContinuousProfile:
     """A profile evaluated at other samples than its own, by `at` throughout."""
 
     profile: Profile
@@ -89,9 +89,9 @@ class Continued:
         """Return the same at samples, whose times are `time`."""
         return self.profile.at(time)
 
-    def stretched(self, factor: float) -> Continued:
+    def stretched(self, factor: float) -> ContinuousProfile:
         """Return the profile slowed down by a factor, with the same first time."""
-        return Continued(self.profile.stretched(factor))
+        return ContinuousProfile(self.profile.stretched(factor))
 
     @property
     def estimate(self) -> SampledProfile | None:

@@ -17,9 +17,9 @@ from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal, commanded_n
 from vsacli.base.variables import UNCERTAIN
 from vsacli.base.wrench import Wrench
 from vsacli.documents.source import Source
-from vsacli.trajectory.curves import Constant
+from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.profile import Continued, Profile, WrenchProfile
+from vsacli.trajectory.profile import ContinuousProfile, Profile, WrenchProfile
 from vsacli.trajectory.times import Times
 
 if TYPE_CHECKING:
@@ -119,9 +119,9 @@ class Trajectory:
                     f"the {signal.key} spans {start:g} to {end:g} s, the steps 0 to {self.duration:g} s"
                 )
 
-    def _nothing(self, signal: Signal) -> Constant:
+    def _nothing(self, signal: Signal) -> ConstantProfile:
         """Return the profile of a signal that commands no joint."""
-        return Constant(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
+        return ConstantProfile(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
 
     @classmethod
     def from_samples(
@@ -200,7 +200,7 @@ class Trajectory:
     def commanding(self, signal: Signal, value: tuple[float, ...], note: str) -> Trajectory:
         """Return the trajectory with a constant as a further signal; NaN for joints it does not command."""
         same = copy(self)
-        constant = Constant(signal=signal, span=(0.0, self.duration), value=value)
+        constant = ConstantProfile(signal=signal, span=(0.0, self.duration), value=value)
         same.commanded = {**self.commanded, signal.key: constant}
         same._source_notes = (*self._source_notes, note)
         return same
@@ -287,7 +287,7 @@ class Trajectory:
 
     def sampled(self, times: Times) -> Trajectory:
         """Return the same functions at other sample times, from the first time on and not beyond the last."""
-        return self._derived(lambda _, profile: Continued(profile), times)
+        return self._derived(lambda _, profile: ContinuousProfile(profile), times)
 
     def from_zero(self) -> Trajectory:
         """Return the trajectory with time zero at its first sample, where times are rounded least."""

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vsacli.actuators.laws.inversion import FirstGuess, inverse, with_sign_of
+from vsacli.actuators.laws.inversion import FirstGuess, deflection_at_torque, with_sign_of
 from vsacli.actuators.laws.law import SpringLaw, SpringState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
@@ -55,12 +55,12 @@ class FourBar(SpringLaw):
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Return the derivatives of the energy k beta^2/2, which share the angles."""
-        return _derivatives(self.k, self._angle(phi, order + 1))
+        return _energy_derivatives(self.k, self._angle(phi, order + 1))
 
     def energy_and_state(self, phi: FloatArray) -> tuple[FloatArray, SpringState]:
         """Return energy and all derivatives, which share the angles."""
         beta = self._angle(phi, 4)
-        return self.k / 2 * beta[0] * beta[0], SpringState(*_derivatives(self.k, beta))
+        return self.k / 2 * beta[0] * beta[0], SpringState(*_energy_derivatives(self.k, beta))
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Return the torque k beta beta'."""
@@ -92,7 +92,7 @@ class FourBar(SpringLaw):
         load = np.minimum(np.abs(torque), self.torque_range[1])
         low, high = np.zeros_like(load), np.full_like(load, self.domain[1])
         start = np.minimum(self._first_guess(load), high)
-        return with_sign_of(torque, *inverse(self, load, low, high, start))
+        return with_sign_of(torque, *deflection_at_torque(self, load, low, high, start))
 
     @cached_property
     def _first_guess(self) -> FirstGuess:
@@ -130,7 +130,7 @@ class FourBar(SpringLaw):
         return beta
 
 
-def _derivatives(k: float, beta: list[FloatArray]) -> tuple[FloatArray, ...]:
+def _energy_derivatives(k: float, beta: list[FloatArray]) -> tuple[FloatArray, ...]:
     """Return the derivatives of k beta^2/2 from beta and its derivatives, one fewer than these."""
     k_beta, k_rate = k * beta[0], k * beta[1]
     derivatives = [k_beta * beta[1]]

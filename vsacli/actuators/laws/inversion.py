@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.actuators.laws.law import SpringLaw, SpringState, state_of
+from vsacli.actuators.laws.law import SpringLaw, SpringState, spring_state
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
 
 
-def hermite(
+def evaluate_hermite_cubic(
     x: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray, end: FloatArray
 ) -> FloatArray:
     """Return the cubic over x from 0 to 1 with values and slopes at both ends; arrays of one shape."""
@@ -17,7 +17,7 @@ def hermite(
     return low + x * (start + x * (3 * rise - 2 * start - end + x * (start + end - 2 * rise)))
 
 
-def in_single(values: FloatArray) -> FloatArray:
+def round_to_single(values: FloatArray) -> FloatArray:
     """Return values rounded to single precision, enough for a guess; unchanged beyond its range."""
     with np.errstate(all="ignore"):
         rounded = values.astype(np.float32).astype(float)
@@ -38,7 +38,7 @@ MAX_HALVINGS = 20
 torque, which no cubic approximates."""
 
 
-def inverse(
+def deflection_at_torque(
     law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
 ) -> tuple[FloatArray, SpringState]:
     """Return the deflection at which a law has a torque, and the state of the spring there; (samples,).
@@ -57,7 +57,7 @@ def inverse(
         converged = _converges(torque, error) & (phi >= low) & (phi <= high)
         phi, *values = where_needed(
             ~converged,
-            lambda *known: _safeguarded(law, *known),
+            lambda *unsolved: _halley_in_bracket(law, *unsolved),
             (torque, low, high, start),
             (phi, *state.after(phi - start)),
         )
@@ -69,7 +69,7 @@ def _halley_step(
 ) -> tuple[FloatArray, FloatArray, SpringState]:
     """Return the deflection after a step; also the error of the torque and the spring's state before it."""
     # Halley's correction of the Newton step is kept between one half and two.
-    state = state_of(law, phi)
+    state = spring_state(law, phi)
     error = state.tau - torque
     newton = error / state.sigma
     correction = newton * state.zeta / (2 * state.sigma)
@@ -82,10 +82,10 @@ def _converges(torque: FloatArray, error: FloatArray) -> BoolArray:
     return converges
 
 
-def _safeguarded(
+def _halley_in_bracket(
     law: SpringLaw, torque: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray
 ) -> Values:
-    """Compute `inverse` from a distant start: Halley steps within the bracket, else bisection."""
+    """Invert a law from a distant start: Halley steps within the bracket, else bisection."""
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         (phi, low, high, *_), (torque,) = state, constants
@@ -127,7 +127,7 @@ class FirstGuess:
     def _interpolate(self, law: SpringLaw, nodes: FloatArray) -> None:
         torque, stiffness = law.derivatives(nodes, 1)
         compliance = 1 / np.where(stiffness == 0, np.inf, stiffness)
-        self._nodes = torque, nodes, in_single(compliance)
+        self._nodes = torque, nodes, round_to_single(compliance)
 
     def __call__(self, torque: FloatArray) -> FloatArray:
         """Return the deflection at torques between those of the nodes."""
@@ -135,4 +135,4 @@ class FirstGuess:
         low, start, first = look_up(self._nodes, cell)
         high, end, last = look_up(self._nodes, cell + 1)
         width = high - low
-        return hermite((torque - low) / width, start, end, first * width, last * width)
+        return evaluate_hermite_cubic((torque - low) / width, start, end, first * width, last * width)

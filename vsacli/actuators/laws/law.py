@@ -257,7 +257,7 @@ class SpringLaw(DeclaredRecord, ABC):
         """Return the deflection phi with tau(phi) = torque, the inverse of `torque`."""
 
 
-def state_of(law: SpringLaw, phi: FloatArray) -> SpringState:
+def spring_state(law: SpringLaw, phi: FloatArray) -> SpringState:
     """Return the state of a spring, as a subroutine of compiled code."""
     return SpringState(*subroutine(law.state, (phi,)))
 
@@ -266,7 +266,7 @@ class SpringRows:
     """Springs of several joints, the same number at each; deflections and results (..., joints, springs)."""
 
     def __init__(self, laws: Sequence[Sequence[SpringLaw]]) -> None:
-        self._alike = list(_alike([law for of_joint in laws for law in of_joint]))
+        self._alike = list(_distinct_laws([law for of_joint in laws for law in of_joint]))
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Return the torque of each spring."""
@@ -295,7 +295,7 @@ class SpringRows:
         return [whole.reshape(*phi.shape) for whole in merged]
 
 
-def _alike(laws: list[SpringLaw]) -> Iterator[tuple[SpringLaw, list[int]]]:
+def _distinct_laws(laws: list[SpringLaw]) -> Iterator[tuple[SpringLaw, list[int]]]:
     """Yield each distinct law, with the indices of its springs."""
     distinct: list[SpringLaw] = []
     for law in laws:

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vsacli.actuators.laws.inversion import inverse, with_sign_of
+from vsacli.actuators.laws.inversion import deflection_at_torque, with_sign_of
 from vsacli.actuators.laws.law import SpringLaw, SpringState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
@@ -90,7 +90,7 @@ class Polynomial(SpringLaw):
             if coefficient > 0
         ]
         high = reduce(np.minimum, bounds)
-        return with_sign_of(torque, *inverse(self, load, np.zeros_like(load), high, start=high))
+        return with_sign_of(torque, *deflection_at_torque(self, load, np.zeros_like(load), high, start=high))
 
     def _derivative(self, order: int, squared: FloatArray) -> FloatArray:
         """Return a derivative of the torque without the factor phi that those of even order have."""

@@ -92,10 +92,10 @@ def spline_knots(low: float, high: float, pieces: int, degree: int) -> FloatArra
 
 def spline_curve(knots: FloatArray, weights: FloatArray, degree: int, integrate: Integrate) -> SplineCurve:
     """Return the curve of a spline with such knots, weights and degree."""
-    origins, coefficients = _half(knots, weights, degree, integrate)
+    origins, coefficients = _potential_above_zero(knots, weights, degree, integrate)
     above = origins.size
     if knots[0] < 0:
-        down, turned = _half(-knots[::-1], weights[::-1], degree, integrate)
+        down, turned = _potential_above_zero(-knots[::-1], weights[::-1], degree, integrate)
         origins = np.concatenate((down[::-1], origins))
         coefficients = np.hstack((turned[:, ::-1], coefficients))
     return SplineCurve(
@@ -106,15 +106,15 @@ def spline_curve(knots: FloatArray, weights: FloatArray, degree: int, integrate:
     )
 
 
-def _half(
+def _potential_above_zero(
     knots: FloatArray, weights: FloatArray, degree: int, integrate: Integrate
 ) -> tuple[FloatArray, FloatArray]:
     """Return the origins of the potential's polynomials above zero, and their coefficients, ascending."""
-    potential = integrate(_above_zero(knots, weights, degree))
+    potential = integrate(_spline_above_zero(knots, weights, degree))
     return potential.x[:-1], potential.c[::-1]
 
 
-def _above_zero(knots: FloatArray, weights: FloatArray, degree: int) -> PPoly:
+def _spline_above_zero(knots: FloatArray, weights: FloatArray, degree: int) -> PPoly:
     """Return the spline from its knot at zero to the last; the other knots there enclose nothing."""
     from scipy.interpolate import PPoly
 

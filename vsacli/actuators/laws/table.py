@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from vsacli.actuators.laws.inversion import FirstGuess, inverse
+from vsacli.actuators.laws.inversion import FirstGuess, deflection_at_torque
 from vsacli.actuators.laws.law import SpringLaw, SpringState
 from vsacli.actuators.laws.spline_curve import SplineCurve, spline_curve, spline_knots, times_deflection
 from vsacli.actuators.laws.tendons import Mirrored
@@ -42,15 +42,15 @@ def fit_curve(deflection: FloatArray, torque: FloatArray) -> SplineCurve:
 
     pieces = int(np.clip(len(deflection) // 2, 1, MAX_PIECES))
     knots = spline_knots(float(deflection[0]), float(deflection[-1]), pieces, DEGREE)
-    shapes = [_curve(knots, weights, 0.0) for weights in np.eye(len(knots) - DEGREE - 1)]
+    shapes = [_energy_curve(knots, weights, 0.0) for weights in np.eye(len(knots) - DEGREE - 1)]
     columns = np.column_stack([deflection, *(shape(deflection, 1, 1)[0] for shape in shapes)])
     sizes = np.maximum(np.abs(columns).max(axis=0), LEAST_SHAPE_SIZE)
     least = REST_STIFFNESS_SHARE * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
     excess, *weights = nnls(columns / sizes, torque - least * deflection)[0] / sizes
-    return _curve(knots, np.array(weights), least + excess)
+    return _energy_curve(knots, np.array(weights), least + excess)
 
 
-def _curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> SplineCurve:
+def _energy_curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> SplineCurve:
     """Return the energy of a spring with the slope phi g(phi)."""
 
     def energy(spline: PPoly) -> PPoly:
@@ -89,7 +89,7 @@ class MeasuredSpring(SpringLaw):
     examples: ClassVar = {"revolute": {"file": "measured_spring.csv"}}  # the bundled table is in rad and N m
 
     def _problems(self) -> tuple[()]:
-        problems = list(_table_problems(self.file))
+        problems = list(_hardening_problems(self.file))
         if problems:
             raise InputError(problems)
         return ()
@@ -173,7 +173,7 @@ class MeasuredSpring(SpringLaw):
         least, largest = self.torque_range
         carried = np.minimum(np.maximum(torque, least), largest)
         start = np.minimum(np.maximum(self._first_guess(carried), low), high)
-        return inverse(self, carried, low, high, start)
+        return deflection_at_torque(self, carried, low, high, start)
 
     @cached_property
     def _first_guess(self) -> FirstGuess:
@@ -214,7 +214,7 @@ def wrong_rows(table: Table) -> Iterator[Problem]:
         yield Problem(path, table.line_of(steps[0] + 1), message)
 
 
-def _table_problems(table: Table) -> Iterator[Problem]:
+def _hardening_problems(table: Table) -> Iterator[Problem]:
     """Yield why the rows are no hardening spring, with the lines."""
     deflection, torque = table.values.T
     path = table.source.path
@@ -259,11 +259,11 @@ def _wrong_bends(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[i
     above_chord = torque[1:-1] - chord
     tolerance = SHAPE_TOLERANCE * np.ptp(torque)
     for row in np.flatnonzero((left >= 0) & (above_chord > tolerance)):
-        yield int(row) + 1, _bend(torque[row + 1], "above", chord[row], "convex")
+        yield int(row) + 1, _describe_bend(torque[row + 1], "above", chord[row], "convex")
     for row in np.flatnonzero((right <= 0) & (above_chord < -tolerance)):
-        yield int(row) + 1, _bend(torque[row + 1], "below", chord[row], "concave")
+        yield int(row) + 1, _describe_bend(torque[row + 1], "below", chord[row], "concave")
 
 
-def _bend(torque: float, side: str, chord: float, shape: str) -> str:
+def _describe_bend(torque: float, side: str, chord: float, shape: str) -> str:
     where = f"the torque {torque:.4g} lies {side} {chord:.4g}, the line between the rows before and after"
     return f"{where}: it is not {shape} here, so the spring would not harden away from zero"

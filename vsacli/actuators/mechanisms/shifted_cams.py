@@ -96,8 +96,10 @@ class ShiftedCams(Mechanism):
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
         """Return deflection and setting from the solution of the pair."""
         with np.errstate(all="ignore"):  # a torque may be infinite
-            found = self._cams.solve(tau_e, stiffness)
-        return found._replace(phi_1=(found.phi_1 + found.phi_2) / 2, phi_2=(found.phi_1 - found.phi_2) / 2)
+            solution = self._cams.solve(tau_e, stiffness)
+        return solution._replace(
+            phi_1=(solution.phi_1 + solution.phi_2) / 2, phi_2=(solution.phi_1 - solution.phi_2) / 2
+        )
 
     @property
     def opposite_branch(self) -> str | None:

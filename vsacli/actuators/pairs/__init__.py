@@ -17,11 +17,11 @@ __all__ = ["make_pair"]
 def make_pair(first: SpringLaw, second: SpringLaw) -> Pair:
     """Return the solver of (14) for two laws with phi_1 up: closed if the laws have one, else iterated."""
     first, second = first.unlimited, second.unlimited
-    return first.closed_pair(second) or _iterated(first, second)
+    return first.closed_pair(second) or _cached_iterated_pair(first, second)
 
 
 @lru_cache(maxsize=1024)
-def _iterated(first: SpringLaw, second: SpringLaw) -> Pair:
+def _cached_iterated_pair(first: SpringLaw, second: SpringLaw) -> Pair:
     # Cached, since a pair maps its folds once: equal laws share the map.
     from vsacli.actuators.pairs.solver import IteratedPair
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.law import SpringLaw, SpringState, state_of
+from vsacli.actuators.laws.law import SpringLaw, SpringState, spring_state
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, subroutine
 
@@ -128,7 +128,7 @@ class Balance:
 
     def state(self, phi_1: FloatArray, phi_2: FloatArray) -> PairState:
         """Return the state of both springs at their deflections."""
-        return PairState(phi_1, phi_2, state_of(self.first, phi_1), state_of(self.second, phi_2))
+        return PairState(phi_1, phi_2, spring_state(self.first, phi_1), spring_state(self.second, phi_2))
 
     def stiffness(self, phi_1: FloatArray, phi_2: FloatArray) -> FloatArray:
         """Return G at deflections."""

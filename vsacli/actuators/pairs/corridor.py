@@ -23,7 +23,7 @@ SMALLEST_PRELOAD, LARGEST_PRELOAD = 0, 1
 """Ends of the preload torque: side 1 is at this end of its domain, or side 2 at the opposite end of its."""
 
 
-class End(NamedTuple):
+class PieceEnd(NamedTuple):
     """Deflections at an end of the piece, and the joint stiffness there; arrays (samples,).
 
     Where nothing ends the piece, the stiffness is infinite and the deflections are their limits.
@@ -46,8 +46,8 @@ class Corridor(NamedTuple):
         state: Both springs at the inner end.
     """
 
-    inner: End
-    outer: End
+    inner: PieceEnd
+    outer: PieceEnd
     rising: BoolArray
     critical: BoolArray
     slack: BoolArray
@@ -61,14 +61,18 @@ def corridor(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Corridor:
     exists, fold = outermost_fold(balance, folds, tau_e)
     critical = carried & exists & ((tau_e != 0) | ((least < 0) & (largest > 0)))
     inner = PairState.of(
-        _at_end(
+        _evaluate_at_end(
             balance, SMALLEST_PRELOAD, tau_e, carried & ~critical, fold.values, lambda state: state.values
         )
     )
-    outer = End(*_at_end(balance, LARGEST_PRELOAD, tau_e, carried, _endless(balance, tau_e), _end))
+    outer = PieceEnd(
+        *_evaluate_at_end(
+            balance, LARGEST_PRELOAD, tau_e, carried, _end_at_infinite_preload(balance, tau_e), _piece_end
+        )
+    )
     return Corridor(
-        inner=_if_carried(_end(inner), carried),
-        outer=_if_carried(outer, carried),
+        inner=_nan_unless_carried(_piece_end(inner), carried),
+        outer=_nan_unless_carried(outer, carried),
         rising=outer.stiffness >= inner.stiffness,
         critical=critical,
         slack=balance.is_slack(tau_e, least),
@@ -76,22 +80,22 @@ def corridor(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Corridor:
     )
 
 
-def _end(state: PairState) -> End:
-    return End(state.phi_1, state.phi_2, state.stiffness)
+def _piece_end(state: PairState) -> PieceEnd:
+    return PieceEnd(state.phi_1, state.phi_2, state.stiffness)
 
 
-def _endless(balance: Balance, tau_e: FloatArray) -> End:
+def _end_at_infinite_preload(balance: Balance, tau_e: FloatArray) -> PieceEnd:
     """Return the limit of the springs for a preload that grows without bound."""
     phi_1 = balance.first.domain[LARGEST_PRELOAD]
     phi_2 = balance.second.domain[1 - LARGEST_PRELOAD]
-    return End(*(np.full_like(tau_e, value) for value in (phi_1, phi_2, np.inf)))
+    return PieceEnd(*(np.full_like(tau_e, value) for value in (phi_1, phi_2, np.inf)))
 
 
-def _if_carried(end: End, carried: BoolArray) -> End:
+def _nan_unless_carried(end: PieceEnd, carried: BoolArray) -> PieceEnd:
     return end._replace(stiffness=np.where(carried, end.stiffness, np.nan))
 
 
-def _at_end(
+def _evaluate_at_end(
     balance: Balance,
     end: int,
     tau_e: FloatArray,
@@ -116,12 +120,12 @@ def _at_end(
     def with_first(tau_e: FloatArray) -> Values:
         phi_1 = np.full_like(tau_e, first.domain[end])
         phi_2, two = under(second, tau_e - tau_1)
-        return wanted(PairState(phi_1, phi_2, _everywhere(balance.domain_ends[0][end], tau_e), two))
+        return wanted(PairState(phi_1, phi_2, _broadcast_state(balance.domain_ends[0][end], tau_e), two))
 
     def with_second(tau_e: FloatArray) -> Values:
         phi_1, one = under(first, tau_e - tau_2)
         phi_2 = np.full_like(tau_e, second.domain[1 - end])
-        return wanted(PairState(phi_1, phi_2, one, _everywhere(balance.domain_ends[1][1 - end], tau_e)))
+        return wanted(PairState(phi_1, phi_2, one, _broadcast_state(balance.domain_ends[1][1 - end], tau_e)))
 
     values = otherwise
     if math.isfinite(tau_1):
@@ -131,5 +135,5 @@ def _at_end(
     return values
 
 
-def _everywhere(state: SpringState, like: FloatArray) -> SpringState:
+def _broadcast_state(state: SpringState, like: FloatArray) -> SpringState:
     return SpringState(*(np.full_like(like, value) for value in state))

@@ -117,11 +117,11 @@ def sample_hardening(law: SpringLaw) -> Hardening | None:
     else:
         phi = law.deflection(SAMPLED_TORQUES)
     phi = np.concatenate(([0.0], phi))
-    peaks = _peaks(law, phi)
+    peaks = _hardening_peaks(law, phi)
     phi = np.unique(np.concatenate((phi, peaks, *(_around(peak, phi) for peak in peaks))))
     rho = law.hardening(phi)
-    known = np.isfinite(rho)
-    phi, rho = phi[known], rho[known]
+    finite = np.isfinite(rho)
+    phi, rho = phi[finite], rho[finite]
     return Hardening(law, phi, rho, np.searchsorted(phi, peaks))
 
 
@@ -134,7 +134,7 @@ def _around(peak: float, phi: FloatArray) -> FloatArray:
     )
 
 
-def _peaks(law: SpringLaw, phi: FloatArray) -> FloatArray:
+def _hardening_peaks(law: SpringLaw, phi: FloatArray) -> FloatArray:
     """Return deflections at which the slope of rho, eta sigma - zeta^2 over sigma^2, changes its sign."""
 
     def slope(phi: FloatArray) -> FloatArray:
@@ -159,10 +159,12 @@ def critical_curves(first: SpringLaw, second: SpringLaw) -> Iterator[CriticalCur
         return
     brackets = [_cusp_brackets(curve.tau_e) for curve in curves]
     low, high = (
-        CriticalCurve(*_joined(curve.take(ends[side]) for curve, ends in zip(curves, brackets, strict=True)))
+        CriticalCurve(
+            *_concatenate_parts(curve.take(ends[side]) for curve, ends in zip(curves, brackets, strict=True))
+        )
         for side in (0, 1)
     )
-    cusps = _cusps(first, second, low, high)
+    cusps = _cusp_points(first, second, low, high)
     counts = np.cumsum([0, *(len(low) for low, _ in brackets)])
     for curve, ends, before, after in zip(curves, brackets, counts[:-1], counts[1:], strict=True):
         yield from _split(curve, *ends, cusps.take(slice(before, after)))
@@ -177,7 +179,9 @@ def _curves(one: Hardening, two: Hardening) -> Iterator[CriticalCurve]:
     pieces = list(product(one.pieces(), two.pieces()))
     of_one = [_matches(one, first, two, second) for first, second in pieces]
     of_two = [_matches(two, second, one, first) for first, second in pieces]
-    points = _points(one.law, two.law, _Matches(*_joined(of_one)), _Matches(*_joined(of_two)))
+    points = _matched_points(
+        one.law, two.law, _Matches(*_concatenate_parts(of_one)), _Matches(*_concatenate_parts(of_two))
+    )
     alike = [one.rises(first) == two.rises(second) for first, second in pieces]
     piece = np.repeat([*range(len(pieces))] * 2, [len(nodes.phi) for nodes in (*of_one, *of_two)])
     with np.errstate(divide="ignore"):
@@ -189,7 +193,7 @@ def _curves(one: Hardening, two: Hardening) -> Iterator[CriticalCurve]:
             yield points.take(order[first:last])
 
 
-def _joined(parts: Iterable[tuple[FloatArray, ...]]) -> Iterator[FloatArray]:
+def _concatenate_parts(parts: Iterable[tuple[FloatArray, ...]]) -> Iterator[FloatArray]:
     return map(np.concatenate, zip(*parts, strict=True))
 
 
@@ -204,7 +208,7 @@ def _matches(of: Hardening, piece: slice, among: Hardening, other: slice) -> _Ma
     return _Matches(phi[shared], rho[shared], ends[cell - 1], ends[cell])
 
 
-def _points(first: SpringLaw, second: SpringLaw, of_one: _Matches, of_two: _Matches) -> CriticalCurve:
+def _matched_points(first: SpringLaw, second: SpringLaw, of_one: _Matches, of_two: _Matches) -> CriticalCurve:
     """Return critical points at the nodes of each spring, with the other at the same hardening."""
     phi_1 = np.concatenate((of_one.phi, _equal_hardening(first, *of_two[1:])))
     phi_2 = np.concatenate((_equal_hardening(second, *of_one[1:]), of_two.phi))
@@ -224,7 +228,9 @@ def _cusp_brackets(tau_e: FloatArray) -> tuple[IndexArray, IndexArray]:
     return noticed[turns], noticed[turns + 1] + 1
 
 
-def _cusps(first: SpringLaw, second: SpringLaw, low: CriticalCurve, high: CriticalCurve) -> CriticalCurve:
+def _cusp_points(
+    first: SpringLaw, second: SpringLaw, low: CriticalCurve, high: CriticalCurve
+) -> CriticalCurve:
     """Return the points between `low` and `high` at which tau_e is stationary along the curve."""
 
     def partner(phi: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
@@ -252,7 +258,7 @@ def _split(
     starts, ends = [0, *high.tolist()], [*low.tolist(), len(curve.phi_1) - 1]
     for index, (start, end) in enumerate(zip(starts, ends, strict=True)):
         around = cusps.take(slice(max(index - 1, 0), index)), cusps.take(slice(index, index + 1))
-        part = CriticalCurve(*_joined((around[0], curve.take(slice(start, end + 1)), around[1])))
+        part = CriticalCurve(*_concatenate_parts((around[0], curve.take(slice(start, end + 1)), around[1])))
         tau_e = part.tau_e
         yield part if tau_e[-1] > tau_e[0] else part.take(slice(None, None, -1))
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.inversion import hermite, in_single
+from vsacli.actuators.laws.inversion import evaluate_hermite_cubic, round_to_single
 from vsacli.actuators.laws.law import SpringLaw, SpringState
 from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.actuators.pairs.balance import Balance, PairState
@@ -55,7 +55,7 @@ class FoldPoints(NamedTuple):
     cusp: FloatArray
 
 
-class _Cells(NamedTuple):
+class _FoldCells(NamedTuple):
     """Cells of tau_e, each between adjacent critical points of the curve that is outermost there.
 
     Attributes:
@@ -71,22 +71,22 @@ class _Cells(NamedTuple):
 
 def outermost_folds(balance: Balance) -> FoldPoints:
     """Return the outermost critical points over all elastic torques, dense enough for all spring features."""
-    return _row(balance, _cut(balance, _cells(balance.first, balance.second)))
+    return _fold_points(balance, _cut_at_edges(balance, _cells_of_both_signs(balance.first, balance.second)))
 
 
-def _cells(first: SpringLaw, second: SpringLaw) -> _Cells:
+def _cells_of_both_signs(first: SpringLaw, second: SpringLaw) -> _FoldCells:
     """Return the cells of negative torques, from the mirrored pair, followed by those of positive ones."""
     above = _positive_cells(first, second)
     below = _positive_cells(Mirrored(law=second), Mirrored(law=first))
     turned = np.where(below.curve == NONE, NONE, below.curve + above.curve.max() + 1)
-    return _Cells(
+    return _FoldCells(
         np.concatenate((-below.edges[:0:-1], above.edges)),
         np.concatenate((-below.corners[(0, 2, 1), ::-1, ::-1], above.corners), axis=-1),
         np.concatenate((turned[::-1], above.curve)),
     )
 
 
-def _positive_cells(first: SpringLaw, second: SpringLaw) -> _Cells:
+def _positive_cells(first: SpringLaw, second: SpringLaw) -> _FoldCells:
     """Return the cells of positive tau_e."""
     curves = list(critical_curves(first, second))
     knots = np.unique(np.concatenate([[0.0], *(curve.tau_e for curve in curves)]))
@@ -101,17 +101,17 @@ def _positive_cells(first: SpringLaw, second: SpringLaw) -> _Cells:
         cell = np.clip(np.searchsorted(tau_e, middle[further]) - 1, 0, len(tau_e) - 2)
         for values, nodes in zip(corners, (tau_e, curve.phi_1, curve.phi_2), strict=True):
             values[:, further] = nodes[cell], nodes[cell + 1]
-    changes = np.flatnonzero(_differ(corners[0, :, 1:], corners[0, :, :-1])) + 1
+    changes = np.flatnonzero(_corners_differ(corners[0, :, 1:], corners[0, :, :-1])) + 1
     cells = np.append(0, changes)
-    return _Cells(np.append(knots[cells], np.inf), corners[:, :, cells], number[cells])
+    return _FoldCells(np.append(knots[cells], np.inf), corners[:, :, cells], number[cells])
 
 
-def _differ(cells: FloatArray, others: FloatArray) -> BoolArray:
-    differ: BoolArray = ~np.all((cells == others) | (np.isnan(cells) & np.isnan(others)), axis=0)
+def _corners_differ(cells: FloatArray, next_cells: FloatArray) -> BoolArray:
+    differ: BoolArray = ~np.all((cells == next_cells) | (np.isnan(cells) & np.isnan(next_cells)), axis=0)
     return differ
 
 
-def _cut(balance: Balance, cells: _Cells) -> _Cells:
+def _cut_at_edges(balance: Balance, cells: _FoldCells) -> _FoldCells:
     """Return the cells with corners moved to their edges, where another curve becomes the outermost."""
     corners = cells.corners.copy()
     low, high = np.sort(cells.corners, axis=1).swapaxes(0, 1)
@@ -122,7 +122,7 @@ def _cut(balance: Balance, cells: _Cells) -> _Cells:
     return cells._replace(corners=corners)
 
 
-def _row(balance: Balance, cells: _Cells) -> FoldPoints:
+def _fold_points(balance: Balance, cells: _FoldCells) -> FoldPoints:
     """Return the corners of all cells as points, one for cells without a fold, and one at infinity."""
     ends = np.append(np.flatnonzero(np.diff(cells.curve)) + 1, cells.curve.size)
     rows: list[FloatArray] = []
@@ -140,11 +140,11 @@ def _row(balance: Balance, cells: _Cells) -> FoldPoints:
     state = balance.state(*phi)
     slope = np.stack(along_critical_curve(state, state.rho)[:2])
     numbers = np.array([*last, len(last)])
-    cusp = _cusps(tau_e, np.stack(phi), slope, numbers)
+    cusp = _mark_cusps(tau_e, np.stack(phi), slope, numbers)
     return FoldPoints(tau_e, np.stack(phi), slope, np.stack(state.rho), numbers, cusp)
 
 
-def _cusps(tau_e: FloatArray, phi: FloatArray, slope: FloatArray, last: IndexArray) -> FloatArray:
+def _mark_cusps(tau_e: FloatArray, phi: FloatArray, slope: FloatArray, last: IndexArray) -> FloatArray:
     """Return 1 at the ends of stretches whose slope is far above the mean slope, else 0."""
     ends = np.unique(last)
     begins = np.append(0, ends[:-1] + 1)
@@ -203,12 +203,12 @@ class FoldMap(NamedTuple):
         low, low_1, low_2, *of_low = look_up(self, cell)
         high, high_1, high_2, *of_high = look_up(self, cell + 1)
         width = high - low
-        cubic = _Cubic.of((tau_e - low) / width, width, (of_low[-1], of_high[-1]))
+        cubic = _CubicArguments.of((tau_e - low) / width, width, (of_low[-1], of_high[-1]))
         near = cubic(low_1, high_1, of_low[0], of_high[0]), cubic(low_2, high_2, of_low[1], of_high[1])
         return ~np.isnan(low_1 + high_1), near, (low_1, high_1, low_2, high_2)
 
 
-class _Cubic(NamedTuple):
+class _CubicArguments(NamedTuple):
     """Arguments of Hermite cubics in a cell.
 
     Attributes:
@@ -222,7 +222,7 @@ class _Cubic(NamedTuple):
     end: FloatArray
 
     @classmethod
-    def of(cls, share: FloatArray, width: FloatArray, cusps: Values) -> _Cubic:
+    def of(cls, share: FloatArray, width: FloatArray, cusps: Values) -> _CubicArguments:
         """Return the arguments for a share of a cell, at most one end of which is a cusp."""
         first, last = cusps
         root = np.sqrt(np.where(last > 0, 1 - share, share))
@@ -231,7 +231,7 @@ class _Cubic(NamedTuple):
 
     def __call__(self, low: FloatArray, high: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
         """Evaluate the cubic from values and slopes at both ends."""
-        return hermite(self.x, low, high, first * self.start, last * self.end)
+        return evaluate_hermite_cubic(self.x, low, high, first * self.start, last * self.end)
 
 
 def map_folds(first: SpringLaw, second: SpringLaw) -> FoldMap:
@@ -239,19 +239,19 @@ def map_folds(first: SpringLaw, second: SpringLaw) -> FoldMap:
     balance = Balance(first, second)
     with np.errstate(all="ignore"):  # infinite slopes at cusps, 0/0 without stiffness, overflow far away
         points = outermost_folds(balance)
-        return _map(points, _kept(points))
+        return _map_with_nodes(points, _choose_nodes(points))
 
 
-def _kept(points: FoldPoints) -> IndexArray:
+def _choose_nodes(points: FoldPoints) -> IndexArray:
     """Return the fewest points between which cubics are close to all other points, greedily, by index."""
-    farthest = _farthest(points).tolist()
-    kept = [0]
-    while kept[-1] + 1 < len(farthest):
-        kept.append(max(farthest[kept[-1]], kept[-1] + 1))
-    return np.array(kept)
+    farthest = _farthest_points(points).tolist()
+    nodes = [0]
+    while nodes[-1] + 1 < len(farthest):
+        nodes.append(max(farthest[nodes[-1]], nodes[-1] + 1))
+    return np.array(nodes)
 
 
-def _farthest(points: FoldPoints) -> IndexArray:
+def _farthest_points(points: FoldPoints) -> IndexArray:
     """Return the farthest point to which a cubic from each point may extend, by bisection for all at once."""
     start = np.arange(points.tau_e.size)
     reached = np.minimum(start + 1, points.last)
@@ -271,7 +271,7 @@ def _farthest(points: FoldPoints) -> IndexArray:
 def _is_close(points: FoldPoints, start: IndexArray, end: IndexArray) -> BoolArray:
     """Return whether the cubics from points `start` to points `end` are close to all points between."""
     between = start + np.rint(TESTED[:, None] * (end - start)).astype(int)
-    cubic = _cubic(points, start, end, between)
+    cubic = _cubic_arguments(points, start, end, between)
     error, hardened, size = (np.zeros(between.shape) for _ in range(3))
     for side, (phi, rho) in enumerate(zip(points.phi, points.rho, strict=True)):
         slopes = _slopes(points, side, start, end)
@@ -291,49 +291,51 @@ def _slopes(points: FoldPoints, side: int, start: IndexArray, end: IndexArray) -
     tau_e, phi = points.tau_e, points.phi[side]
     first_cusp, last_cusp = points.cusp[start] > 0, points.cusp[end] > 0
     chord = (phi[end] - phi[start]) / (tau_e[end] - tau_e[start])
-    first, last = (_limited(points.slope[side, each], chord) for each in (start, end))
+    first, last = (_limit_slope(points.slope[side, each], chord) for each in (start, end))
     share = np.where(first_cusp, MIDDLE_ROOT**2, 1 - MIDDLE_ROOT**2)
     middle = np.searchsorted(tau_e, tau_e[start] + share * (tau_e[end] - tau_e[start]))
     middle = np.clip(middle, start + 1, np.maximum(end - 1, start + 1))
-    cubic = _cubic(points, start, end, middle)
+    cubic = _cubic_arguments(points, start, end, middle)
     missed = phi[middle] - cubic(
         phi[start], phi[end], np.where(first_cusp, 0.0, first), np.where(last_cusp, 0.0, last)
     )
     x = cubic.x
     at_start, at_end = missed / (cubic.start * x * (1 - x) ** 2), -missed / (cubic.end * x**2 * (1 - x))
-    known = end > start + 1
+    has_middle = end > start + 1
     return (
-        np.where(first_cusp, np.where(known, at_start, chord), first),
-        np.where(last_cusp, np.where(known, at_end, chord), last),
+        np.where(first_cusp, np.where(has_middle, at_start, chord), first),
+        np.where(last_cusp, np.where(has_middle, at_end, chord), last),
     )
 
 
-def _cubic(points: FoldPoints, start: IndexArray, end: IndexArray, at: IndexArray) -> _Cubic:
+def _cubic_arguments(
+    points: FoldPoints, start: IndexArray, end: IndexArray, at: IndexArray
+) -> _CubicArguments:
     """Return the arguments of the cubics at the points `at` in cells from `start` to `end`."""
     width = points.tau_e[end] - points.tau_e[start]
     share = (points.tau_e[at] - points.tau_e[start]) / width
-    return _Cubic.of(share, width, (points.cusp[start], points.cusp[end]))
+    return _CubicArguments.of(share, width, (points.cusp[start], points.cusp[end]))
 
 
-def _limited(slope: FloatArray, chord: FloatArray) -> FloatArray:
+def _limit_slope(slope: FloatArray, chord: FloatArray) -> FloatArray:
     """Return the slope, limited so that a cubic with that chord is monotone."""
     ratio = np.nan_to_num(slope / chord, nan=1.0, posinf=MONOTONE_SLOPE_RATIO, neginf=0.0)
     return chord * np.clip(ratio, 0, MONOTONE_SLOPE_RATIO)
 
 
-def _map(points: FoldPoints, kept: IndexArray) -> FoldMap:
+def _map_with_nodes(points: FoldPoints, chosen: IndexArray) -> FoldMap:
     """Return the map with nodes at some of the points."""
-    joined = np.flatnonzero(points.last[kept[1:]] == points.last[kept[:-1]])
-    before, after = np.full((2, 2, kept.size), np.nan)
+    connected = np.flatnonzero(points.last[chosen[1:]] == points.last[chosen[:-1]])
+    before, after = np.full((2, 2, chosen.size), np.nan)
     for side in range(2):
-        cells = kept[joined], kept[joined + 1]
-        after[side, joined], before[side, joined + 1] = _slopes(points, side, *cells)
+        cells = chosen[connected], chosen[connected + 1]
+        after[side, connected], before[side, connected + 1] = _slopes(points, side, *cells)
     slope = np.where(np.isnan(before) | (np.abs(after) < np.abs(before)), after, before)
-    rounded = in_single(slope)
-    nodes = np.stack((points.tau_e[kept], *points.phi[:, kept], *rounded, points.cusp[kept]))
+    single_slope = round_to_single(slope)
+    nodes = np.stack((points.tau_e[chosen], *points.phi[:, chosen], *single_slope, points.cusp[chosen]))
     bend = np.abs(after[:, 1:] - before[:, :-1]).sum(axis=0) / np.abs(after[:, 1:]).sum(axis=0)
-    same = (nodes[:3, 1:] == nodes[:3, :-1]).all(axis=0) & (bend <= SAME_SLOPE_RTOL)
-    return FoldMap(*np.delete(nodes, np.flatnonzero(same), axis=1))
+    repeated = (nodes[:3, 1:] == nodes[:3, :-1]).all(axis=0) & (bend <= SAME_SLOPE_RTOL)
+    return FoldMap(*np.delete(nodes, np.flatnonzero(repeated), axis=1))
 
 
 MAX_NEWTON_STEPS = 12
@@ -350,20 +352,20 @@ def outermost_fold(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> tuple
         spring = SpringState(*[nowhere] * len(SpringState._fields))
         return np.zeros_like(tau_e, dtype=bool), PairState(nowhere, nowhere, spring, spring)
     exists, near, corners = folds.guess(tau_e)
-    box = (*_sorted(*corners[:2]), *_sorted(*corners[2:]))
+    box = (*_ascending(*corners[:2]), *_ascending(*corners[2:]))
     guess = balance.state(*near)
     rho = guess.rho
     steps = newton_step(guess, rho, tau_e)
     fold = where_needed(
         exists & ~is_short(guess, rho, steps),
-        lambda *known: _safeguarded(balance, *known),
+        lambda *unsolved: _fold_in_box(balance, *unsolved),
         (tau_e, *near, *box),
-        guess.after(*_within(box, near, steps)).values,
+        guess.after(*_clip_to_box(box, near, steps)).values,
     )
     return exists, PairState.of(fold)
 
 
-def _within(box: Values, near: Values, steps: Values) -> Values:
+def _clip_to_box(box: Values, near: Values, steps: Values) -> Values:
     """Return the steps, clipped to the box.
 
     By rounding of the elastic torque they would leave it if one spring were stretched 1e16 times farther than
@@ -374,7 +376,7 @@ def _within(box: Values, near: Values, steps: Values) -> Values:
     return np.clip(step_1, low_1 - near_1, high_1 - near_1), np.clip(step_2, low_2 - near_2, high_2 - near_2)
 
 
-def _safeguarded(
+def _fold_in_box(
     balance: Balance, tau_e: FloatArray, guess_1: FloatArray, guess_2: FloatArray, *box: FloatArray
 ) -> Values:
     """Return the fold between two corners of a box: by Newton's method from a guess, else by bracketing."""
@@ -389,15 +391,15 @@ def _safeguarded(
 
     low_1, high_1, low_2, high_2 = box
     start = np.clip(guess_1, low_1, high_1), np.clip(guess_2, low_2, high_2)
-    *found, change = repeat(step, (*start, np.zeros_like(tau_e)), (tau_e, *box), MAX_NEWTON_STEPS)
+    *phi, change = repeat(step, (*start, np.zeros_like(tau_e)), (tau_e, *box), MAX_NEWTON_STEPS)
     phi_1, phi_2 = where_needed(
         ~(change <= NEWTON_RTOL),
-        lambda *known: bracketed_in_box(balance, *known),
+        lambda *unsolved: bracketed_in_box(balance, *unsolved),
         (tau_e, *box),
-        tuple(found),
+        tuple(phi),
     )
     return balance.state(phi_1, phi_2).values
 
 
-def _sorted(one: FloatArray, other: FloatArray) -> Values:
-    return np.minimum(one, other), np.maximum(one, other)
+def _ascending(first: FloatArray, second: FloatArray) -> Values:
+    return np.minimum(first, second), np.maximum(first, second)

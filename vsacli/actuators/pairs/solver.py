@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.laws.law import Pair, PairSolution, SpringLaw, state_of
+from vsacli.actuators.laws.law import Pair, PairSolution, SpringLaw, spring_state
 from vsacli.actuators.pairs.balance import Balance, first_guess, third_order_step
 from vsacli.actuators.pairs.bracketing import bracketed_root
 from vsacli.actuators.pairs.corridor import Corridor, corridor
@@ -55,7 +55,7 @@ class IteratedPair(Pair):
             lower = np.minimum(piece.inner.stiffness, piece.outer.stiffness)
             upper = np.maximum(piece.inner.stiffness, piece.outer.stiffness)
             demand = np.minimum(np.maximum(stiffness, lower), upper)
-            phi_1, phi_2 = _deflections(balance, piece, tau_e, demand)
+            phi_1, phi_2 = _solve_between_ends(balance, piece, tau_e, demand)
         return PairSolution(
             lower=lower,
             upper=upper,
@@ -91,7 +91,7 @@ class _Box(NamedTuple):
         near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
         return cls(inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, near)
 
-    def holds(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
+    def contains(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
         """Return whether deflections lie in the box, its outer sides excluded."""
         inside: BoolArray = (
             (self.inner_1 <= phi_1)
@@ -101,7 +101,7 @@ class _Box(NamedTuple):
         )
         return inside
 
-    def confined(
+    def confine(
         self, phi_1: FloatArray, phi_2: FloatArray, target_1: FloatArray, target_2: FloatArray
     ) -> Values:
         """Return the targets of a step from deflections in the box, moved back into it."""
@@ -123,48 +123,48 @@ def _short_of(start: FloatArray, target: FloatArray, outer: FloatArray, near: Bo
     return np.where(target >= outer, np.where(near, outer, (start + outer) / 2), target)
 
 
-def _deflections(balance: Balance, piece: Corridor, tau_e: FloatArray, demand: FloatArray) -> Values:
+def _solve_between_ends(balance: Balance, piece: Corridor, tau_e: FloatArray, demand: FloatArray) -> Values:
     """Return phi_1 and phi_2 at which the piece has a stiffness between those at its ends; (samples,)."""
     sign = np.where(piece.rising, 1.0, -1.0)
     inner = piece.inner
     box = _Box.of(piece, demand)
     guess = first_guess(piece.state, inner.stiffness, demand, sign)
     start = where_needed(
-        ~box.holds(*guess),
-        lambda phi_1, phi_2, guess_1, guess_2, *box: _Box(*box).confined(phi_1, phi_2, guess_1, guess_2),
+        ~box.contains(*guess),
+        lambda phi_1, phi_2, guess_1, guess_2, *box: _Box(*box).confine(phi_1, phi_2, guess_1, guess_2),
         (inner.phi_1, inner.phi_2, *guess, *box),
         guess,
     )
     phi_1, phi_2, error = repeat(
-        lambda state, constants: _step(balance, state, constants),
+        lambda state, constants: _step_in_box(balance, state, constants),
         (*start, np.zeros_like(tau_e)),
         (tau_e, demand, sign, inner.stiffness, *box),
         MAX_STEPS,
     )
     return where_needed(
         ~(error <= ERROR_RTOL) & ~np.isnan(demand),
-        lambda *known: _bracketed(balance, *known),
+        lambda *unsolved: _bracket_preload(balance, *unsolved),
         (tau_e, demand, inner.phi_1),
         (phi_1, phi_2),
     )
 
 
-def _step(balance: Balance, state: Values, constants: Values) -> tuple[Values, BoolArray]:
+def _step_in_box(balance: Balance, state: Values, constants: Values) -> tuple[Values, BoolArray]:
     """Return the state after a step of third order on (14), kept in the box, and whether it has converged."""
     phi_1, phi_2, _ = state
     tau_e, demand, sign, inner_stiffness, *bounds = constants
     step_1, step_2, error = third_order_step(balance.state(phi_1, phi_2), tau_e, demand, sign)
     target = phi_1 + step_1, phi_2 + step_2
     *next_point, error = where_needed(
-        (demand == inner_stiffness) | ~_Box(*bounds).holds(*target),
-        _confined_step,
+        (demand == inner_stiffness) | ~_Box(*bounds).contains(*target),
+        _confine_step,
         (demand, inner_stiffness, error, phi_1, phi_2, *target, *bounds),
         (*target, error),
     )
     return (*next_point, error), ~(error > ERROR_RTOL)
 
 
-def _confined_step(
+def _confine_step(
     demand: FloatArray,
     inner_stiffness: FloatArray,
     error: FloatArray,
@@ -175,14 +175,14 @@ def _confined_step(
     *bounds: FloatArray,
 ) -> Values:
     """Return a step moved back into the box, or no step if the demand is the stiffness at the inner end."""
-    confined_1, confined_2 = _Box(*bounds).confined(phi_1, phi_2, target_1, target_2)
+    confined_1, confined_2 = _Box(*bounds).confine(phi_1, phi_2, target_1, target_2)
     met = demand == inner_stiffness
     return np.where(met, phi_1, confined_1), np.where(met, phi_2, confined_2), np.where(met, 0.0, error)
 
 
-def _bracketed(balance: Balance, tau_e: FloatArray, demand: FloatArray, inner_1: FloatArray) -> Values:
+def _bracket_preload(balance: Balance, tau_e: FloatArray, demand: FloatArray, inner_1: FloatArray) -> Values:
     """Return phi_1 and phi_2 by bracketing the preload torque x in excess of that at the inner end."""
-    tau_1 = state_of(balance.first, inner_1).tau
+    tau_1 = spring_state(balance.first, inner_1).tau
     tau_2 = tau_e - tau_1
 
     def missing(x: FloatArray, tau_1: FloatArray, tau_2: FloatArray, demand: FloatArray) -> FloatArray:
@@ -194,11 +194,11 @@ def _bracketed(balance: Balance, tau_e: FloatArray, demand: FloatArray, inner_1:
 
     def widened(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         (width,) = state
-        *known, endless = constants
-        short = (endless > 0) & (missing(width, *known) > 0)
+        *torques_and_demand, endless = constants
+        short = (endless > 0) & (missing(width, *torques_and_demand) > 0)
         return (np.where(short, 2 * width, width),), ~short
 
-    known = tau_1, tau_2, demand
-    (width,) = repeat(widened, (guess,), (*known, np.where(endless, 1.0, 0.0)), MAX_DOUBLINGS)
-    x = bracketed_root(missing, least, width, known)
+    torques_and_demand = tau_1, tau_2, demand
+    (width,) = repeat(widened, (guess,), (*torques_and_demand, np.where(endless, 1.0, 0.0)), MAX_DOUBLINGS)
+    x = bracketed_root(missing, least, width, torques_and_demand)
     return balance.deflections(tau_1 + x, tau_2 - x)

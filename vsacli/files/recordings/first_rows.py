@@ -31,7 +31,7 @@ from vsacli.documents.time_column import (
     guessed_unit,
     read_clock,
 )
-from vsacli.trajectory.recorded.header_words import QUANTITY_WORDS, WORDS, words_of
+from vsacli.trajectory.recorded.header_words import QUANTITY_WORDS, WORDS, words_of_column_name
 
 FIRST_ROWS = 500
 """Number of rows read, enough to distinguish numbers from texts, and stamps from counters."""
@@ -245,7 +245,7 @@ def _called(rows: FirstRows) -> list[int]:
 
 def _like_stamps(rows: FirstRows, place: int) -> bool:
     """Return whether a column, not named as a quantity, rises nearly evenly and does not count rows."""
-    words = words_of(split_heading(rows.columns[place])[0])
+    words = words_of_column_name(split_heading(rows.columns[place])[0])
     if QUANTITY_WORDS.intersection(words) or rows.counts_rows(place):
         return False
     steps = np.diff(rows.numbers(place))
@@ -255,7 +255,7 @@ def _like_stamps(rows: FirstRows, place: int) -> bool:
 
 def _seconds_and_nanoseconds(rows: FirstRows) -> tuple[int, int] | None:
     """Return columns of whole seconds and of nanoseconds that restart, by name or as seconds since 1970."""
-    words = [words_of(split_heading(column)[0]) for column in rows.columns]
+    words = [words_of_column_name(split_heading(column)[0]) for column in rows.columns]
     for place in rows.of_numbers:
         *before, last = words[place] or ("",)
         named = [other for other in rows.of_numbers if words[other] in [(*before, rest) for rest in REST]]

@@ -25,7 +25,7 @@ from vsacli.robot.model import Robot
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR
 from vsacli.trajectory.fits.selection import INTERPOLATE, LEAST_SQUARES, SMOOTH
 from vsacli.trajectory.recorded.columns import column_layout
-from vsacli.trajectory.recorded.recording import read_recording
+from vsacli.trajectory.recorded.recording import read_recorded_signals
 from vsacli.trajectory.recorded.samples import SampledProfile
 
 FEWEST_POINTS = 1000
@@ -63,13 +63,13 @@ def table_profiles(path: str, robot: Robot, progress: Progress = unseen) -> list
         progress: opens a progress bar over the samples to which splines are fitted.
 
     Raises:
-        InputError: as `read_recording`.
+        InputError: as `read_recorded_signals`.
     """
     joints, header = CommandedJoints.of(robot), read_header(path)
     layout = column_layout(header.columns, joints, (POSITION,), path, header.line)
     wanted = [signal for signal in (POSITION, *COMMANDED.values()) if layout.quantities.get(signal.names[0])]
     choices = dict.fromkeys(wanted, AS_IT_ASKS_FOR)
-    return list(read_recording(path, joints, choices, progress=progress).profiles)
+    return list(read_recorded_signals(path, joints, choices, progress=progress).profiles)
 
 
 def recorded_curves(

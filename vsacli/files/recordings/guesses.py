@@ -29,7 +29,7 @@ from vsacli.trajectory.recorded.header_words import (
     JointNames,
     motor_of,
     role_of,
-    words_of,
+    words_of_column_name,
 )
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE
 
@@ -171,7 +171,7 @@ def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
     heading = split_heading(rows.columns[place])[0]
     role, name = role_of(heading)
     if _STIFFNESS.fullmatch(name.strip("_ ")) and min(rows.numbers(place)) > 0:
-        yield _Column(place, "stiffness", words=words_of(name)[1:], role=role)
+        yield _Column(place, "stiffness", words=words_of_column_name(name)[1:], role=role)
         return
     for match in reversed(list(WORDS.finditer(name))):
         quantity = next((key for key, known in QUANTITIES.items() if match[0].lower() in known), None)
@@ -179,12 +179,12 @@ def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
             entry = _INDEX.match(name, match.end())
             before, words = (
                 name[: match.start()],
-                (*words_of(name[: match.start()]), *words_of(name[match.end() :])),
+                (*words_of_column_name(name[: match.start()]), *words_of_column_name(name[match.end() :])),
             )
             yield _Column(place, quantity, before, words, int(entry[1]) if entry else None, role=role)
             return
     if heading:
-        yield _Column(place, "q", heading, words_of(heading), bare=True, role=role)
+        yield _Column(place, "q", heading, words_of_column_name(heading), bare=True, role=role)
 
 
 def _of_motor(column: _Column, joints: JointNames) -> _Column:
@@ -201,7 +201,7 @@ def _of_motor(column: _Column, joints: JointNames) -> _Column:
 
 def _labels(rows: FirstRows) -> dict[int, str]:
     """Return joint names found in the rows, as ROS writes them, by their indices in arrays."""
-    words = [words_of(column) or ("",) for column in rows.columns]
+    words = [words_of_column_name(column) or ("",) for column in rows.columns]
     return {
         int(last): rows.text(place)
         for place, (*before, last) in enumerate(words)
@@ -255,7 +255,7 @@ def _matched(
     for column in family:
         label = None if column.entry is None else labels.get(column.entry)
         if label is not None:
-            name, reason = joints.in_words(words_of(label)), f"the rows call it {label}"
+            name, reason = joints.in_words(words_of_column_name(label)), f"the rows call it {label}"
         elif column.bare:
             name, reason = joints.called(column.words), "named as the joint; taken for its position"
         else:

@@ -13,25 +13,25 @@ Element: TypeAlias = ElementTree.Element
 Value: TypeAlias = str | bool | float | Iterable[float]
 
 
-def element(parent: Element, tag: str, /, **attributes: Value) -> Element:
+def add_element(parent: Element, tag: str, /, **attributes: Value) -> Element:
     """Add a new element to another one, and return it."""
-    return add(ElementTree.SubElement(parent, tag), **attributes)
+    return set_attributes(ElementTree.SubElement(parent, tag), **attributes)
 
 
-def add(to: Element, /, **attributes: Value) -> Element:
+def set_attributes(to: Element, /, **attributes: Value) -> Element:
     """Add or replace attributes of an element, and return it."""
-    to.attrib.update({name: _text(value) for name, value in attributes.items()})
+    to.attrib.update({name: _format_attribute(value) for name, value in attributes.items()})
     return to
 
 
-def document(root: Element, comment: str) -> str:
+def xml_document(root: Element, comment: str) -> str:
     """Return the text of an XML file, indented, with a comment at its beginning."""
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- {_harmless(comment)} -->\n{text}\n'
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n<!-- {_without_double_hyphens(comment)} -->\n{text}\n'
 
 
-def _text(value: Value) -> str:
+def _format_attribute(value: Value) -> str:
     """Return numbers as the shortest text that reads back bit for bit; zero without a sign."""
     if isinstance(value, str):
         return value
@@ -39,10 +39,10 @@ def _text(value: Value) -> str:
         return str(value).lower()
     if isinstance(value, float | int):
         return repr(float(value) or 0.0).removesuffix(".0")
-    return " ".join(map(_text, value))
+    return " ".join(map(_format_attribute, value))
 
 
-def _harmless(comment: str) -> str:
+def _without_double_hyphens(comment: str) -> str:
     """Return a comment without double hyphens, which would end it."""
     while "--" in comment:
         comment = comment.replace("--", "- -")

@@ -16,11 +16,11 @@ from vsacli.robot.model import Robot
 from vsacli.robot.models.exported_model import (
     Element,
     ExportedModel,
-    add,
+    add_element,
     arm_length,
-    document,
-    element,
     rod_radius,
+    set_attributes,
+    xml_document,
 )
 from vsacli.robot.models.mjcf_drives import (
     DRAWN,
@@ -58,50 +58,52 @@ def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     check_bodies(robot)
     check_friction(robot)
     root = ElementTree.Element("mujoco", model=robot.name)
-    element(root, "compiler", angle="radian")
-    option = element(root, "option", gravity=robot.gravity, integrator="RK4", timestep=TIME_STEP)
-    element(option, "flag", contact="disable")
-    element(root, "statistic", center=robot.base.xyz, extent=SEEN * arm_length(robot))
+    add_element(root, "compiler", angle="radian")
+    option = add_element(root, "option", gravity=robot.gravity, integrator="RK4", timestep=TIME_STEP)
+    add_element(option, "flag", contact="disable")
+    add_element(root, "statistic", center=robot.base.xyz, extent=SEEN * arm_length(robot))
     _add_light(root)
-    sections = Sections(*(element(root, tag) for tag in ("worldbody", "tendon", "actuator")))
-    body = _placed(sections.world, "base", robot.base)
+    sections = Sections(*(add_element(root, tag) for tag in ("worldbody", "tendon", "actuator")))
+    body = _add_body(sections.world, "base", robot.base)
     radius = rod_radius(robot)
     for joint in robot.joints:
-        below, body = body, _link(body, joint, radius)
+        below, body = body, _add_link_body(body, joint, radius)
         add_drive(sections, joint, below, body)
     add_dampers(sections, robot.joints)
-    element(body, "site", name="tool", pos=robot.tool.xyz, quat=_quaternion(robot.tool), size=DRAWN)
+    add_element(body, "site", name="tool", pos=robot.tool.xyz, quat=_quaternion(robot.tool), size=DRAWN)
     if start is not None:
         add_start(root, sections.world, robot, start)
-    return ExportedModel(document(root, _comment(robot)), forces_text(robot), ())
+    return ExportedModel(xml_document(root, _header_comment(robot)), forces_text(robot), ())
 
 
 def _add_light(root: Element) -> None:
     """Add a bright sky, against which a model without a ground is visible."""
-    element(element(root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.6, 0.6, 0.6))
-    sky = element(element(root, "asset"), "texture", type="skybox", builtin="gradient", width=64, height=384)
-    add(sky, rgb1=(0.85, 0.9, 0.95), rgb2=(1, 1, 1))
+    add_element(add_element(root, "visual"), "headlight", ambient=(0.4, 0.4, 0.4), diffuse=(0.6, 0.6, 0.6))
+    sky = add_element(
+        add_element(root, "asset"), "texture", type="skybox", builtin="gradient", width=64, height=384
+    )
+    set_attributes(sky, rgb1=(0.85, 0.9, 0.95), rgb2=(1, 1, 1))
 
 
-def _comment(robot: Robot) -> str:
+def _header_comment(robot: Robot) -> str:
     words = forces_words(robot)
     beside = f" In addition, passive forces: {words}." if words else ""
     return f"{robot.name}, by vsacli {__version__}, for MuJoCo {LOWEST_VERSION} or later.{beside}"
 
 
-def _placed(parent: Element, name: str, pose: Pose) -> Element:
-    return element(parent, "body", name=name, pos=pose.xyz, quat=_quaternion(pose))
+def _add_body(parent: Element, name: str, pose: Pose) -> Element:
+    return add_element(parent, "body", name=name, pos=pose.xyz, quat=_quaternion(pose))
 
 
-def _link(parent: Element, joint: Joint, radius: float) -> Element:
+def _add_link_body(parent: Element, joint: Joint, radius: float) -> Element:
     """Add the body of a link at its pose at q = 0, with its joint, and return it."""
     dh, link = joint.dh, joint.link
     sa, ca = math.sin(dh.alpha), math.cos(dh.alpha)
     place = (dh.a * math.cos(dh.theta), dh.a * math.sin(dh.theta), dh.d)
-    body = element(parent, "body", name=f"{joint.name}.link", pos=place, quat=_row_quaternion(joint))
-    element(body, "inertial", pos=link.com, mass=link.mass, fullinertia=full_inertia(link))
+    body = add_element(parent, "body", name=f"{joint.name}.link", pos=place, quat=_row_quaternion(joint))
+    add_element(body, "inertial", pos=link.com, mass=link.mass, fullinertia=full_inertia(link))
     origin = (-dh.a, -dh.d * sa, -dh.d * ca)
-    hinge = element(
+    hinge = add_element(
         body,
         "joint",
         name=joint.name,
@@ -111,27 +113,27 @@ def _link(parent: Element, joint: Joint, radius: float) -> Element:
         damping=joint.damping,
     )
     if all(map(math.isfinite, joint.limits.position)):
-        add(hinge, range=joint.limits.position, limited=False)
-    _draw(body, origin, radius)
+        set_attributes(hinge, range=joint.limits.position, limited=False)
+    _draw_link(body, origin, radius)
     return body
 
 
-def _draw(body: Element, origin: tuple[float, float, float], radius: float) -> None:
+def _draw_link(body: Element, origin: tuple[float, float, float], radius: float) -> None:
     if math.hypot(*origin) > radius:
         draw_rod(body, origin, radius, LINK_COLOR)
     else:
-        element(body, "geom", type="sphere", size=radius, rgba=LINK_COLOR, **GHOST)
+        add_element(body, "geom", type="sphere", size=radius, rgba=LINK_COLOR, **GHOST)
 
 
 def _row_quaternion(joint: Joint) -> tuple[float, ...]:
     """Return the quaternion of Rz(theta) Rx(alpha)."""
-    (ct, st), (ca, sa) = (_half(angle) for angle in (joint.dh.theta, joint.dh.alpha))
+    (ct, st), (ca, sa) = (_half_angle_cosine_sine(angle) for angle in (joint.dh.theta, joint.dh.alpha))
     return (ct * ca, ct * sa, st * sa, st * ca)
 
 
 def _quaternion(pose: Pose) -> tuple[float, ...]:
     """Return the quaternion of Rz(yaw) Ry(pitch) Rx(roll)."""
-    (cr, sr), (cp, sp), (cy, sy) = map(_half, pose.rpy)
+    (cr, sr), (cp, sp), (cy, sy) = map(_half_angle_cosine_sine, pose.rpy)
     return (
         cy * cp * cr + sy * sp * sr,
         cy * cp * sr - sy * sp * cr,
@@ -140,5 +142,5 @@ def _quaternion(pose: Pose) -> tuple[float, ...]:
     )
 
 
-def _half(angle: float) -> tuple[float, float]:
+def _half_angle_cosine_sine(angle: float) -> tuple[float, float]:
     return math.cos(angle / 2), math.sin(angle / 2)

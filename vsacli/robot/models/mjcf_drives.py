@@ -20,7 +20,7 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.base.variables import VARIABLES
 from vsacli.robot.joint import INERTIA_ROUNDING, Joint, Link
 from vsacli.robot.model import Robot
-from vsacli.robot.models.exported_model import Element, Value, add, element
+from vsacli.robot.models.exported_model import Element, Value, add_element, set_attributes
 
 LEAST = 1e-14
 """Smallest mass, kg, and moment of inertia, kg m^2, written: ten times what MuJoCo treats as zero."""
@@ -37,17 +37,17 @@ def check_bodies(robot: Robot) -> None:
     Raises:
         InputError: MuJoCo refuses links; names each with the reason.
     """
-    reasons = [reason for joint in robot.joints for reason in _reasons(joint)]
+    reasons = [reason for joint in robot.joints for reason in _refused_bodies(joint)]
     if reasons:
-        raise InputError(Problem(file_of(robot), 0, reason) for reason in reasons)
+        raise InputError(Problem(robot_file_path(robot), 0, reason) for reason in reasons)
 
 
-def file_of(robot: Robot) -> str:
+def robot_file_path(robot: Robot) -> str:
     """Return the path of the file that a robot was read from; empty without one."""
     return next((source.path for source in robot.sources), "")
 
 
-def _reasons(joint: Joint) -> Iterator[str]:
+def _refused_bodies(joint: Joint) -> Iterator[str]:
     link = joint.link
     low, middle, high = link.inertia.principal_moments
     whose = f"link of joint {joint.name}"
@@ -99,8 +99,10 @@ def rotors_of(joint: Joint, tendons: Element) -> list[Rotor]:
     first, second = rotors
     weight = math.copysign(math.sqrt(second.inertia / first.inertia), coupled)
     inertia = coupled / weight
-    tendon = add_sum(tendons, f"{joint.name}.coupled_inertia", {first.name: 1.0, second.name: weight})
-    add(tendon, armature=inertia)
+    tendon = add_weighted_sum(
+        tendons, f"{joint.name}.coupled_inertia", {first.name: 1.0, second.name: weight}
+    )
+    set_attributes(tendon, armature=inertia)
     left = 1 - inertia / first.inertia
     return [rotor._replace(inertia=left * rotor.inertia) for rotor in rotors]
 
@@ -119,18 +121,20 @@ def add_rotors(world: Element, rotors: list[Rotor], *, coupled: bool) -> None:
 
 def add_rotor(parent: Element, rotor: Rotor, **attributes: Value) -> Element:
     """Add the body of a motor to another body, with its coordinate along or about z, and return it."""
-    body = element(parent, "body", name=rotor.name)
-    element(body, "inertial", pos=(0, 0, 0), mass=LEAST, diaginertia=(LEAST,) * 3)
+    body = add_element(parent, "body", name=rotor.name)
+    add_element(body, "inertial", pos=(0, 0, 0), mass=LEAST, diaginertia=(LEAST,) * 3)
     damping, inertia = rotor.motor.damping, rotor.inertia
-    element(body, "joint", name=rotor.name, axis=(0, 0, 1), armature=inertia, damping=damping, **attributes)
+    add_element(
+        body, "joint", name=rotor.name, axis=(0, 0, 1), armature=inertia, damping=damping, **attributes
+    )
     return body
 
 
-def add_sum(tendons: Element, name: str, weights: dict[str, float]) -> Element:
+def add_weighted_sum(tendons: Element, name: str, weights: dict[str, float]) -> Element:
     """Add a tendon whose length is a weighted sum of positions, and return it."""
-    tendon = element(tendons, "fixed", name=name)
+    tendon = add_element(tendons, "fixed", name=name)
     for position, weight in weights.items():
-        element(tendon, "joint", joint=position, coef=weight)
+        add_element(tendon, "joint", joint=position, coef=weight)
     return tendon
 
 
@@ -153,7 +157,7 @@ radian."""
 def draw_rod(body: Element, end: Sequence[float], radius: float, color: Sequence[float]) -> None:
     """Draw a rod from the origin of a body to a point, without mass and contact."""
     ends = (0, 0, 0, *end)
-    element(body, "geom", type="capsule", fromto=ends, size=radius, rgba=color, **GHOST)
+    add_element(body, "geom", type="capsule", fromto=ends, size=radius, rgba=color, **GHOST)
 
 
 def add_lever(below: Element, joint: Joint, spring: LeverSpring, rotors: Sequence[Rotor]) -> None:
@@ -161,27 +165,27 @@ def add_lever(below: Element, joint: Joint, spring: LeverSpring, rotors: Sequenc
     first, second = rotors
     half = joint.dh.theta / 2
     lever = add_rotor(below, first, type="hinge")
-    add(lever, quat=(math.cos(half), 0, 0, math.sin(half)))
+    set_attributes(lever, quat=(math.cos(half), 0, 0, math.sin(half)))
     draw_rod(lever, (spring.lever, 0, 0), DRAWN, LEVER_COLOR)
-    element(lever, "site", name=f"{joint.name}.lever", pos=(spring.lever, 0, 0), size=DRAWN)
+    add_element(lever, "site", name=f"{joint.name}.lever", pos=(spring.lever, 0, 0), size=DRAWN)
     place = -math.copysign(ANCHOR, spring.lead)
-    element(lever, "site", name=f"{second.name}.anchor", pos=(0, 0, place), size=DRAWN)
+    add_element(lever, "site", name=f"{second.name}.anchor", pos=(0, 0, place), size=DRAWN)
     slide = add_rotor(lever, second, type="slide")
-    element(slide, "site", name=f"{second.name}.end", pos=(0, 0, 0), size=DRAWN)
+    add_element(slide, "site", name=f"{second.name}.end", pos=(0, 0, 0), size=DRAWN)
 
 
 def add_lever_spring(tendons: Element, joint: Joint, spring: LeverSpring, setter: str, body: Element) -> None:
     """Add the spring from the lever to a point of the link, and via the pulley from the anchor to motor 2."""
     dh, lead = joint.dh, abs(spring.lead)
     place = (spring.arm - dh.a, -dh.d * math.sin(dh.alpha), -dh.d * math.cos(dh.alpha))
-    element(body, "site", name=f"{joint.name}.point", pos=place, size=DRAWN)
-    tendon = element(tendons, "spatial", name=f"{joint.name}.spring", stiffness=spring.stiffness)
-    add(tendon, springlength=abs(spring.arm - spring.lever) + ANCHOR * lead, group=HIDDEN)
-    element(tendon, "site", site=f"{joint.name}.lever")
-    element(tendon, "site", site=f"{joint.name}.point")
-    element(tendon, "pulley", divisor=1 / lead)
-    element(tendon, "site", site=f"{setter}.anchor")
-    element(tendon, "site", site=f"{setter}.end")
+    add_element(body, "site", name=f"{joint.name}.point", pos=place, size=DRAWN)
+    tendon = add_element(tendons, "spatial", name=f"{joint.name}.spring", stiffness=spring.stiffness)
+    set_attributes(tendon, springlength=abs(spring.arm - spring.lever) + ANCHOR * lead, group=HIDDEN)
+    add_element(tendon, "site", site=f"{joint.name}.lever")
+    add_element(tendon, "site", site=f"{joint.name}.point")
+    add_element(tendon, "pulley", divisor=1 / lead)
+    add_element(tendon, "site", site=f"{setter}.anchor")
+    add_element(tendon, "site", site=f"{setter}.end")
 
 
 POLYNOMIAL_TERMS = 3
@@ -199,10 +203,12 @@ class Sections(NamedTuple):
     actuators: Element
 
 
-def has_springs_of(joint: Joint) -> bool:
+def springs_are_expressible(joint: Joint) -> bool:
     """Return whether MJCF can express the springs of a joint; True if it has none."""
     elements = joint.actuator.spring_elements
-    polynomial = elements is not None and all(_terms(each.law) is not None for each in elements)
+    polynomial = elements is not None and all(
+        _polynomial_stiffness(each.law) is not None for each in elements
+    )
     return polynomial or joint.actuator.lever_spring is not None
 
 
@@ -210,7 +216,7 @@ def add_drive(sections: Sections, joint: Joint, below: Element, body: Element) -
     """Add motors, springs and torques of a joint; `below` is the body before the joint, `body` its link's."""
     rotors = rotors_of(joint, sections.tendons)
     for rotor in rotors:
-        _actuate(sections.actuators, rotor)
+        _add_actuator(sections.actuators, rotor)
     lever = joint.actuator.lever_spring
     if not joint.actuator.sprung:
         _drive_directly(body, joint, rotors)
@@ -219,21 +225,21 @@ def add_drive(sections: Sections, joint: Joint, below: Element, body: Element) -
         add_lever_spring(sections.tendons, joint, lever, rotors[1].name, body)
     else:
         add_rotors(sections.world, rotors, coupled=joint.actuator.coupled_rotors != 0)
-        if has_springs_of(joint):
+        if springs_are_expressible(joint):
             _add_springs(sections.tendons, joint)
 
 
 def _drive_directly(body: Element, joint: Joint, rotors: Sequence[Rotor]) -> None:
     """Add the inertia and damping of a motor, whose rotor moves with the joint, to the joint."""
     (moving,), (rotor,) = body.findall("joint"), rotors
-    add(moving, armature=rotor.inertia, damping=joint.damping + rotor.motor.damping)
+    set_attributes(moving, armature=rotor.inertia, damping=joint.damping + rotor.motor.damping)
 
 
-def _actuate(actuators: Element, rotor: Rotor) -> None:
-    actuator = element(actuators, "motor", name=f"{rotor.name}.torque", joint=rotor.name)
+def _add_actuator(actuators: Element, rotor: Rotor) -> None:
+    actuator = add_element(actuators, "motor", name=f"{rotor.name}.torque", joint=rotor.name)
     most = rotor.motor.max_torque
     if math.isfinite(most):
-        add(actuator, ctrlrange=(-most, most), ctrllimited=False)
+        set_attributes(actuator, ctrlrange=(-most, most), ctrllimited=False)
 
 
 def _add_springs(tendons: Element, joint: Joint) -> None:
@@ -246,12 +252,16 @@ def _add_spring(tendons: Element, name: str, joint: Joint, spring: SpringElement
     turned = -1.0 if spring.law.domain[1] <= 0 else 1.0
     motors = [motor_name(joint, number) for number in range(1, 1 + len(spring.motors))]
     weights = zip((joint.name, *motors), (spring.joint, *spring.motors), strict=True)
-    tendon = add_sum(tendons, name, {position: turned * weight for position, weight in weights if weight})
-    terms = [term * turned ** (power + 1) for power, term in enumerate(_terms(spring.law) or (), 1)]
-    add(tendon, stiffness=terms, springlength=SLACK if spring.law.pulls_only else 0)
+    tendon = add_weighted_sum(
+        tendons, name, {position: turned * weight for position, weight in weights if weight}
+    )
+    terms = [
+        term * turned ** (power + 1) for power, term in enumerate(_polynomial_stiffness(spring.law) or (), 1)
+    ]
+    set_attributes(tendon, stiffness=terms, springlength=SLACK if spring.law.pulls_only else 0)
 
 
-def _terms(law: SpringLaw) -> tuple[float, ...] | None:
+def _polynomial_stiffness(law: SpringLaw) -> tuple[float, ...] | None:
     """Return the stiffness of a tendon, one number if linear; None if MuJoCo has no such spring."""
     terms = law.polynomial
     if terms is None or len(terms) > POLYNOMIAL_TERMS:
@@ -265,16 +275,18 @@ def add_dampers(sections: Sections, joints: Iterable[Joint]) -> None:
         if joint.damper_at("link"):
             _add_damper(sections.actuators, f"{joint.name}.damping", joint=joint.name)
         if joint.damper_at("transmission"):
-            for number, there in enumerate(joint.actuator.has(VARIABLES["phi"]), 1):
-                if there:
+            for number, has_spring in enumerate(joint.actuator.has(VARIABLES["phi"]), 1):
+                if has_spring:
                     name = f"{joint.name}.damper_{number}"
-                    add_sum(sections.tendons, name, {motor_name(joint, number): 1.0, joint.name: -1.0})
+                    add_weighted_sum(
+                        sections.tendons, name, {motor_name(joint, number): 1.0, joint.name: -1.0}
+                    )
                     _add_damper(sections.actuators, f"{joint.name}.damping_{number}", tendon=name)
 
 
 def _add_damper(actuators: Element, name: str, **place: str) -> None:
     """Add a force that is minus the velocity times the control."""
-    element(actuators, "general", name=name, gaintype="affine", gainprm=(0, 0, -1), **place)
+    add_element(actuators, "general", name=name, gaintype="affine", gainprm=(0, 0, -1), **place)
 
 
 KEY = "start"
@@ -311,5 +323,5 @@ def add_start(root: Element, world: Element, robot: Robot, start: Start) -> None
         raise InputError.one(f"no motion begins where {', '.join(lost)} has no position or velocity")
     in_order = [states[str(coordinate.get("name"))] for coordinate in world.iter("joint")]
     positions, velocities = zip(*in_order, strict=True)
-    key = element(root, "keyframe")
-    element(key, "key", name=KEY, qpos=map(float, positions), qvel=map(float, velocities))
+    key = add_element(root, "keyframe")
+    add_element(key, "key", name=KEY, qpos=map(float, positions), qvel=map(float, velocities))

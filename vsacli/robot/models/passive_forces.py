@@ -18,7 +18,7 @@ from vsacli.base.texts import one_line
 from vsacli.base.version import __version__
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.robot.models.mjcf_drives import file_of, has_springs_of, motor_name
+from vsacli.robot.models.mjcf_drives import motor_name, robot_file_path, springs_are_expressible
 
 _TEXT = '''"""Passive forces of {name}, by vsacli {version}: {words}.
 
@@ -61,13 +61,13 @@ def check_friction(robot: Robot) -> None:
     """
     problems = [
         Problem(
-            file_of(robot),
+            robot_file_path(robot),
             0,
             f"{where} has the width 0; MuJoCo's frictionloss is another law, which creeps where this one "
             "sticks: give the friction a width",
         )
         for joint in robot.joints
-        for where, friction in _frictions(joint)
+        for where, friction in _named_frictions(joint)
         if friction.sharp
     ]
     if problems:
@@ -76,7 +76,7 @@ def check_friction(robot: Robot) -> None:
 
 def forces_words(robot: Robot) -> str:
     """Return a phrase on the forces in the file; "" without any."""
-    springs = [joint.name for joint in robot.joints if not has_springs_of(joint)]
+    springs = [joint.name for joint in robot.joints if not springs_are_expressible(joint)]
     friction = [joint.name for joint in robot.joints if joint.has_friction]
     parts = {"springs": springs, "friction": friction}
     return "; ".join(f"{what} of {', '.join(names)}" for what, names in parts.items() if names)
@@ -84,7 +84,7 @@ def forces_words(robot: Robot) -> str:
 
 def forces_text(robot: Robot) -> str | None:
     """Return the text of the file; None if MJCF can express all forces of the robot."""
-    joints = [joint for joint in robot.joints if joint.has_friction or not has_springs_of(joint)]
+    joints = [joint for joint in robot.joints if joint.has_friction or not springs_are_expressible(joint)]
     if not joints:
         return None
     from vsacli.compute.tracing import Kind, trace
@@ -104,7 +104,7 @@ def forces_text(robot: Robot) -> str | None:
     )
 
 
-def _frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
+def _named_frictions(joint: Joint) -> Iterator[tuple[str, Friction]]:
     if joint.friction is not None:
         yield f"joint {joint.name}: its friction", joint.friction
     for number, motor in enumerate(joint.actuator.motors, 1):
@@ -124,17 +124,21 @@ def _forces(joints: Sequence[Joint], rows: Sequence[Any]) -> list[Any]:
     forces = []
     for joint in joints:
         count = len(_coordinates(joint))
-        forces += _forces_of(joint, positions[:count], velocities[:count])
+        forces += _joint_forces(joint, positions[:count], velocities[:count])
         del positions[:count], velocities[:count]
     return forces
 
 
-def _forces_of(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]) -> list[Any]:
+def _joint_forces(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]) -> list[Any]:
     """Return the torques of springs minus friction on the coordinates of a joint."""
     forces = [np.zeros_like(position) for position in positions]
-    if not has_springs_of(joint):
+    if not springs_are_expressible(joint):
         elements = joint.actuator.spring_elements
-        forces = _of_mechanism(joint, positions) if elements is None else _of_elements(elements, positions)
+        forces = (
+            _mechanism_forces(joint, positions)
+            if elements is None
+            else _spring_element_forces(elements, positions)
+        )
     frictions = [joint.friction, *(motor.friction for motor in joint.actuator.motors)]
     for number, friction in enumerate(frictions):
         law = FrictionLaws.of([friction])
@@ -144,7 +148,7 @@ def _forces_of(joint: Joint, positions: Sequence[Any], velocities: Sequence[Any]
     return forces
 
 
-def _of_elements(elements: Sequence[SpringElement], positions: Sequence[Any]) -> list[Any]:
+def _spring_element_forces(elements: Sequence[SpringElement], positions: Sequence[Any]) -> list[Any]:
     """Return the torques of springs on coordinates by their weights; springs that only pull may be slack."""
     forces = [np.zeros_like(position) for position in positions]
     for spring in elements:
@@ -157,7 +161,7 @@ def _of_elements(elements: Sequence[SpringElement], positions: Sequence[Any]) ->
     return forces
 
 
-def _of_mechanism(joint: Joint, positions: Sequence[Any]) -> list[Any]:
+def _mechanism_forces(joint: Joint, positions: Sequence[Any]) -> list[Any]:
     """Return the torques of the springs of a joint from its elasticity, if they have no spring elements."""
     elasticity = type(joint.actuator).elasticity([joint.actuator])
     torques = elasticity.torques(elasticity.coordinates(positions[0], np.stack(positions[1:], axis=-1)))

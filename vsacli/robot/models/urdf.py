@@ -17,7 +17,14 @@ from vsacli.base.errors import InputError
 from vsacli.base.version import __version__
 from vsacli.robot.joint import UNBOUNDED, Joint
 from vsacli.robot.model import Robot
-from vsacli.robot.models.exported_model import Element, ExportedModel, add, document, element, rod_radius
+from vsacli.robot.models.exported_model import (
+    Element,
+    ExportedModel,
+    add_element,
+    rod_radius,
+    set_attributes,
+    xml_document,
+)
 from vsacli.robot.models.mjcf_drives import Start
 from vsacli.robot.urdf.link_tree import pose_matrix, roll_pitch_yaw
 
@@ -40,81 +47,81 @@ def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     if start is not None:
         raise InputError.one("--start needs --format mjcf; a URDF has no initial state")
     root = ElementTree.Element("robot", name=robot.name)
-    element(root, "link", name=ROOT)
+    add_element(root, "link", name=ROOT)
     parent, end = ROOT, pose_matrix(robot.base.xyz, robot.base.rpy)
     for joint in robot.joints:
         link = f"{joint.name}_link"
         dh = joint.dh
         _add_link(root, link, joint, rod_radius(robot))
-        moving = _add_joint(root, joint.name, _type(joint), parent, link)
-        _place(moving, end @ pose_matrix((0, 0, dh.d), (0, 0, dh.theta)))
-        _add_drive(moving, joint)
+        moving = _add_joint(root, joint.name, _urdf_joint_type(joint), parent, link)
+        _add_origin(moving, end @ pose_matrix((0, 0, dh.d), (0, 0, dh.theta)))
+        _add_joint_properties(moving, joint)
         parent, end = link, pose_matrix((dh.a, 0, 0), (dh.alpha, 0, 0))
-    element(root, "link", name=TOOL)
+    add_element(root, "link", name=TOOL)
     fixed = _add_joint(root, "tool.mount", "fixed", parent, TOOL)
-    _place(fixed, end @ pose_matrix(robot.tool.xyz, robot.tool.rpy))
-    notes = tuple(_left_out(robot))
-    return ExportedModel(document(root, f"{robot.name}, by vsacli {__version__}"), None, notes)
+    _add_origin(fixed, end @ pose_matrix(robot.tool.xyz, robot.tool.rpy))
+    notes = tuple(_describe_losses(robot))
+    return ExportedModel(xml_document(root, f"{robot.name}, by vsacli {__version__}"), None, notes)
 
 
 def _add_link(root: Element, name: str, joint: Joint, radius: float) -> None:
     """Add a link; the inertia tensor keeps the axes of the Denavit-Hartenberg frame, and so its entries."""
-    link, whole = joint.link, element(root, "link", name=name)
-    body = element(whole, "inertial")
+    link, whole = joint.link, add_element(root, "link", name=name)
+    body = add_element(whole, "inertial")
     end = pose_matrix((joint.dh.a, 0, 0), (joint.dh.alpha, 0, 0))
     com = end[:3, :3] @ np.array(link.com) + end[:3, 3]
-    element(body, "origin", xyz=com, rpy=(joint.dh.alpha, 0, 0))
-    element(body, "mass", value=link.mass)
+    add_element(body, "origin", xyz=com, rpy=(joint.dh.alpha, 0, 0))
+    add_element(body, "mass", value=link.mass)
     inertia = link.inertia
     entries = {f"i{name}": getattr(inertia, name) for name in ("xx", "xy", "xz", "yy", "yz", "zz")}
-    element(body, "inertia", **entries)
-    _draw(whole, joint, radius)
+    add_element(body, "inertia", **entries)
+    _add_visual(whole, joint, radius)
 
 
-def _draw(link: Element, joint: Joint, radius: float) -> None:
+def _add_visual(link: Element, joint: Joint, radius: float) -> None:
     """Draw a rod from origin to origin of the Denavit-Hartenberg frames, without collision geometry."""
     a, d = joint.dh.a, joint.dh.d
-    visual = element(link, "visual")
-    element(visual, "origin", xyz=(a / 2, 0, -d / 2), rpy=(0, math.atan2(a, d), 0))
+    visual = add_element(link, "visual")
+    add_element(visual, "origin", xyz=(a / 2, 0, -d / 2), rpy=(0, math.atan2(a, d), 0))
     length = math.hypot(a, d)
     if length > radius:
-        element(element(visual, "geometry"), "cylinder", radius=radius, length=length)
+        add_element(add_element(visual, "geometry"), "cylinder", radius=radius, length=length)
     else:
-        element(element(visual, "geometry"), "sphere", radius=radius)
+        add_element(add_element(visual, "geometry"), "sphere", radius=radius)
 
 
 def _add_joint(root: Element, name: str, kind: str, parent: str, child: str) -> Element:
-    joint = element(root, "joint", name=name, type=kind)
-    element(joint, "parent", link=parent)
-    element(joint, "child", link=child)
+    joint = add_element(root, "joint", name=name, type=kind)
+    add_element(joint, "parent", link=parent)
+    add_element(joint, "child", link=child)
     return joint
 
 
-def _place(joint: Element, pose: FloatArray) -> None:
-    element(joint, "origin", xyz=pose[:3, 3], rpy=roll_pitch_yaw(pose[:3, :3]))
+def _add_origin(joint: Element, pose: FloatArray) -> None:
+    add_element(joint, "origin", xyz=pose[:3, 3], rpy=roll_pitch_yaw(pose[:3, :3]))
 
 
-def _type(joint: Joint) -> str:
+def _urdf_joint_type(joint: Joint) -> str:
     if not joint.is_revolute:
         return "prismatic"
     return "continuous" if joint.limits.position == UNBOUNDED else "revolute"
 
 
-def _add_drive(moving: Element, joint: Joint) -> None:
+def _add_joint_properties(moving: Element, joint: Joint) -> None:
     """Add axis, damping, friction and limits of a joint; two motors together have no effort limit."""
-    element(moving, "axis", xyz=(0, 0, 1))
+    add_element(moving, "axis", xyz=(0, 0, 1))
     friction = {} if joint.friction is None else {"friction": max(joint.friction.coulomb)}
-    element(moving, "dynamics", damping=joint.damping, **friction)
+    add_element(moving, "dynamics", damping=joint.damping, **friction)
     motors = joint.actuator.motors
     effort = motors[0].max_torque if len(motors) == 1 else math.inf
     speed = min(map(abs, joint.limits.velocity))
-    limit = element(moving, "limit", effort=min(effort, NO_LIMIT), velocity=min(speed, NO_LIMIT))
-    if _type(joint) != "continuous":
+    limit = add_element(moving, "limit", effort=min(effort, NO_LIMIT), velocity=min(speed, NO_LIMIT))
+    if _urdf_joint_type(joint) != "continuous":
         lower, upper = (max(-NO_LIMIT, min(NO_LIMIT, end)) for end in joint.limits.position)
-        add(limit, lower=lower, upper=upper)
+        set_attributes(limit, lower=lower, upper=upper)
 
 
-def _left_out(robot: Robot) -> Iterator[str]:
+def _describe_losses(robot: Robot) -> Iterator[str]:
     yield f"motors and springs are left out: URDF has no place for them ({', '.join(robot.joint_names)})"
     if robot.gravity != STANDARD_GRAVITY:
         gravity = ", ".join(f"{each:g}" for each in robot.gravity)

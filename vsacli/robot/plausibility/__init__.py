@@ -18,25 +18,25 @@ from vsacli.robot.plausibility.springs import SPRING_RULES
 ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
 
 
-def implausible(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Problem, ...]:
+def robot_findings(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Problem, ...]:
     """Return impossible links and the findings of the rules, with lines of the robot file.
 
     The robot file is the first of the sources.
     """
-    written = _written(sources)
-    return (*impossible_links(checked.joints, written), *findings(ROBOT_RULES, checked, written))
+    lines = _robot_file_lines(sources)
+    return (*impossible_links(checked.joints, lines), *findings(ROBOT_RULES, checked, lines))
 
 
-def strange_of_robot(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
+def robot_rules_with_findings(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
     """Return the names of the rules that have findings."""
-    return frozenset(strange(ROBOT_RULES, checked, _written(sources)))
+    return frozenset(strange(ROBOT_RULES, checked, _robot_file_lines(sources)))
 
 
-def _written(sources: Sequence[Source]) -> Written | None:
-    return Written(sources[0], _as_written) if sources else None
+def _robot_file_lines(sources: Sequence[Source]) -> Written | None:
+    return Written(sources[0], _path_in_robot_file) if sources else None
 
 
-def _as_written(root: tree.Node, path: NumberPath) -> NumberPath:
+def _path_in_robot_file(root: tree.Node, path: NumberPath) -> NumberPath:
     """Return the path in the robot file for a path of the robot; modified rows become standard ones.
 
     The standard row i has a and alpha of the modified row i+1; those of the first one are in the base.

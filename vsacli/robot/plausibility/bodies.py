@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
-from vsacli.robot.plausibility.checked_robot import CheckedRobot, density_of_sphere, joint_path, ratio
+from vsacli.robot.plausibility.checked_robot import CheckedRobot, density_of_sphere, joint_path, ratio_or_nan
 
 TURN = 2 * math.pi
 ROUNDED = 1e-3
@@ -57,7 +57,7 @@ def turns(angle: float) -> float:
     return math.nan if computed else abs(angle) / TURN
 
 
-def _numbers(
+def _measure_numbers(
     unit: str,
     *keys: str,
     without: tuple[str, ...] = (),
@@ -78,26 +78,28 @@ def _numbers(
 
 
 def _in_extents(checked: CheckedRobot, length: float) -> float:
-    return ratio(abs(length), checked.sizes.extent)
+    return ratio_or_nan(abs(length), checked.sizes.extent)
 
 
-def _range(_: CheckedRobot, angle: float) -> float:
+def _turns_of_limit(_: CheckedRobot, angle: float) -> float:
     return turns(angle) if abs(angle) < UNLIMITED_ANGLE else math.nan
 
 
-def _velocity(_: CheckedRobot, velocity: float) -> float:
+def _speed_of_limit(_: CheckedRobot, velocity: float) -> float:
     """Return |velocity|; NaN for powers of ten from 100 on, which mean no limit."""
     size = abs(velocity)
     return math.nan if size >= 100 and math.log10(size).is_integer() else size
 
 
-def _lengths(checked: CheckedRobot) -> Iterator[Measured]:
+def _measure_lengths(checked: CheckedRobot) -> Iterator[Measured]:
     largest = float(np.max(checked.sizes.gyrations))
-    in_gyrations = _numbers("m", "dh", "com", "tool", size=lambda _, length: ratio(abs(length), largest))
+    in_gyrations = _measure_numbers(
+        "m", "dh", "com", "tool", size=lambda _, length: ratio_or_nan(abs(length), largest)
+    )
     return (number._replace(beside={"gyration": f"{largest:.3g}"}) for number in in_gyrations(checked))
 
 
-def _links(size: Callable[[CheckedRobot, int], float]) -> Measure:
+def _measure_link_masses(size: Callable[[CheckedRobot, int], float]) -> Measure:
     """Return the measure of the mass of each link, with a size from its index."""
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
@@ -108,12 +110,14 @@ def _links(size: Callable[[CheckedRobot, int], float]) -> Measure:
     return measure
 
 
-def _gyration(checked: CheckedRobot, index: int) -> float:
+def _relative_gyration(checked: CheckedRobot, index: int) -> float:
     """Return the radius of gyration over the reach from the base frame; single wheels have little reach."""
-    return ratio(float(checked.sizes.gyrations[index]), checked.sizes.reach + math.hypot(*checked.base.xyz))
+    return ratio_or_nan(
+        float(checked.sizes.gyrations[index]), checked.sizes.reach + math.hypot(*checked.base.xyz)
+    )
 
 
-def _gravity(size: Callable[[float], float]) -> Measure:
+def _measure_gravity(size: Callable[[float], float]) -> Measure:
     """Return the measure of the magnitude of gravity, with a size from it."""
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
@@ -123,61 +127,62 @@ def _gravity(size: Callable[[float], float]) -> Measure:
     return measure
 
 
-def _upward(checked: CheckedRobot) -> Iterator[Measured]:
+def _measure_upward_gravity(checked: CheckedRobot) -> Iterator[Measured]:
     upward = checked.gravity[2]
     if not any(checked.base.rpy):
-        yield Measured(("gravity",), upward, "m/s^2", ratio(upward, math.hypot(*checked.gravity)))
+        yield Measured(("gravity",), upward, "m/s^2", ratio_or_nan(upward, math.hypot(*checked.gravity)))
 
 
 BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("fixed angles", "`alpha`, `theta`, `rpy`",
-        _numbers("rad", without=("limits", "actuator"), size=lambda _, angle: turns(angle)),
+        _measure_numbers("rad", without=("limits", "actuator"), size=lambda _, angle: turns(angle)),
         size="turns", high=1 + ROUNDED, usual=0.25,
         reason="mounting angles are less than a turn",
         finding="is {size} turns", units=(DEGREES,), in_angles=True),
     Rule("ranges of revolute joints", "`limits.position`",
-        _numbers("rad", "limits", size=_range),
+        _measure_numbers("rad", "limits", size=_turns_of_limit),
         size="turns", high=2 + ROUNDED, usual=0.25,
         reason="few joints turn further; from 10,000 rad on, no limit is meant",
         finding="is {size} turns", units=(DEGREES,), in_angles=True),
-    Rule("ranges of prismatic joints", "`limits.position`", _numbers("m", "limits", size=_in_extents),
+    Rule("ranges of prismatic joints", "`limits.position`", _measure_numbers("m", "limits", size=_in_extents),
         size="over the reach", high=40, usual=0.1,
         reason="tracks of arms are shorter",
         finding="is {size} times the reach of the robot", units=(MILLIMETERS, CENTIMETERS)),
-    Rule("velocities of revolute joints", "`limits.velocity`", _numbers("rad/s", "limits", size=_velocity),
+    Rule("velocities of revolute joints", "`limits.velocity`",
+        _measure_numbers("rad/s", "limits", size=_speed_of_limit),
         size="rad/s", high=FASTEST, usual=3,
         reason="limbs are slower; powers of ten from 100 on mean no limit",
         finding="is about ten turns a second or more",
         units=(DEGREES_PER_SECOND, RPM), in_angles=True),
-    Rule("velocities of prismatic joints", "`limits.velocity`", _numbers("m/s", "limits"),
+    Rule("velocities of prismatic joints", "`limits.velocity`", _measure_numbers("m/s", "limits"),
         size="m/s", high=20, usual=0.5, reason="linear motors are slower",
         finding="is faster than linear motors are", units=(OtherUnit("mm/s", 1e-3),)),
-    Rule("lengths", "`dh.a`, `dh.d`, `com`, `tool.xyz`", _lengths,
+    Rule("lengths", "`dh.a`, `dh.d`, `com`, `tool.xyz`", _measure_lengths,
         size="over the largest radius of gyration", high=30, usual=0.8,
         reason="real robots: up to 8",
         finding="is {size} times the largest radius of gyration of a link, {gyration} m",
         units=(MILLIMETERS, CENTIMETERS)),
     Rule("densities of links", "`mass`, `inertia`",
-        _links(lambda checked, index: density_of_sphere(checked.joints[index].link)),
+        _measure_link_masses(lambda checked, index: density_of_sphere(checked.joints[index].link)),
         size="kg/m^3, of a solid sphere with this mass and sum of moments",
         low=2e-3, high=25000, usual=400,
         reason="real robots: 0.006 to 11,000; osmium: 22,600",
         finding="makes a link as dense as a solid sphere of {size} kg/m^3", units=SLIPS_OF_DENSITY),
-    Rule("sizes of links", "`mass`, `inertia`", _links(_gyration),
+    Rule("sizes of links", "`mass`, `inertia`", _measure_link_masses(_relative_gyration),
         size="radius of gyration over the reach from the base frame", high=3,
         reason="real robots: up to 1.9",
         finding="makes a link whose radius of gyration is {size} times the reach of the robot",
         advice="check the units of mass, inertia and lengths",
         explained_by=("lengths", "densities of links")),
-    Rule("size of gravity", "`gravity`", _gravity(lambda size: size or math.nan),
+    Rule("size of gravity", "`gravity`", _measure_gravity(lambda size: size or math.nan),
         size="m/s^2, if there is any", low=0.02, high=30, usual=9.81,
         reason="Jupiter: 25; Ceres: 0.28",
         finding="is that of no planet or moon", units=SLIPS_OF_GRAVITY),
-    Rule("gravity as a direction", "`gravity`", _gravity(lambda size: abs(size - 1)),
+    Rule("gravity as a direction", "`gravity`", _measure_gravity(lambda size: abs(size - 1)),
         size="distance of its magnitude from 1 m/s^2", low=1e-3,
         reason="a unit vector is only a direction",
         finding="has the length 1", advice="write the acceleration, 9.81 times the direction on earth"),
-    Rule("direction of gravity", "`gravity`", _upward,
+    Rule("direction of gravity", "`gravity`", _measure_upward_gravity,
         size="share along +z, if `base` is not turned", low=-math.inf, high=0.9,
         reason="gravity points down; a robot on the ceiling has a `base` with `rpy: [pi, 0, 0]`",
         finding="points upwards, along +z of the base frame",

@@ -23,19 +23,19 @@ SPHERE = 0.4
 """Moment of inertia of a solid sphere, over mass times radius squared."""
 
 
-class Corridor(NamedTuple):
+class UnloadedStiffnessRange(NamedTuple):
     """Attainable stiffness of a joint without load, N m/rad (N/m)."""
 
     lower: float
     upper: float
 
 
-def corridor(joint: Joint) -> Corridor | None:
+def unloaded_stiffness_range(joint: Joint) -> UnloadedStiffnessRange | None:
     """Return the attainable range of a joint without load; None if its stiffness is not commanded."""
     if "stiffness" not in joint.actuator.commanded:
         return None
     solution = joint.actuator.solve(np.zeros(1), np.ones(1), np.zeros(1))
-    return Corridor(float(solution.lower[0]), float(solution.upper[0]))
+    return UnloadedStiffnessRange(float(solution.lower[0]), float(solution.upper[0]))
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,12 @@ class CheckedRobot:
         return BodySizes(self.joints)
 
     @cached_property
-    def corridors(self) -> tuple[Corridor | None, ...]:
+    def unloaded_ranges(self) -> tuple[UnloadedStiffnessRange | None, ...]:
         """Attainable stiffness of each joint at rest; None if it has no commanded stiffness."""
-        return tuple(map(corridor, self.joints))
+        return tuple(map(unloaded_stiffness_range, self.joints))
 
     @property
-    def driven(self) -> Iterator[tuple[int, Joint]]:
+    def joints_with_drives(self) -> Iterator[tuple[int, Joint]]:
         """Joints with their indices; none if springs and motors are placeholders."""
         return enumerate(() if self.placeholder else self.joints)
 
@@ -89,12 +89,12 @@ def joint_path(number: int, joint: Joint, *steps: str | Entry) -> NumberPath:
     return ("joints", Entry(number, joint.name), *steps)
 
 
-def motors(joint: Joint) -> Iterator[tuple[NumberPath, Motor]]:
+def motors_in_file(joint: Joint) -> Iterator[tuple[NumberPath, Motor]]:
     """Return the motors of a joint as written in the file, each with its path from the joint."""
-    return written_once(("actuator", "motor"), getattr(joint.actuator, "motor", ()))
+    return records_in_file(("actuator", "motor"), getattr(joint.actuator, "motor", ()))
 
 
-def written_once(path: NumberPath, content: Any) -> Iterator[tuple[NumberPath, Any]]:
+def records_in_file(path: NumberPath, content: Any) -> Iterator[tuple[NumberPath, Any]]:
     """Yield a record, or each record of a pair, with its path; a record for both sides is yielded once."""
     sides = content if isinstance(content, tuple) else (content,)
     if len({id(side) for side in sides}) == 1:
@@ -112,8 +112,8 @@ class BodySizes:
         levers: distance from each joint to the farthest point of the stretched robot, m.
         mass: mass of all links, kg.
         inertias: inertia of each link alone about its joint, kg m^2; for a prismatic joint the mass, kg.
-        moved: inertia of all links that a joint of the stretched robot moves, kg m^2; for a prismatic joint
-            their mass, kg.
+        moved_inertias: inertia of all links that a joint of the stretched robot moves, kg m^2; for a
+            prismatic joint their mass, kg.
         loads: largest torque of the weight at each joint of the stretched robot, N m (N).
     """
 
@@ -123,15 +123,17 @@ class BodySizes:
         before = np.cumsum(lengths) - lengths
         coms = np.array([_com_distance(joint) for joint in joints])
         extents = before + coms
-        self.gyrations = np.array([_gyration(joint.link) for joint in joints])
+        self.gyrations = np.array([_radius_of_gyration(joint.link) for joint in joints])
         self.reach = float(max(np.max(extents), np.sum(lengths)))
         self.levers = self.reach - before
-        mass, moment = _from_tip(masses), _from_tip(masses * extents)
+        mass, moment = _sums_from_tip(masses), _sums_from_tip(masses * extents)
         self.mass = float(mass[0])
         revolute = np.array([joint.is_revolute for joint in joints])
         self.inertias = masses * np.where(revolute, coms**2 + self.gyrations**2, 1.0)
-        turned = _from_tip(masses * (extents**2 + self.gyrations**2)) - 2 * before * moment + before**2 * mass
-        self.moved = np.where(revolute, turned, mass)
+        turned = (
+            _sums_from_tip(masses * (extents**2 + self.gyrations**2)) - 2 * before * moment + before**2 * mass
+        )
+        self.moved_inertias = np.where(revolute, turned, mass)
         self.loads = WEIGHT_PER_MASS * np.where(revolute, moment - before * mass, mass)
 
     @property
@@ -149,7 +151,7 @@ class BodySizes:
         return self.weight * (self.extent if joint.is_revolute else 1.0)
 
 
-def _from_tip(values: FloatArray) -> FloatArray:
+def _sums_from_tip(values: FloatArray) -> FloatArray:
     """Return the sums from each entry to the last."""
     sums: FloatArray = np.cumsum(values[::-1])[::-1]
     return sums
@@ -167,7 +169,7 @@ def _sum_of_moments(link: Link) -> float:
     return link.inertia.xx + link.inertia.yy + link.inertia.zz
 
 
-def _gyration(link: Link) -> float:
+def _radius_of_gyration(link: Link) -> float:
     return math.sqrt(max(_sum_of_moments(link), 0.0) / 2 / link.mass) if link.mass else 0.0
 
 
@@ -184,6 +186,6 @@ def density_of_sphere(link: Link) -> float:
     return link.mass / (4 / 3 * math.pi * radius * radius * radius)
 
 
-def ratio(value: float, reference: float) -> float:
+def ratio_or_nan(value: float, reference: float) -> float:
     """Return a value over a reference; NaN unless the reference is positive."""
     return value / reference if reference > 0 else math.nan

@@ -13,7 +13,7 @@ from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, RPM, SIZES, Measure
-from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors, ratio
+from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors_in_file, ratio_or_nan
 
 TINY = 0.1
 """Length, m; in shorter robots, such as fingers, rotors behind gears far outweigh the links."""
@@ -25,30 +25,30 @@ GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
 """Names of rules, of gear ratios and sizes, whose findings explain those of motors behind a gear."""
 
 
-class _Driven(NamedTuple):
+class _CheckedMotor(NamedTuple):
     """A motor with its joint; `torque` and `velocity` are NaN without a bound, `load` without gravity."""
 
     checked: CheckedRobot
     number: int
     joint: Joint
-    at: NumberPath
+    path_in_joint: NumberPath
     motor: Motor
 
     @property
-    def behind(self) -> JointMotor:
+    def at_joint_side(self) -> JointMotor:
         """Motor on the joint side of the gear."""
         return self.motor.at_joint
 
     @property
-    def carries(self) -> bool:
+    def carries_load(self) -> bool:
         """Whether the motor carries the load; one that only sets the springs may be small and fast."""
-        last = self.at[-1]
+        last = self.path_in_joint[-1]
         return bool(self.joint.actuator.has(VARIABLES["phi"])[last.number if isinstance(last, Entry) else 0])
 
     @property
     def torque(self) -> float:
         """Largest torque on the joint side of the gear, N m (N)."""
-        return _bounded(self.behind.max_torque)
+        return _nan_if_infinite(self.at_joint_side.max_torque)
 
     @property
     def link_inertia(self) -> float:
@@ -68,7 +68,7 @@ class _Driven(NamedTuple):
     @property
     def velocity(self) -> float:
         """Largest velocity on the joint side of the gear, rad/s (m/s)."""
-        return _bounded(self.behind.max_velocity)
+        return _nan_if_infinite(self.at_joint_side.max_velocity)
 
     @property
     def rotates(self) -> bool:
@@ -82,25 +82,25 @@ class _Driven(NamedTuple):
 
     def path(self, name: str) -> NumberPath:
         """Return the path of a field."""
-        return joint_path(self.number, self.joint, *self.at, name)
+        return joint_path(self.number, self.joint, *self.path_in_joint, name)
 
-    def measured(self, name: str, size: float) -> Measured:
+    def measure(self, name: str, size: float) -> Measured:
         """Return the measured value of a field, with a size."""
         return Measured(self.path(name), getattr(self.motor, name), self.unit(name), size)
 
 
-def _bounded(value: float) -> float:
+def _nan_if_infinite(value: float) -> float:
     return value if math.isfinite(value) else math.nan
 
 
-def _all_motors(checked: CheckedRobot) -> Iterator[_Driven]:
-    for number, joint in checked.driven:
-        for at, motor in motors(joint):
-            yield _Driven(checked, number, joint, at, motor)
+def _checked_motors(checked: CheckedRobot) -> Iterator[_CheckedMotor]:
+    for number, joint in checked.joints_with_drives:
+        for path, motor in motors_in_file(joint):
+            yield _CheckedMotor(checked, number, joint, path, motor)
 
 
-def _motors(
-    name: str, size: Callable[[_Driven], float] | None = None, *, unit: str = "", carrying: bool = False
+def _measure_motors(
+    name: str, size: Callable[[_CheckedMotor], float] | None = None, *, unit: str = "", carrying: bool = False
 ) -> Measure:
     """Return the measure of a field of the motors.
 
@@ -112,50 +112,52 @@ def _motors(
     """
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
-        for driven in _all_motors(checked):
-            if unit in ("", driven.unit(name)) and (driven.carries or not carrying):
-                value = getattr(driven.motor, name) or math.nan
-                yield driven.measured(name, _bounded(abs(value)) if size is None else size(driven))
+        for drive in _checked_motors(checked):
+            if unit in ("", drive.unit(name)) and (drive.carries_load or not carrying):
+                value = getattr(drive.motor, name) or math.nan
+                yield drive.measure(name, _nan_if_infinite(abs(value)) if size is None else size(drive))
 
     return measure
 
 
-def _heavy_rotor(driven: _Driven) -> float:
-    sizes = driven.checked.sizes
-    lever = sizes.extent if driven.joint.is_revolute else 1.0
-    return ratio(driven.behind.inertia, sizes.mass * lever**2) if sizes.extent > TINY else math.nan
+def _rotor_inertia_share(drive: _CheckedMotor) -> float:
+    sizes = drive.checked.sizes
+    lever = sizes.extent if drive.joint.is_revolute else 1.0
+    return (
+        ratio_or_nan(drive.at_joint_side.inertia, sizes.mass * lever**2) if sizes.extent > TINY else math.nan
+    )
 
 
-def _shaft_velocity(driven: _Driven) -> float:
+def _shaft_velocity(drive: _CheckedMotor) -> float:
     """Return the largest velocity of the motor's shaft, as written if the gear ratio is unknown."""
-    return driven.velocity * abs(driven.motor.gear_ratio or 1.0) if driven.rotates else math.nan
+    return drive.velocity * abs(drive.motor.gear_ratio or 1.0) if drive.rotates else math.nan
 
 
-def _joint_velocity(driven: _Driven) -> float:
+def _joint_velocity(drive: _CheckedMotor) -> float:
     """Return the largest velocity that the motor allows the joint, over the limit of the joint."""
-    limit = max(map(abs, driven.joint.limits.velocity))
-    return ratio(driven.velocity, limit) if driven.rotates else math.nan
+    limit = max(map(abs, drive.joint.limits.velocity))
+    return ratio_or_nan(drive.velocity, limit) if drive.rotates else math.nan
 
 
-def _dry_friction(checked: CheckedRobot) -> Iterator[Measured]:
+def _measure_dry_friction(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield Coulomb friction of motors as written: one number if it is equal in both directions."""
-    for driven in _all_motors(checked):
-        if driven.motor.friction is not None:
-            backward, forward = driven.motor.friction.coulomb
+    for drive in _checked_motors(checked):
+        if drive.motor.friction is not None:
+            backward, forward = drive.motor.friction.coulomb
             directions = {Entry(0): backward, Entry(1): forward} if backward != forward else {None: forward}
             for direction, torque in directions.items():
-                path = (*driven.path("friction"), "coulomb", *(() if direction is None else (direction,)))
-                size = torque / _bounded(driven.motor.max_torque)
-                yield Measured(path, torque, driven.unit("max_torque"), size)
+                path = (*drive.path("friction"), "coulomb", *(() if direction is None else (direction,)))
+                size = torque / _nan_if_infinite(drive.motor.max_torque)
+                yield Measured(path, torque, drive.unit("max_torque"), size)
 
 
 GEAR_RULES: tuple[Rule[CheckedRobot], ...] = (
-    Rule("gear ratios", "`gear_ratio`", _motors("gear_ratio", unit="1"),
+    Rule("gear ratios", "`gear_ratio`", _measure_motors("gear_ratio", unit="1"),
         size="motor turns per joint turn", low=1, high=5000, usual=100,
         reason="several stages reach some thousands",
         finding="is {size} turns of the motor to one of the joint",
         advice="it is the motor's turns over those of the joint, e.g. 100"),
-    Rule("gear ratios of prismatic joints", "`gear_ratio`", _motors("gear_ratio", unit="rad/m"),
+    Rule("gear ratios of prismatic joints", "`gear_ratio`", _measure_motors("gear_ratio", unit="rad/m"),
         size="rad/m", low=5, high=1e5, usual=600,
         reason="5: a wheel of 0.4 m; 100,000: a screw of 0.06 mm pitch",
         finding="turns the motor by {size} rad for each meter", units=(OtherUnit("rad/mm", 1e3),),
@@ -164,13 +166,15 @@ GEAR_RULES: tuple[Rule[CheckedRobot], ...] = (
 
 MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("light rotors", "`motor.inertia`",
-        _motors("inertia", lambda m: ratio(m.behind.inertia, m.link_inertia), carrying=True),
+        _measure_motors(
+            "inertia", lambda m: ratio_or_nan(m.at_joint_side.inertia, m.link_inertia), carrying=True
+        ),
         size="joint-side, over the link's inertia about its joint", low=0.005,
         reason="gears multiply by the ratio squared; direct drives have large rotors",
         finding="is, on the joint's side of the gear, {size} of the inertia of the link about its joint",
         advice="is it the rotor's own? Then give `gear_ratio` and `side: shaft`, or multiply by its square",
         explained_by=GEARS),
-    Rule("heavy rotors", "`motor.inertia`", _motors("inertia", _heavy_rotor, carrying=True),
+    Rule("heavy rotors", "`motor.inertia`", _measure_motors("inertia", _rotor_inertia_share, carrying=True),
         size="joint-side, over mass times reach squared (mass)",
         high=100, usual=0.1,
         reason="it would not feel the robot; robots below 0.1 m pass",
@@ -178,18 +182,18 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         units=(OtherUnit("kg cm^2", 1e-4), OtherUnit("g cm^2", 1e-7), OtherUnit("kg mm^2", 1e-6)),
         advice=WHICH_SIDE, explained_by=GEARS),
     Rule("velocities of motors", "`max_velocity`",
-        _motors("max_velocity", _shaft_velocity, carrying=True),
+        _measure_motors("max_velocity", _shaft_velocity, carrying=True),
         size="rad/s, of the motor's shaft", high=2500, usual=400, reason="robots have no faster motors",
         finding="is more than 24,000 turns a minute of the motor", units=ROTARY, in_angles=True),
     Rule("velocities of motors and joints", "`max_velocity`, `limits.velocity`",
-        _motors("max_velocity", _joint_velocity, carrying=True),
+        _measure_motors("max_velocity", _joint_velocity, carrying=True),
         size="joint-side, over the joint's limit", high=8,
         reason="a joint's limit is about what its motor can do",
         finding="lets the joint go {size} times as fast as its `limits.velocity`",
         units=ROTARY, advice="check the units of both", in_angles=True,
         explained_by=(*GEARS, "velocities of motors")),
     Rule("weak motors", "`max_torque`",
-        _motors("max_torque", lambda m: ratio(m.torque, m.load), carrying=True),
+        _measure_motors("max_torque", lambda m: ratio_or_nan(m.torque, m.load), carrying=True),
         size="joint-side, over the load of the stretched arm's weight",
         low=0.05, usual=2,
         reason="it could accelerate the arm by only 0.05 g",
@@ -197,7 +201,7 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         advice="is it the motor's own? Then give `gear_ratio` and `side: shaft`, or multiply by it",
         explained_by=GEARS),
     Rule("strong motors", "`max_torque`",
-        _motors("max_torque", lambda m: ratio(m.torque, m.scale), carrying=True),
+        _measure_motors("max_torque", lambda m: ratio_or_nan(m.torque, m.scale), carrying=True),
         size="joint-side, over weight times reach",
         high=300, usual=0.5, reason="it would lift 300 such robots",
         finding="is, on the joint's side of the gear, {size} times the weight of the robot at its reach",
@@ -205,14 +209,14 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
 )  # fmt: skip
 
 RESISTANCE_RULES: tuple[Rule[CheckedRobot], ...] = (
-    Rule("dry friction compared with torque", "`motor.friction.coulomb`", _dry_friction,
+    Rule("dry friction compared with torque", "`motor.friction.coulomb`", _measure_dry_friction,
         size="over the motor's largest torque", high=1, usual=0.1,
         reason="the motor could not move",
         finding="is {size} times the largest torque of the motor", units=OTHER_TORQUES, explained_by=GEARS),
 )  # fmt: skip
 
 WINDING_RULES: tuple[Rule[CheckedRobot], ...] = (
-    Rule("torque constants", "`torque_constant`", _motors("torque_constant"),
+    Rule("torque constants", "`torque_constant`", _measure_motors("torque_constant"),
         size="N m/A", low=1e-4, high=30, usual=0.1,
         reason="from the smallest motors, 0.0003, to large direct drives, a few",
         finding="is that of no motor", units=(OtherUnit("mN m/A", 1e-3), OtherUnit("N cm/A", 1e-2)),

@@ -16,7 +16,7 @@ from vsacli.robot.plausibility.checked_robot import joint_path
 UNIT = "kg m^2"
 
 
-def impossible_links(joints: Sequence[Joint], written: Written | None) -> Iterator[Problem]:
+def impossible_links(joints: Sequence[Joint], file_lines: Written | None) -> Iterator[Problem]:
     """Yield warnings about links without mass or inertia, and about broken triangle inequalities.
 
     A robot without any mass has no warnings about zeros, since one for the whole robot says so.
@@ -27,18 +27,18 @@ def impossible_links(joints: Sequence[Joint], written: Written | None) -> Iterat
         no_inertia = link.inertia.principal_moments[-1] == 0
         if not massless and link.mass == 0 and no_inertia:
             advice = "give those of the link, the inertia about its center of mass"
-            yield _problem(path, f": mass and inertia are zero; {advice}", written)
+            yield _problem_at_path(path, f": mass and inertia are zero; {advice}", file_lines)
         elif not massless and link.mass == 0:
-            yield _problem((*path, "mass"), " is zero; give the mass of the link, in kg", written)
+            yield _problem_at_path((*path, "mass"), " is zero; give the mass of the link, in kg", file_lines)
         elif not massless and no_inertia:
             advice = f"give the inertia of the link about its center of mass, in {UNIT}"
-            yield _problem((*path, "inertia"), f" is zero; {advice}", written)
-        if excess := _excess((*path, "inertia"), link.inertia, written):
+            yield _problem_at_path((*path, "inertia"), f" is zero; {advice}", file_lines)
+        if excess := _describe_triangle_violation((*path, "inertia"), link.inertia, file_lines):
             advice = "which no rigid body allows; check the entries"
-            yield _problem((*path, "inertia"), f": {excess}, {advice}", written)
+            yield _problem_at_path((*path, "inertia"), f": {excess}, {advice}", file_lines)
 
 
-def _excess(path: NumberPath, inertia: Inertia, written: Written | None) -> str:
+def _describe_triangle_violation(path: NumberPath, inertia: Inertia, file_lines: Written | None) -> str:
     """Return by how much the largest moment exceeds the sum of the others; empty if it does not.
 
     Moments are named by their axes if these are principal axes, unless the file has other axes.
@@ -48,22 +48,22 @@ def _excess(path: NumberPath, inertia: Inertia, written: Written | None) -> str:
         return ""
     names = ["xx", "yy", "zz"]
     largest = names.pop(int(np.argmax(np.diag(inertia.tensor))))
-    in_file = written is None or _is_written((*path, largest), high, written)
+    in_file = file_lines is None or _is_written((*path, largest), high, file_lines)
     if in_file and np.count_nonzero(inertia.tensor - np.diag(np.diag(inertia.tensor))) == 0:
-        moment, others = f"{largest} =", f"{' + '.join(names)} ="
+        moment, sum_of_others = f"{largest} =", f"{' + '.join(names)} ="
     else:
-        moment, others = "the largest principal moment", "the sum of the others"
+        moment, sum_of_others = "the largest principal moment", "the sum of the others"
     by = f"by {high - low - middle:.4g} {UNIT}"
-    return f"{moment} {high:.4g} {UNIT} exceeds {others} {low + middle:.4g} {UNIT} {by}"
+    return f"{moment} {high:.4g} {UNIT} exceeds {sum_of_others} {low + middle:.4g} {UNIT} {by}"
 
 
-def _is_written(path: NumberPath, value: float, written: Written) -> bool:
-    return written.said(Measured(path, value, UNIT, math.nan)) is not None
+def _is_written(path: NumberPath, value: float, file_lines: Written) -> bool:
+    return file_lines.said(Measured(path, value, UNIT, math.nan)) is not None
 
 
-def _problem(path: NumberPath, message: str, written: Written | None) -> Problem:
+def _problem_at_path(path: NumberPath, message: str, file_lines: Written | None) -> Problem:
     """Return a problem with the line of a path, unless the file has another mass there: it was changed."""
     message = ".".join(map(str, path)) + message
-    if written is None or (path[-1] == "mass" and not _is_written(path, 0.0, written)):
+    if file_lines is None or (path[-1] == "mass" and not _is_written(path, 0.0, file_lines)):
         return Problem("", 0, message)
-    return Problem(written.path, written.line(path), message)
+    return Problem(file_lines.path, file_lines.line(path), message)

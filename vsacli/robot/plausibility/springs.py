@@ -15,7 +15,13 @@ from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import Entry, NumberPath
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, TURN
-from vsacli.robot.plausibility.checked_robot import CheckedRobot, Corridor, joint_path, ratio, written_once
+from vsacli.robot.plausibility.checked_robot import (
+    CheckedRobot,
+    UnloadedStiffnessRange,
+    joint_path,
+    ratio_or_nan,
+    records_in_file,
+)
 
 HALF_TURN = math.pi
 TOO_SOFT = (
@@ -34,114 +40,120 @@ SLIPS_OF_DAMPING = (
 )
 
 
-def _unit(joint: Joint) -> str:
+def _stiffness_unit(joint: Joint) -> str:
     return units.STIFFNESS.unit(joint.type)
 
 
-def _travel(checked: CheckedRobot, joint: Joint) -> float:
+def _reference_travel(checked: CheckedRobot, joint: Joint) -> float:
     """Return 1 rad, or for a prismatic joint the reach of the robot, m."""
     return 1.0 if joint.is_revolute else checked.sizes.extent
 
 
-def _corridors(checked: CheckedRobot) -> Iterator[tuple[int, Joint, Corridor]]:
+def _joints_with_commanded_stiffness(
+    checked: CheckedRobot,
+) -> Iterator[tuple[int, Joint, UnloadedStiffnessRange]]:
     """Yield the joints with commanded stiffness, with index and attainable range."""
-    for index, joint in checked.driven:
-        found = checked.corridors[index]
-        if found is not None:
-            yield index, joint, found
+    for index, joint in checked.joints_with_drives:
+        attainable = checked.unloaded_ranges[index]
+        if attainable is not None:
+            yield index, joint, attainable
 
 
-def _soft_ends(checked: CheckedRobot) -> Iterator[Measured]:
+def _measure_minimum_stiffness(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the minimum stiffness at rest, where stiffness is commanded, over the weight at full reach."""
-    for index, joint, found in _corridors(checked):
-        size = ratio(found.lower * _travel(checked, joint), checked.sizes.scale(joint))
-        beside = {"stiffness": f"{found.lower:.4g} {_unit(joint)}"}
-        yield Measured(joint_path(index, joint, "actuator", "spring"), math.nan, _unit(joint), size, beside)
+    for index, joint, attainable in _joints_with_commanded_stiffness(checked):
+        size = ratio_or_nan(attainable.lower * _reference_travel(checked, joint), checked.sizes.scale(joint))
+        beside = {"stiffness": f"{attainable.lower:.4g} {_stiffness_unit(joint)}"}
+        yield Measured(
+            joint_path(index, joint, "actuator", "spring"), math.nan, _stiffness_unit(joint), size, beside
+        )
 
 
-def _stiff_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
+def _measure_stiff_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the stiffness at rest of single springs, over the weight at full reach, per rad."""
-    for joint, measured, held in _single_springs(checked):
+    for joint, measured, solved in _loaded_single_springs(checked):
         if joint.is_revolute:
-            yield measured._replace(size=ratio(float(held.stiffness[0]), checked.sizes.scale(joint)))
+            yield measured._replace(size=ratio_or_nan(float(solved.stiffness[0]), checked.sizes.scale(joint)))
 
 
-def _soft_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
+def _measure_soft_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield 1 rad, or the reach, over the deflection under the largest weight, if there is gravity."""
-    for joint, measured, held in _single_springs(checked) if any(checked.gravity) else ():
-        yield measured._replace(size=ratio(_travel(checked, joint), float(held.phi[0, 1])))
+    for joint, measured, solved in _loaded_single_springs(checked) if any(checked.gravity) else ():
+        yield measured._replace(size=ratio_or_nan(_reference_travel(checked, joint), float(solved.phi[0, 1])))
 
 
-def _single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, JointVariables]]:
+def _loaded_single_springs(checked: CheckedRobot) -> Iterator[tuple[Joint, Measured, JointVariables]]:
     """Yield joints without commanded stiffness, with the spring solved at rest and under the largest weight.
 
     The measured number is the stiffness or the law; callers replace its size.
     """
-    for number, joint in checked.driven:
+    for number, joint in checked.joints_with_drives:
         if joint.actuator.sprung and "stiffness" not in joint.actuator.commanded:
             command = Command.at_rest(np.array([0.0, checked.sizes.loads[number]]), np.zeros(2))
-            held = joint.actuator.transmit(command, MIN_MARGIN, None)
+            solved = joint.actuator.transmit(command, MIN_MARGIN, None)
             constant = getattr(joint.actuator, "stiffness", None)
             path = joint_path(number, joint, "actuator", "spring" if constant is None else "stiffness")
             value = math.nan if constant is None else constant
-            yield joint, Measured(path, value, _unit(joint), math.nan), held
+            yield joint, Measured(path, value, _stiffness_unit(joint), math.nan), solved
 
 
-def _springs(checked: CheckedRobot) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
+def _springs_in_file(checked: CheckedRobot) -> Iterator[tuple[Joint, NumberPath, SpringLaw]]:
     """Yield the springs as written in the file, with joint and path."""
-    for number, joint in checked.driven:
+    for number, joint in checked.joints_with_drives:
         path = joint_path(number, joint, "actuator", "spring")
-        for at, law in written_once(path, getattr(joint.actuator, "spring", None) or ()):
-            yield joint, at, law
+        for path_in_file, law in records_in_file(path, getattr(joint.actuator, "spring", None) or ()):
+            yield joint, path_in_file, law
 
 
-def _hardening(checked: CheckedRobot) -> Iterator[Measured]:
+def _measure_hardening(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the stiffness at half a turn (at the reach) or at the law's end, over that at rest.
 
     Only springs of joints with commanded stiffness, which depends on hardening.
     """
-    for joint, path, law in _springs(checked):
+    for joint, path, law in _springs_in_file(checked):
         if not law.is_linear and "stiffness" in joint.actuator.commanded:
             unit, full = ("rad", HALF_TURN) if joint.is_revolute else ("m", checked.sizes.extent)
             deflection = min(law.domain[1], full)
-            rest, there = law.stiffness(np.array([0.0, deflection])).tolist()
-            size = there / rest if rest else math.nan
+            at_rest, deflected = law.stiffness(np.array([0.0, deflection])).tolist()
+            size = deflected / at_rest if at_rest else math.nan
             yield Measured(path, math.nan, "", size, {"deflection": f"{deflection:.3g} {unit}"})
 
 
-def _deflections(checked: CheckedRobot) -> Iterator[Measured]:
-    for joint, path, law in _springs(checked):
+def _measure_deflection_limits(checked: CheckedRobot) -> Iterator[Measured]:
+    for joint, path, law in _springs_in_file(checked):
         ends = {"max_deflection": law.max_deflection, "file": law.domain[1]}
         for name, end in ends.items():
             if math.isfinite(end) and (name == "max_deflection" or law.sources):
                 unit, full = ("rad", TURN) if joint.is_revolute else ("m", 2 * checked.sizes.extent)
-                yield Measured((*path, name), end, unit, ratio(end, full))
+                yield Measured((*path, name), end, unit, ratio_or_nan(end, full))
 
 
-def _stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
+def _measure_stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield limits over the minimum at rest; a lower limit below the attainable range does no harm."""
-    for index, joint, found in _corridors(checked):
-        beside = {"lower": f"{found.lower:.4g}", "unit": _unit(joint)}
+    for index, joint, attainable in _joints_with_commanded_stiffness(checked):
+        beside = {"lower": f"{attainable.lower:.4g}", "unit": _stiffness_unit(joint)}
         for side, limit in enumerate(joint.limits.stiffness):
-            size = ratio(limit, found.lower)
-            if math.isfinite(limit) and (side or limit > found.upper or size > 1):
+            size = ratio_or_nan(limit, attainable.lower)
+            if math.isfinite(limit) and (side or limit > attainable.upper or size > 1):
                 path = joint_path(index, joint, "limits", "stiffness", Entry(side))
-                yield Measured(path, limit, _unit(joint), size, beside)
+                yield Measured(path, limit, _stiffness_unit(joint), size, beside)
 
 
-def _least_stiffness(joint: Joint, found: Corridor | None) -> float:
+def _least_stiffness(joint: Joint, attainable: UnloadedStiffnessRange | None) -> float:
     """Return the minimum stiffness of a joint without load, N m/rad (N/m), given its attainable range."""
-    if found is not None:
-        return found.lower if found.lower > 0 else found.upper
-    held = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), MIN_MARGIN, None)
-    return float(held.stiffness[0])
+    if attainable is not None:
+        return attainable.lower if attainable.lower > 0 else attainable.upper
+    solved = joint.actuator.transmit(Command.at_rest(np.zeros(1), np.zeros(1)), MIN_MARGIN, None)
+    return float(solved.stiffness[0])
 
 
-def _largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
+def _measure_largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the upper end of each damper's range, over twice the root of inertia times stiffness."""
-    for number, joint in checked.driven:
+    for number, joint in checked.joints_with_drives:
         if joint.damper is not None and joint.actuator.sprung:
-            product = float(checked.sizes.moved[number]) * _least_stiffness(joint, checked.corridors[number])
+            product = float(checked.sizes.moved_inertias[number]) * _least_stiffness(
+                joint, checked.unloaded_ranges[number]
+            )
             damping = joint.damper.range[1]
             size = damping / (2 * math.sqrt(product)) if product > 0 else math.nan
             path = joint_path(number, joint, "damper", "range", Entry(1))
@@ -149,39 +161,39 @@ def _largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
-    Rule("stiff springs", "`spring`", _soft_ends,
+    Rule("stiff springs", "`spring`", _measure_minimum_stiffness,
         size="stiffness at rest times 1 rad (reach), over weight times reach",
         high=1000, usual=4,
         reason="bundled robots have 0.03 to 100",
         finding="makes {stiffness} at rest, {size} times the robot's weight at its reach per rad (per reach)",
         units=TOO_STIFF, explained_by=SIZES),
-    Rule("stiff transmissions", "`stiffness`, `spring` of elastic joints", _stiff_transmissions,
+    Rule("stiff transmissions", "`stiffness`, `spring` of elastic joints", _measure_stiff_transmissions,
         size="of revolute joints, stiffness at rest times 1 rad, over weight times reach",
         high=5000, usual=300,
         reason="light arms with strain wave gears stay below",
         finding="is {size} times the weight of the robot at its reach per rad",
         units=TOO_STIFF, advice="if it does not yield, take `type: rigid`", explained_by=SIZES),
-    Rule("soft transmissions", "`stiffness`, `spring` of elastic joints", _soft_transmissions,
+    Rule("soft transmissions", "`stiffness`, `spring` of elastic joints", _measure_soft_transmissions,
         size="1 rad (reach) over the deflection under the stretched arm's weight",
         low=4, usual=50, reason="the arm would hang down",
         finding="yields by more than 0.25 rad (of the reach) to what the weight of the stretched arm can ask",
         units=TOO_SOFT, explained_by=SIZES),
-    Rule("hardening of springs", "`spring`", _hardening,
+    Rule("hardening of springs", "`spring`", _measure_hardening,
         size="stiffness at half a turn (reach), over that at rest", low=1.5,
         reason="without hardening, the stiffness cannot change",
         finding="is at {deflection} but {size} times as stiff as at rest",
         advice="check the units of its constants: rad, not deg (m, not mm)"),
-    Rule("deflections", "`max_deflection`, `file` of a table", _deflections,
+    Rule("deflections", "`max_deflection`, `file` of a table", _measure_deflection_limits,
         size="turns (twice the reach)", high=0.5, usual=0.05,
         reason="joint springs do not wind up so far",
         finding="is a deflection of more than half a turn (than the reach)",
         units=(DEGREES, MILLIMETERS), in_angles=True),
-    Rule("limits of stiffness", "`limits.stiffness`", _stiffness_limits,
+    Rule("limits of stiffness", "`limits.stiffness`", _measure_stiffness_limits,
         size="over the lowest of the springs at rest", low=1, high=500, usual=2,
         reason="below 1 the limits exclude everything",
         finding="is {size} times the minimum of {lower} {unit} without load",
         units=(*TOO_SOFT, *TOO_STIFF), advice="check the units of limits and springs"),
-    Rule("ranges of dampers", "`damper.range`", _largest_dampings,
+    Rule("ranges of dampers", "`damper.range`", _measure_largest_dampings,
         size="over 2 sqrt(I sigma): inertia of the stretched arm, least stiffness",
         low=1e-3, high=100, usual=0.7,
         reason="no effect below, creeping above",

@@ -2,6 +2,6 @@
 
 from vsacli.robot.urdf.conversion import Conversion, import_urdf
 from vsacli.robot.urdf.placeholders import Placeholders
-from vsacli.robot.urdf.robot_text import robot_text
+from vsacli.robot.urdf.robot_text import converted_robot_text
 
-__all__ = ["Conversion", "Placeholders", "import_urdf", "robot_text"]
+__all__ = ["Conversion", "Placeholders", "converted_robot_text", "import_urdf"]

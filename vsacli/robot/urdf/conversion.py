@@ -26,15 +26,15 @@ from vsacli.robot.model import Robot
 from vsacli.robot.urdf.dh import (
     SNAP_ANGLE,
     Frames,
-    Residual,
+    KinematicResidual,
     Snap,
     dh_frames,
     kinematic_residual,
     tidy,
     tidy_angle,
 )
-from vsacli.robot.urdf.link_tree import POSITION_LIMITS, Body, UrdfJoint, inverse, roll_pitch_yaw
-from vsacli.robot.urdf.placeholders import JointLoad, Placeholders, joint_loads
+from vsacli.robot.urdf.link_tree import POSITION_LIMITS, RigidBody, UrdfJoint, inverse_pose, roll_pitch_yaw
+from vsacli.robot.urdf.placeholders import JointLoad, Placeholders, largest_joint_loads
 from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.serial_chain import (
     STANDARD_GRAVITY,
@@ -76,7 +76,7 @@ class Conversion:
     placeholders: Placeholders
     loads: tuple[JointLoad, ...]
     snaps: tuple[Snap, ...]
-    residual: Residual
+    residual: KinematicResidual
     file_warnings: tuple[Problem, ...] = ()
 
     @property
@@ -92,9 +92,9 @@ class Conversion:
         robot, count = self.robot, len(self.robot.joints)
         joints = f"{count} joint{'s' if count > 1 else ''}"
         yield f"{robot.name}: {joints} from {self.chain.base} to {self.chain.tip}"
-        yield from _aligned(self._rows())
+        yield from _align_dh_table(self._rows())
         yield f"total mass of the moving links: {sum(joint.link.mass for joint in robot.joints):.6g} kg"
-        yield _exactness(self.residual)
+        yield _describe_residual(self.residual)
         yield from (f"warning: {warning}" for warning in self.warnings())
         yield from self.notes()
 
@@ -102,8 +102,8 @@ class Conversion:
         yield _HEADER
         for joint, origin in zip(self.robot.joints, self.chain.joints, strict=True):
             row = (joint.dh.a, joint.dh.alpha, joint.dh.d, joint.dh.theta, joint.link.mass)
-            others = len(origin.links) - 1
-            carried = origin.links[0].name + (f" + {others}" if others else "")
+            further = len(origin.links) - 1
+            carried = origin.links[0].name + (f" + {further}" if further else "")
             yield (joint.name, *(f"{number:.6g}" for number in row), carried)
 
     def warnings(self) -> Iterator[str]:
@@ -114,8 +114,8 @@ class Conversion:
 
     def notes(self) -> Iterator[str]:
         """Yield sentences on parts left out or changed."""
-        yield from _held("below the base", self.chain.held_below)
-        yield from _held("outside the chain, their links lumped", self.chain.held_beside)
+        yield from _describe_held_joints("below the base", self.chain.held_below)
+        yield from _describe_held_joints("outside the chain, their links lumped", self.chain.held_beside)
         if followers := [
             f"{each.name} (follows {each.mimic.leader})" for each in self.chain.followers if each.mimic
         ]:
@@ -139,17 +139,17 @@ class Conversion:
     def _of_motors(self) -> Iterator[str]:
         """Yield notes on effort limits and gears, which apply to a single motor."""
         joints = [joint.urdf for joint in self.chain.joints]
-        known = {
+        motor_data = {
             "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
             "gear reductions": [f"{joint.name} {joint.gear_ratio:g}" for joint in joints if joint.gear_ratio],
         }
         taken = "taken over" if self.one_motor_each else "not taken over, since two motors share a joint"
-        for what, names in known.items():
+        for quantity, names in motor_data.items():
             if names:
-                yield f"{what} {taken}: {', '.join(names)}"
+                yield f"{quantity} {taken}: {', '.join(names)}"
 
 
-def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
+def _describe_held_joints(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
     at_zero = [joint.urdf.name for joint in joints if joint.position == 0]
     elsewhere = [str(joint) for joint in joints if joint.position != 0]
     if at_zero:
@@ -158,14 +158,14 @@ def _held(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:
         yield f"held {place}: {', '.join(elsewhere)}"
 
 
-def _exactness(residual: Residual) -> str:
+def _describe_residual(residual: KinematicResidual) -> str:
     verdict = "the same as" if max(residual) <= EXACT_RESIDUAL else "not quite"
     position, orientation = (max(error, SMALLEST_RESIDUAL) for error in residual)
     errors = f"{position:.1e} m and {orientation:.1e} rad"
     return f"forward kinematics: {verdict} the URDF's, the tip within {errors}"
 
 
-def _aligned(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
+def _align_dh_table(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
     """Yield the lines of a table with aligned columns, numbers right-aligned."""
     table = list(rows)
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
@@ -210,18 +210,18 @@ def import_urdf(
         base, tip = base or ends.base, tip or ends.tip
     chain = serial_chain(urdf, base, tip, hold)
     frames = dh_frames(chain.joints, chain.tip_pose, snap)
-    links = _links(file, chain.joints, frames)
-    loads = joint_loads(chain.joints, frames.rows, links)
+    links = _convert_links(file, chain.joints, frames)
+    loads = largest_joint_loads(chain.joints, frames.rows, links)
     actuators = [
         ACTUATORS[chosen.actuator].placeholder(chosen.constants(joint, load))
         for joint, load in zip(chain.joints, loads, strict=True)
     ]
-    robot = _robot(file, chain, frames, links, actuators)
+    robot = _assemble_robot(file, chain, frames, links, actuators)
     residual = kinematic_residual(chain, robot)
     return Conversion(file, chain, robot, chosen, tuple(loads), frames.snaps, residual, urdf.warnings)
 
 
-def _robot(
+def _assemble_robot(
     path: str, chain: SerialChain, frames: Frames, links: Sequence[Link], actuators: Sequence[Actuator]
 ) -> Robot:
     names = identifiers([joint.urdf.name for joint in chain.joints])
@@ -229,23 +229,25 @@ def _robot(
     x, y, z = (-STANDARD_GRAVITY * tidy(chain.up, 1.0) + 0.0).tolist()
     return Robot(
         name=as_name(chain.robot_name),
-        description=_description(path, chain),
+        description=_describe_origin(path, chain),
         placeholder=True,
         gravity=(x, y, z),
-        base=_pose(frames.base, frames.scale),
-        tool=_pose(frames.tool, frames.scale),
-        joints=tuple(_joint(*part) for part in parts),
+        base=_tidy_pose(frames.base, frames.scale),
+        tool=_tidy_pose(frames.tool, frames.scale),
+        joints=tuple(_convert_joint(*part) for part in parts),
     )
 
 
-def _description(path: str, chain: SerialChain) -> str:
+def _describe_origin(path: str, chain: SerialChain) -> str:
     """Return a description of the robot's origin, with joints held elsewhere than at zero."""
     held = [f", {each}" for each in chain.held if each.position != 0 and not each.follows]
     origin = f"converted from {one_line(os.path.basename(path))}, from link {chain.base} to link {chain.tip}"
     return f"{origin}{''.join(held)}"
 
 
-def _joint(name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, actuator: Actuator) -> Joint:
+def _convert_joint(
+    name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, actuator: Actuator
+) -> Joint:
     limit = joint.urdf.limit
     speed = limit.velocity
     return Joint(
@@ -262,7 +264,7 @@ def _joint(name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, actu
     )
 
 
-def _links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> list[Link]:
+def _convert_links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> list[Link]:
     """Return the links that each joint moves, in its Denavit-Hartenberg frame.
 
     Raises:
@@ -271,17 +273,17 @@ def _links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> list[Link
     problems, links = Problems(path), []
     for joint, pose in zip(joints, frames.poses, strict=True):
         try:
-            links.append(_link(joint.body.moved(inverse(pose)), frames.scale))
+            links.append(_convert_link(joint.body.in_outer_frame(inverse_pose(pose)), frames.scale))
         except InvalidRecordError as error:
-            own, *others = joint.links
-            whole = f"{quoted(own.name)}{' with the links it carries' if others else ''}"
+            first, *carried = joint.links
+            whole = f"{quoted(first.name)}{' with the links it carries' if carried else ''}"
             for problem in error.fields:
-                problems.add(own.line, f"inertia of {whole}: {problem}")
+                problems.add(first.line, f"inertia of {whole}: {problem}")
     problems.check()
     return links
 
 
-def _link(body: Body, scale: float) -> Link:
+def _convert_link(body: RigidBody, scale: float) -> Link:
     largest = float(abs(body.inertia).max())
     inertia = (
         tidy(body.inertia, largest)
@@ -294,7 +296,7 @@ def _link(body: Body, scale: float) -> Link:
     return Link(mass=mass, com=(x, y, z), inertia=Inertia(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz))
 
 
-def _pose(pose: FloatArray, scale: float) -> Pose:
+def _tidy_pose(pose: FloatArray, scale: float) -> Pose:
     x, y, z = tidy(pose[:3, 3], scale).tolist()
     roll, pitch, yaw = (tidy_angle(angle) for angle in roll_pitch_yaw(pose[:3, :3]))
     return Pose(xyz=(x, y, z), rpy=(roll, pitch, yaw))

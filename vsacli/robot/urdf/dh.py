@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import DenavitHartenberg, Pose
 from vsacli.robot.kinematics import frames
 from vsacli.robot.model import Robot
-from vsacli.robot.urdf.link_tree import inverse, pose_matrix, transform
+from vsacli.robot.urdf.link_tree import inverse_pose, pose_matrix, transform
 from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain
 
 SNAP_ANGLE = 1e-4
@@ -76,7 +76,7 @@ def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Fra
         tip: pose of the tip in the base at position zero, (4, 4).
         snap: angle, rad, below which axes are made parallel.
     """
-    axes, snaps = _parallelled(joints, _axes(joints), snap)
+    axes, snaps = _make_parallel(joints, _axes(joints), snap)
     frame = _first_frame(axes[0])
     poses = [frame]
     for axis in axes[1:]:
@@ -86,9 +86,9 @@ def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Fra
     scale = float(max(abs(pose[:3, 3]).max() for pose in (*poses, tip)))
     return Frames(
         base=poses[0],
-        rows=tuple(_row(inverse(pose) @ next_pose, scale) for pose, next_pose in pairwise(poses)),
+        rows=tuple(_dh_row(inverse_pose(pose) @ next_pose, scale) for pose, next_pose in pairwise(poses)),
         poses=tuple(poses[1:]),
-        tool=inverse(poses[-1]) @ tip,
+        tool=inverse_pose(poses[-1]) @ tip,
         snaps=snaps,
         scale=scale,
     )
@@ -120,7 +120,7 @@ def _axes(joints: Sequence[ChainJoint]) -> list[Axis]:
     return axes[::-1]
 
 
-def _parallelled(
+def _make_parallel(
     joints: Sequence[ChainJoint], axes: Sequence[Axis], snap: float
 ) -> tuple[list[Axis], tuple[Snap, ...]]:
     """Return the axes, rotated about their own points if nearly parallel to the ones before."""
@@ -137,10 +137,10 @@ def _parallelled(
 
 
 def _normal_is_far(first: Axis, second: Axis) -> bool:
-    return max(map(abs, _feet(first, second))) > FAR_NORMAL
+    return max(map(abs, _common_normal_feet(first, second))) > FAR_NORMAL
 
 
-def _feet(first: Axis, second: Axis) -> tuple[float, float]:
+def _common_normal_feet(first: Axis, second: Axis) -> tuple[float, float]:
     """Return the feet of the common normal of two axes, as distances along each axis from its point, m."""
     across = second.point - first.point
     normal = np.cross(first.direction, second.direction)
@@ -156,7 +156,7 @@ def _first_frame(axis: Axis) -> FloatArray:
     origin = axis.point - (axis.point @ axis.direction) * axis.direction
     x, y, _ = np.eye(3)
     reference = x if abs(axis.direction[0]) < math.sqrt(0.5) else y
-    return _frame(axis.direction, _across(reference, axis.direction), origin)
+    return _frame_from_axes(axis.direction, _perpendicular_part(reference, axis.direction), origin)
 
 
 def _next_frame(frame: FloatArray, axis: Axis) -> FloatArray:
@@ -165,14 +165,14 @@ def _next_frame(frame: FloatArray, axis: Axis) -> FloatArray:
     normal = np.cross(before.direction, axis.direction)
     if np.linalg.norm(normal) <= FILE_ROUNDING:
         return _parallel_frame(frame, axis)
-    foot_before, foot = _feet(before, axis)
+    foot_before, foot = _common_normal_feet(before, axis)
     origin = axis.point + foot * axis.direction
     across = origin - (before.point + foot_before * before.direction)
-    x = _across(normal, axis.direction)
+    x = _perpendicular_part(normal, axis.direction)
     distance = float(x @ across)
     if distance < 0 if abs(distance) > _negligible(origin) else _turns_back(x, frame):
         x = -x
-    return _frame(axis.direction, x, origin)
+    return _frame_from_axes(axis.direction, x, origin)
 
 
 def _parallel_frame(frame: FloatArray, axis: Axis) -> FloatArray:
@@ -181,8 +181,8 @@ def _parallel_frame(frame: FloatArray, axis: Axis) -> FloatArray:
     across = across - (across @ axis.direction) * axis.direction
     distance = float(np.linalg.norm(across))
     if distance <= _negligible(axis.point):
-        return _frame(axis.direction, frame[:3, 0], frame[:3, 3])
-    return _frame(axis.direction, across / distance, frame[:3, 3] + across)
+        return _frame_from_axes(axis.direction, frame[:3, 0], frame[:3, 3])
+    return _frame_from_axes(axis.direction, across / distance, frame[:3, 3] + across)
 
 
 def _turns_back(x: FloatArray, frame: FloatArray) -> bool:
@@ -201,22 +201,22 @@ def _last_frame(frame: FloatArray, tip: FloatArray) -> FloatArray:
     axis = frame[:3, 2]
     origin = frame[:3, 3] + (axis @ (tip[:3, 3] - frame[:3, 3])) * axis
     along = abs(float(axis @ tip[:3, 0]))
-    x = _across(tip[:3, 0], axis) if along < math.sqrt(0.5) else frame[:3, 0]
-    return _frame(axis, x, origin)
+    x = _perpendicular_part(tip[:3, 0], axis) if along < math.sqrt(0.5) else frame[:3, 0]
+    return _frame_from_axes(axis, x, origin)
 
 
-def _across(vector: FloatArray, axis: FloatArray) -> FloatArray:
+def _perpendicular_part(vector: FloatArray, axis: FloatArray) -> FloatArray:
     """Return the unit vector along the component of a vector normal to an axis."""
     part = vector - (vector @ axis) * axis
     result: FloatArray = part / np.linalg.norm(part)
     return result
 
 
-def _frame(z: FloatArray, x: FloatArray, origin: FloatArray) -> FloatArray:
+def _frame_from_axes(z: FloatArray, x: FloatArray, origin: FloatArray) -> FloatArray:
     return transform(np.column_stack([x, np.cross(z, x), z]), origin)
 
 
-def _row(step: FloatArray, scale: float) -> DenavitHartenberg:
+def _dh_row(step: FloatArray, scale: float) -> DenavitHartenberg:
     """Return the row of a transform between two frames that follow the convention."""
     theta = tidy_angle(math.atan2(step[1, 0], step[0, 0]))
     alpha = tidy_angle(math.atan2(step[2, 1], step[2, 2]))
@@ -231,28 +231,28 @@ DRAWN_HALF_WIDTH = {True: np.pi, False: 1.0}
 """Half the range of random positions of a revolute (rad) or prismatic (m) joint without limits."""
 
 
-class Residual(NamedTuple):
+class KinematicResidual(NamedTuple):
     """Largest distance, m, and angle, rad, between the tips, over random joint positions."""
 
     position: float
     orientation: float
 
 
-def kinematic_residual(chain: SerialChain, robot: Robot) -> Residual:
+def kinematic_residual(chain: SerialChain, robot: Robot) -> KinematicResidual:
     """Compare the tips of chain and robot at random positions within the limits."""
-    q = _positions(chain.joints)
-    expected, found = _chain_tips(chain, q), _robot_tips(robot, q)
-    shift = np.linalg.norm(found[:, :3, 3] - expected[:, :3, 3], axis=1)
-    turn = np.linalg.norm(found[:, :3, :3] - expected[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
-    return Residual(float(shift.max()), float(turn.max()))
+    q = _random_joint_positions(chain.joints)
+    expected, tips = _chain_tips(chain, q), _robot_tips(robot, q)
+    shift = np.linalg.norm(tips[:, :3, 3] - expected[:, :3, 3], axis=1)
+    turn = np.linalg.norm(tips[:, :3, :3] - expected[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
+    return KinematicResidual(float(shift.max()), float(turn.max()))
 
 
-def _positions(joints: Sequence[ChainJoint]) -> FloatArray:
+def _random_joint_positions(joints: Sequence[ChainJoint]) -> FloatArray:
     """Return random positions, (samples, joints), rad (m)."""
     rng = np.random.default_rng(SEED)
     reach = np.array([DRAWN_HALF_WIDTH[joint.is_revolute] for joint in joints])
-    given = [joint.urdf.limit.position for joint in joints]
-    bounds = [limits or (-1e9, 1e9) for limits in given]
+    file_limits = [joint.urdf.limit.position for joint in joints]
+    bounds = [limits or (-1e9, 1e9) for limits in file_limits]
     lower, upper = np.clip(np.array(bounds).T, -reach, reach)
     return rng.uniform(lower, upper, (SAMPLES, len(joints)))
 
@@ -262,9 +262,9 @@ def _chain_tips(chain: SerialChain, q: FloatArray) -> FloatArray:
     poses = np.broadcast_to(np.eye(4), (len(q), 4, 4))
     before = np.eye(4)
     for joint, positions in zip(chain.joints, q.T, strict=True):
-        poses = poses @ (inverse(before) @ joint.frame) @ joint.urdf.motions(positions)
+        poses = poses @ (inverse_pose(before) @ joint.frame) @ joint.urdf.motions(positions)
         before = joint.frame
-    result: FloatArray = poses @ (inverse(before) @ chain.tip_pose)
+    result: FloatArray = poses @ (inverse_pose(before) @ chain.tip_pose)
     return result
 
 
@@ -272,9 +272,9 @@ def _robot_tips(robot: Robot, q: FloatArray) -> FloatArray:
     *_, last = frames(robot, q)
     poses = np.tile(np.eye(4), (len(q), 1, 1))
     poses[:, :3, :3], poses[:, :3, 3] = last.axes, last.origin
-    result: FloatArray = _matrix(robot.base) @ poses @ _matrix(robot.tool)
+    result: FloatArray = _matrix_of_pose(robot.base) @ poses @ _matrix_of_pose(robot.tool)
     return result
 
 
-def _matrix(pose: Pose) -> FloatArray:
+def _matrix_of_pose(pose: Pose) -> FloatArray:
     return pose_matrix(pose.xyz, pose.rpy)

@@ -53,7 +53,7 @@ def roll_pitch_yaw(rotation: FloatArray) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def inverse(pose: FloatArray) -> FloatArray:
+def inverse_pose(pose: FloatArray) -> FloatArray:
     """Return the inverse of a rigid motion."""
     rotation = pose[:3, :3].T
     return transform(rotation, -rotation @ pose[:3, 3])
@@ -65,29 +65,32 @@ def cross_matrix(vector: FloatArray) -> FloatArray:
     return np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
 
 
-class Body(NamedTuple):
+class RigidBody(NamedTuple):
     """A rigid body in some frame: mass, kg, center of mass, (3,), m, inertia about it, (3, 3), kg m^2."""
 
     mass: float
     com: FloatArray
     inertia: FloatArray
 
-    def moved(self, pose: FloatArray) -> Body:
+    def in_outer_frame(self, pose: FloatArray) -> RigidBody:
         """Return the body in another frame, in which its own frame has this pose."""
         rotation = pose[:3, :3]
-        return Body(self.mass, rotation @ self.com + pose[:3, 3], rotation @ self.inertia @ rotation.T)
+        return RigidBody(self.mass, rotation @ self.com + pose[:3, 3], rotation @ self.inertia @ rotation.T)
 
 
-def welded(bodies: list[Body]) -> Body:
+def weld_bodies(bodies: list[RigidBody]) -> RigidBody:
     """Return bodies given in one frame as a single body; without mass, it is at the origin."""
     mass = math.fsum(body.mass for body in bodies)
     moment = sum((body.mass * body.com for body in bodies), np.zeros(3))
     com = moment / mass if mass > 0 else np.zeros(3)
-    inertia = sum((body.inertia + _steiner(body.mass, body.com - com) for body in bodies), np.zeros((3, 3)))
-    return Body(mass, com, (inertia + inertia.T) / 2)
+    inertia = sum(
+        (body.inertia + _parallel_axis_inertia(body.mass, body.com - com) for body in bodies),
+        np.zeros((3, 3)),
+    )
+    return RigidBody(mass, com, (inertia + inertia.T) / 2)
 
 
-def _steiner(mass: float, arm: FloatArray) -> FloatArray:
+def _parallel_axis_inertia(mass: float, arm: FloatArray) -> FloatArray:
     cross = cross_matrix(arm)
     result: FloatArray = -mass * cross @ cross
     return result
@@ -112,7 +115,7 @@ class UrdfLink:
 
     name: str
     line: int
-    body: Body | None
+    body: RigidBody | None
     flaw: tuple[int, str] | None = None
 
 
@@ -208,7 +211,7 @@ class Urdf:
     root: str
     warnings: tuple[Problem, ...] = ()
 
-    def above(self, link: str) -> list[UrdfJoint]:
+    def joints_above(self, link: str) -> list[UrdfJoint]:
         """Return the joints between the root and a link, from the root."""
         parents = {joint.child: joint for joint in self.joints.values()}
         path = []
@@ -217,7 +220,7 @@ class Urdf:
             link = parents[link].parent
         return path[::-1]
 
-    def followed(self, joint: UrdfJoint, released: Collection[str] = ()) -> Mimic:
+    def relation_to_leader(self, joint: UrdfJoint, released: Collection[str] = ()) -> Mimic:
         """Return the relation to the last leader in a chain of mimics; to itself without a leader.
 
         Joints named in `released` follow none.
@@ -235,7 +238,7 @@ class Urdf:
         return mimic
 
 
-def below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
+def joints_below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
     """Yield the joints below a link, parents before children."""
     children: dict[str, list[UrdfJoint]] = {}
     for joint in joints:
@@ -270,9 +273,9 @@ def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
     Raises:
         InputError: a link or path does not exist, or no joint moves on it.
     """
-    start = urdf.root if base is None else _known(urdf, base, "--base")
-    end = _only_tip(urdf, start) if tip is None else _known(urdf, tip, "--tip")
-    path = _path(urdf, start, end)
+    start = urdf.root if base is None else _check_link_name(urdf, base, "--base")
+    end = _only_tip(urdf, start) if tip is None else _check_link_name(urdf, tip, "--tip")
+    path = _chain_between(urdf, start, end)
     if start == end:
         same = f"--base and --tip are the same link, {quoted(start)}"
         raise InputError.one(f"{same}; choose a base nearer to the root, or a tip below it", urdf.file)
@@ -282,15 +285,15 @@ def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
     return path
 
 
-def _known(urdf: Urdf, name: str, option: str) -> str:
+def _check_link_name(urdf: Urdf, name: str, option: str) -> str:
     if name not in urdf.links:
         near = did_you_mean(name, urdf.links)
         raise InputError.one(f"{option}: there is no link {quoted(name)}{near}", urdf.file)
     return name
 
 
-def _path(urdf: Urdf, base: str, tip: str) -> ChainPath:
-    above = urdf.above(tip)
+def _chain_between(urdf: Urdf, base: str, tip: str) -> ChainPath:
+    above = urdf.joints_above(tip)
     links = [joint.parent for joint in above] + [tip]
     if base not in links:
         raise InputError.one(f"the link {quoted(tip)} does not hang below {quoted(base)}", urdf.file)
@@ -299,7 +302,7 @@ def _path(urdf: Urdf, base: str, tip: str) -> ChainPath:
 
 def _only_tip(urdf: Urdf, base: str) -> str:
     """Return the end of the only branch that moves; raise an InputError if it is ambiguous."""
-    leaves = {leaf: _path(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
+    leaves = {leaf: _chain_between(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
     longest = max(leaves.values(), key=len, default=())
     tips = [leaf for leaf, moving in leaves.items() if moving and moving == longest]
     straight = all(moving == longest[: len(moving)] for moving in leaves.values())
@@ -307,12 +310,12 @@ def _only_tip(urdf: Urdf, base: str) -> str:
         raise InputError.one(f"no joint moves below {quoted(base)}", urdf.file)
     if not straight or len(tips) > 1:
         offered = [*_forks(urdf, base), *(leaf for leaf, moving in leaves.items() if moving)]
-        raise InputError.one(_ambiguous(urdf, base, list(dict.fromkeys(offered))), urdf.file)
+        raise InputError.one(_describe_possible_tips(urdf, base, list(dict.fromkeys(offered))), urdf.file)
     return tips[0]
 
 
 def _leaves(urdf: Urdf, base: str) -> list[str]:
-    joints = list(below(base, urdf.joints.values()))
+    joints = list(joints_below(base, urdf.joints.values()))
     parents = {joint.parent for joint in joints}
     return [joint.child for joint in joints if joint.child not in parents]
 
@@ -320,18 +323,20 @@ def _leaves(urdf: Urdf, base: str) -> list[str]:
 def _forks(urdf: Urdf, base: str) -> Iterator[str]:
     """Yield links beyond a moving joint at which more than one branch with moving joints begins."""
     branches: dict[str, set[str]] = {}
-    for moving in (joint for joint in below(base, urdf.joints.values()) if not joint.is_fixed):
-        for joint in _path(urdf, base, moving.child).joints:
+    for moving in (joint for joint in joints_below(base, urdf.joints.values()) if not joint.is_fixed):
+        for joint in _chain_between(urdf, base, moving.child).joints:
             branches.setdefault(joint.parent, set()).add(joint.child)
     for link, ways in branches.items():
-        if len(ways) > 1 and _path(urdf, base, link).moving:
+        if len(ways) > 1 and _chain_between(urdf, base, link).moving:
             yield link
 
 
-def _ambiguous(urdf: Urdf, base: str, tips: list[str]) -> str:
-    counts = [len(_path(urdf, base, tip).moving) for tip in tips]
-    found = [f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)]
-    more = f" and {len(found) - MAX_TIPS} more" if len(found) > MAX_TIPS else ""
-    offered = ", ".join(found[:MAX_TIPS])
+def _describe_possible_tips(urdf: Urdf, base: str, tips: list[str]) -> str:
+    counts = [len(_chain_between(urdf, base, tip).moving) for tip in tips]
+    tip_phrases = [
+        f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)
+    ]
+    more = f" and {len(tip_phrases) - MAX_TIPS} more" if len(tips) > MAX_TIPS else ""
+    offered = ", ".join(tip_phrases[:MAX_TIPS])
     which = f"several links below {quoted(base)} could be the end effector"
     return f"{which}; choose one with --tip: {offered}{more}"

@@ -63,11 +63,11 @@ class Placeholders(NamedTuple):
     def constants(self, joint: ChainJoint, load: JointLoad) -> PlaceholderConstants:
         """Return the constants of a joint from its load, its effort limit, and its gear."""
         gear = joint.urdf.gear_ratio if ACTUATORS[self.actuator].motor_count == 1 else None
-        own = load.constants(DEFLECTION[joint.is_revolute], gear or 1.0)
+        by_load = load.constants(DEFLECTION[joint.is_revolute], gear or 1.0)
         return PlaceholderConstants(
-            motor_inertia=own.motor_inertia if self.motor_inertia is None else self.motor_inertia,
-            stiffness=own.stiffness if self.stiffness is None else self.stiffness,
-            spring=own.spring if self.spring is None else self.spring,
+            motor_inertia=by_load.motor_inertia if self.motor_inertia is None else self.motor_inertia,
+            stiffness=by_load.stiffness if self.stiffness is None else self.stiffness,
+            spring=by_load.spring if self.spring is None else self.spring,
             max_torque=joint.urdf.limit.effort or math.inf,
             gear_ratio=gear,
         )
@@ -80,7 +80,7 @@ class Placeholders(NamedTuple):
         if field == "motor":
             return f"{MOTOR_SHARE:g} times the largest inertia that it moves"
         give = f"{DEFLECTION[joint.is_revolute]:g} {joint.urdf.unit()}"
-        torque = f"{_rounded(load.torque):g} {joint.urdf.unit(TORQUE)}"
+        torque = f"{_round_constant(load.torque):g} {joint.urdf.unit(TORQUE)}"
         return f"gives way by {give} under {torque}, its largest load"
 
 
@@ -107,16 +107,16 @@ class JointLoad(NamedTuple):
         """
         if not self.is_there:
             return UNLOADED
-        stiffness = _rounded(self.torque / deflection)
-        k = _rounded(stiffness / 2)
+        stiffness = _round_constant(self.torque / deflection)
+        k = _round_constant(stiffness / 2)
         return PlaceholderConstants(
-            motor_inertia=_rounded(MOTOR_SHARE * self.inertia / gear**2) * gear**2,
+            motor_inertia=_round_constant(MOTOR_SHARE * self.inertia / gear**2) * gear**2,
             stiffness=stiffness,
-            spring=(k, _rounded(HARDENING * k / deflection**2)),
+            spring=(k, _round_constant(HARDENING * k / deflection**2)),
         )
 
 
-def _rounded(number: float) -> float:
+def _round_constant(number: float) -> float:
     return float(f"{number:.{DIGITS - 1}e}")
 
 
@@ -138,14 +138,16 @@ class _Masses(NamedTuple):
         second = self.second + (2 * self.first + self.mass * distance) * distance
         return _Masses(self.mass, self.first + self.mass * distance, second)
 
-    def joined(self, link: Link, distance: float) -> _Masses:
+    def with_link(self, link: Link, distance: float) -> _Masses:
         """Return the moments with a further link, whose center of mass is at this distance."""
-        own = link.mass * distance
-        moment = max(float(link.inertia.principal_moments[-1]), 0.0)
-        return _Masses(self.mass + link.mass, self.first + own, self.second + own * distance + moment)
+        moment = link.mass * distance
+        principal = max(float(link.inertia.principal_moments[-1]), 0.0)
+        return _Masses(
+            self.mass + link.mass, self.first + moment, self.second + moment * distance + principal
+        )
 
 
-def joint_loads(
+def largest_joint_loads(
     joints: Sequence[ChainJoint], rows: Sequence[DenavitHartenberg], links: Sequence[Link]
 ) -> list[JointLoad]:
     """Return the largest load of each joint over all configurations.
@@ -157,19 +159,19 @@ def joint_loads(
     """
     loads, beyond = [], _Masses()  # beyond joint i, as seen from the origin of frame i
     for joint, row, link in zip(reversed(joints), reversed(rows), reversed(links), strict=True):
-        radius, height = _center(row, link)
-        about_axis = beyond.farther(abs(row.a)).joined(link, radius)
+        radius, height = _cylindrical_center_of_mass(row, link)
+        about_axis = beyond.farther(abs(row.a)).with_link(link, radius)
         inertia = about_axis.second if joint.is_revolute else about_axis.mass
         weight = STANDARD_GRAVITY * math.sqrt(about_axis.mass * inertia)
         loads.append(JointLoad(weight + SLOW[joint.is_revolute] * joint.urdf.damping, inertia))
         strokes = (0.0,) if joint.is_revolute else joint.urdf.limit.position or (0.0,)
         length = math.hypot(row.a, max(abs(row.d + stroke) for stroke in strokes))
         distance = math.hypot(radius, max(abs(row.d + height + stroke) for stroke in strokes))
-        beyond = beyond.farther(length).joined(link, distance)
+        beyond = beyond.farther(length).with_link(link, distance)
     return loads[::-1]
 
 
-def _center(row: DenavitHartenberg, link: Link) -> tuple[float, float]:
+def _cylindrical_center_of_mass(row: DenavitHartenberg, link: Link) -> tuple[float, float]:
     """Return the distance of a link's center of mass from its joint axis, and its height along it above d."""
     x, y, z = link.com
     c, s = math.cos(row.alpha), math.sin(row.alpha)

@@ -25,13 +25,13 @@ from vsacli.robot.urdf.link_tree import (
     POSITION_LIMITS,
     TYPES,
     UNLIMITED,
-    Body,
     Mimic,
+    RigidBody,
     Urdf,
     UrdfJoint,
     UrdfLimit,
     UrdfLink,
-    below,
+    joints_below,
     pose_matrix,
     quaternion_rotation,
     transform,
@@ -59,28 +59,28 @@ def read_gear_ratios(root: Element, unread: Unread, problems: Problems) -> dict[
             elif name in ratios or len(joints) > 1 or not _is_simple(transmission):
                 unread.left_out[name].append(("transmission that is not simple left out", ""))
             else:
-                ratios[name] = _reduction(transmission, problems)
+                ratios[name] = _net_reduction(transmission, problems)
     return ratios
 
 
 def _transmissions(root: Element) -> Iterator[Element]:
-    yield from root.all("transmission")
-    for system in root.all("ros2_control"):
-        yield from system.all("transmission")
+    yield from root.children_with_tag("transmission")
+    for system in root.children_with_tag("ros2_control"):
+        yield from system.children_with_tag("transmission")
 
 
 def _is_simple(transmission: Element) -> bool:
     """Return whether a transmission is declared as simple, with one motor and one reduction at most."""
-    types = [child.text for tag in ("type", "plugin") for child in transmission.all(tag)]
+    types = [child.text for tag in ("type", "plugin") for child in transmission.children_with_tag(tag)]
     says_so = [transmission.attributes.get("type", ""), *types]
-    motors = list(transmission.all("actuator"))
-    is_one = len(motors) == 1 >= len(_reductions(transmission))
+    motors = list(transmission.children_with_tag("actuator"))
+    is_one = len(motors) == 1 >= len(_declared_reductions(transmission))
     return any(word.endswith(SIMPLE) for word in says_so) and is_one
 
 
-def _reductions(transmission: Element) -> list[tuple[int, str, str]]:
+def _declared_reductions(transmission: Element) -> list[tuple[int, str, str]]:
     """Return line, word and text of each gear reduction, an element or an attribute."""
-    parts = list(transmission.everything())
+    parts = list(transmission.with_descendants())
     elements = [(part.line, part.tag, part.text) for part in parts if part.tag in REDUCTIONS]
     attributes = [
         (part.line, word, part.attributes[word])
@@ -91,9 +91,9 @@ def _reductions(transmission: Element) -> list[tuple[int, str, str]]:
     return elements + attributes
 
 
-def _reduction(transmission: Element, problems: Problems) -> float:
+def _net_reduction(transmission: Element, problems: Problems) -> float:
     """Return the reduction of a simple transmission; 1 without one."""
-    for line, word, text in _reductions(transmission):
+    for line, word, text in _declared_reductions(transmission):
         try:
             ratio = float(text.replace("_", "?"))
         except ValueError:
@@ -128,7 +128,7 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     if root.tag != "robot":
         problems.fail(root.line, f"expected a URDF, which begins with <robot>, found <{root.tag}>")
     refuse_macros(root, problems)
-    for link in list(root.all("link"))[MAX_LINKS:]:
+    for link in list(root.children_with_tag("link"))[MAX_LINKS:]:
         problems.fail(link.line, f"more than {MAX_LINKS:,} links")
     unread = Unread(source.path, root)
     sort_words(root, unread, problems)
@@ -136,19 +136,19 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     if version not in VERSIONS:
         unread.warn(root.line, f"version {quoted(version)} is unknown; read as {VERSIONS[-1]}")
     reader = _Reader(problems, version, read_gear_ratios(root, unread, problems), unread)
-    links = _by_name(map(reader.link, root.all("link")), "link", problems)
-    joints = _by_name(map(reader.joint, root.all("joint")), "joint", problems)
+    links = _index_by_name(map(reader.link, root.children_with_tag("link")), "link", problems)
+    joints = _index_by_name(map(reader.joint, root.children_with_tag("joint")), "joint", problems)
     name = reader.word(root, "name")
     if not links:
         problems.fail(root.line, "the file describes no links")
     _check_ends(links, joints, problems)
     _check_leaders(joints, problems)
     problems.check()
-    root_link = _root(links, joints, problems)
+    root_link = _root_link(links, joints, problems)
     return Urdf(source.path, name, links, joints, root_link, tuple(sorted(unread.warnings())))
 
 
-def _by_name(records: Iterable[_Named], kind: str, problems: Problems) -> dict[str, _Named]:
+def _index_by_name(records: Iterable[_Named], kind: str, problems: Problems) -> dict[str, _Named]:
     named: dict[str, _Named] = {}
     for record in records:
         if record.name in named:
@@ -178,12 +178,12 @@ def _check_ends(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], 
 
 def _check_leaders(joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
     for joint in joints.values():
-        if joint.name in _leaders(joint, joints):
+        if joint.name in _followed_joints(joint, joints):
             message = "follows itself: the <mimic> of joints form a circle"
             problems.add(joint.line, f"joint {quoted(joint.name)} {message}")
 
 
-def _leaders(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
+def _followed_joints(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
     """Return the names of the joints that a joint follows, directly or indirectly."""
     leaders: set[str] = set()
     while joint.mimic is not None and joint.mimic.leader in joints.keys() - leaders:
@@ -192,14 +192,14 @@ def _leaders(joint: UrdfJoint, joints: Mapping[str, UrdfJoint]) -> set[str]:
     return leaders
 
 
-def _root(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> str:
+def _root_link(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> str:
     """Return the name of the only link without a parent, and check that all others are below it."""
     children = {joint.child for joint in joints.values()}
     roots = [name for name in links if name not in children]
     if len(roots) != 1:
-        found = f"{', '.join(map(quoted, roots[:5]))} have no parent" if roots else "every link has a parent"
-        problems.fail(1, f"the links must form one tree, which has one root, but {found}")
-    circles = set(links) - {roots[0]} - {joint.child for joint in below(roots[0], joints.values())}
+        reason = f"{', '.join(map(quoted, roots[:5]))} have no parent" if roots else "every link has a parent"
+        problems.fail(1, f"the links must form one tree, which has one root, but {reason}")
+    circles = set(links) - {roots[0]} - {joint.child for joint in joints_below(roots[0], joints.values())}
     if circles:
         names = sorted(circles, key=lambda name: links[name].line)
         message = f"the link {quoted(names[0])} is its own ancestor: the joints form a circle"
@@ -228,10 +228,12 @@ class _Reader:
             return UrdfLink(name, element.line, None, flaw)
         return UrdfLink(name, element.line, self._body(inertial, mass, inertia))
 
-    def _body(self, inertial: Element, mass: Element, inertia: Element) -> Body:
+    def _body(self, inertial: Element, mass: Element, inertia: Element) -> RigidBody:
         xx, xy, xz, yy, yz, zz = (self._number(inertia, name) for name in _MOMENTS)
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        return Body(self._non_negative(mass, "value"), np.zeros(3), tensor).moved(self._origin(inertial))
+        return RigidBody(self._non_negative(mass, "value"), np.zeros(3), tensor).in_outer_frame(
+            self._origin(inertial)
+        )
 
     def joint(self, element: Element) -> UrdfJoint:
         name = self.word(element, "name")
@@ -346,7 +348,7 @@ class _Reader:
 
     def _vector(self, element: Element, name: str, length: int = 3) -> list[float]:
         words = element.attributes.get(name, "0 0 0").split()
-        numbers = [self._parsed(element, name, word, LARGEST_NUMBER) for word in words]
+        numbers = [self._parse_number(element, name, word, LARGEST_NUMBER) for word in words]
         if len(numbers) != length:
             self._problems.add(element.line, f"{name}: expected {length} numbers, found {len(numbers)}")
             return [0.0] * (length - 1) + [float(length == 4)]
@@ -363,12 +365,12 @@ class _Reader:
 
     def _float(self, element: Element, name: str, default: float | None, largest: float) -> float:
         if name in element.attributes:
-            return self._parsed(element, name, element.attributes[name], largest)
+            return self._parse_number(element, name, element.attributes[name], largest)
         if default is None:
             self._problems.add(element.line, f"{element.tag}: there is no attribute {name}")
         return default or 0.0
 
-    def _parsed(self, element: Element, name: str, word: str, largest: float) -> float:
+    def _parse_number(self, element: Element, name: str, word: str, largest: float) -> float:
         try:
             number = float(word.replace("_", "?"))
         except ValueError:
@@ -390,7 +392,7 @@ class _Reader:
 
     def _child(self, element: Element, tag: str) -> Element | None:
         """Return the only child with a tag; None without one."""
-        found = list(element.all(tag))
-        if len(found) > 1:
-            self._problems.add(found[1].line, f"{element.tag}: a second <{tag}>; one is expected")
-        return found[0] if found else None
+        children = list(element.children_with_tag(tag))
+        if len(children) > 1:
+            self._problems.add(children[1].line, f"{element.tag}: a second <{tag}>; one is expected")
+        return children[0] if children else None

@@ -21,15 +21,15 @@ from vsacli.documents.tree import quoted
 from vsacli.robot.urdf.link_tree import (
     LARGEST_NUMBER,
     MOVING,
-    Body,
     ChainPath,
+    RigidBody,
     Urdf,
     UrdfJoint,
     UrdfLink,
-    below,
     find_path,
-    inverse,
-    welded,
+    inverse_pose,
+    joints_below,
+    weld_bodies,
 )
 
 Hold = Mapping[str, float | str]
@@ -68,7 +68,7 @@ class HeldJoint(NamedTuple):
         mimic, limit = self.urdf.mimic, self.urdf.limit.position
         if mimic is not None and self.released:
             yield f"{self}: it follows {mimic.leader} (<mimic>), and its motion with that joint is neglected"
-        elif mimic is not None and not self.follows and self.position == _resting(self.urdf):
+        elif mimic is not None and not self.follows and self.position == _default_position(self.urdf):
             reason = f"there is no joint {quoted(mimic.leader)}, which it should follow (<mimic>)"
             yield f"{self}: {reason}; if it stands elsewhere, say so by --hold {self.leader}=VALUE"
         if limit is not None and not limit[0] - LIMIT_ROUNDING <= self.position <= limit[1] + LIMIT_ROUNDING:
@@ -92,18 +92,18 @@ def held_joints(
     Raises:
         InputError: a position cannot be given, or has no effect.
     """
-    followed = [(joint, urdf.followed(joint, hold)) for joint in standing]
-    leaders = {mimic.leader: _resting(urdf.joints[mimic.leader]) for _, mimic in followed}
+    followed = [(joint, urdf.relation_to_leader(joint, hold)) for joint in standing]
+    leaders = {mimic.leader: _default_position(urdf.joints[mimic.leader]) for _, mimic in followed}
     problems = Problems(urdf.file)
     for name, value in hold.items():
-        leaders[name] = _given(urdf, name, value, leaders, moving, problems)
+        leaders[name] = _read_hold_position(urdf, name, value, leaders, moving, problems)
     problems.check()
     held = [
         HeldJoint(
             joint,
             mimic.multiplier * leaders[mimic.leader] + mimic.offset,
             mimic.leader,
-            joint.name in hold and urdf.followed(joint).leader in moving,
+            joint.name in hold and urdf.relation_to_leader(joint).leader in moving,
         )
         for joint, mimic in followed
     ]
@@ -115,12 +115,12 @@ def held_joints(
     return held
 
 
-def _resting(joint: UrdfJoint) -> float:
+def _default_position(joint: UrdfJoint) -> float:
     """Return the default position of a joint: zero, or that at which its missing leader is at zero."""
     return 0.0 if joint.mimic is None else joint.mimic.offset
 
 
-def _given(
+def _read_hold_position(
     urdf: Urdf,
     name: str,
     value: float | str,
@@ -151,7 +151,7 @@ def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: Col
         return f"{shown} is {joint.type}, so it has no position to choose"
     if name in moving:
         return f"{shown} belongs to the chain, where it moves"
-    if (leader := urdf.followed(joint).leader) != name and leader not in moving:
+    if (leader := urdf.relation_to_leader(joint).leader) != name and leader not in moving:
         return f"{shown} follows {quoted(leader)} (<mimic>); hold that one"
     if name not in leaders:
         return f"{shown} is neither outside the chain nor below its base, so that it has no effect"
@@ -176,7 +176,7 @@ class ChainJoint:
     urdf: UrdfJoint
     frame: FloatArray
     links: tuple[UrdfLink, ...]
-    body: Body
+    body: RigidBody
 
     @property
     def is_revolute(self) -> bool:
@@ -243,26 +243,27 @@ def serial_chain(
             requested.
     """
     path = find_path(urdf, base, tip)
-    carried = _carried(urdf, path)
-    below_base = [joint for joint in urdf.above(path.base) if not joint.is_fixed]
+    carried = _carried_links(urdf, path)
+    below_base = [joint for joint in urdf.joints_above(path.base) if not joint.is_fixed]
     names, hold = [joint.name for joint in path.moving], hold or {}
-    side = _beside(urdf, carried, path)
+    side = _side_branch_joints(urdf, carried, path)
     follow = {
-        joint.name: urdf.followed(joint, hold).leader in names and _is_massless(urdf, joint) for joint in side
+        joint.name: urdf.relation_to_leader(joint, hold).leader in names and _is_massless(urdf, joint)
+        for joint in side
     }
     beside = [joint for joint in side if not follow[joint.name]]
     _check_joints(urdf, path, below_base, beside, hold)
     _check_links(urdf, carried)
     held = held_joints(urdf, [*below_base, *beside], names, hold)
-    poses = _poses(urdf, held)
-    to_base = inverse(poses[path.base])
+    poses = _link_poses(urdf, held)
+    to_base = inverse_pose(poses[path.base])
     return SerialChain(
         robot_name=urdf.name,
         base=path.base,
         tip=path.tip,
         up=to_base[:3, 2],
         joints=tuple(
-            ChainJoint(joint, to_base @ poses[joint.child], links, _body(links, poses, to_base))
+            ChainJoint(joint, to_base @ poses[joint.child], links, _rigid_body_of(links, poses, to_base))
             for joint, links in zip(path.moving, carried, strict=True)
         ),
         tip_pose=to_base @ poses[path.tip],
@@ -274,7 +275,7 @@ def serial_chain(
 
 def _is_massless(urdf: Urdf, joint: UrdfJoint) -> bool:
     """Return whether a joint moves links without mass only, so that it exerts no torque on its leader."""
-    links = [urdf.links[moved.child] for moved in (joint, *below(joint.child, urdf.joints.values()))]
+    links = [urdf.links[moved.child] for moved in (joint, *joints_below(joint.child, urdf.joints.values()))]
     return not any(link.flaw or (link.body and (link.body.mass or link.body.inertia.any())) for link in links)
 
 
@@ -294,7 +295,7 @@ def _check_joints(
     on_chain = {joint.name for joint in path.moving}
     for place, joints in (("outside the chain", beside), ("below the base", below_base)):
         for joint in joints:
-            leader = urdf.followed(joint, hold).leader
+            leader = urdf.relation_to_leader(joint, hold).leader
             if leader in on_chain:
                 reason = f"{place} follows {quoted(leader)} on it (<mimic>)"
                 fix = f"hold it by --hold {shlex.quote(joint.name)}=0, which neglects its motion"
@@ -310,34 +311,38 @@ def _check_links(urdf: Urdf, carried: Iterable[Iterable[UrdfLink]]) -> None:
     problems.check()
 
 
-def _poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
+def _link_poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
     """Return the pose of every link in the root, with some joints held and all others at zero."""
     positions = {each.urdf.name: each.position for each in held}
     poses = {urdf.root: np.eye(4)}
-    for joint in below(urdf.root, urdf.joints.values()):
+    for joint in joints_below(urdf.root, urdf.joints.values()):
         (motion,) = joint.motions(np.array([positions.get(joint.name, 0.0)]))
         poses[joint.child] = poses[joint.parent] @ joint.placement @ motion
     return poses
 
 
-def _carried(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
+def _carried_links(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
     """Return the links that each moving joint of the chain carries, side branches included."""
     number = {joint.name: index for index, joint in enumerate(path.moving)}
     owner = {path.base: -1}
     carried: list[list[UrdfLink]] = [[] for _ in number]
-    for joint in below(path.base, urdf.joints.values()):
+    for joint in joints_below(path.base, urdf.joints.values()):
         index = owner[joint.child] = number.get(joint.name, owner[joint.parent])
         if index >= 0:
             carried[index].append(urdf.links[joint.child])
     return [tuple(links) for links in carried]
 
 
-def _beside(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPath) -> list[UrdfJoint]:
+def _side_branch_joints(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPath) -> list[UrdfJoint]:
     names = {link.name for links in carried for link in links}
     moving = {joint.name for joint in path.moving}
     candidates = (joint for joint in urdf.joints.values() if joint.child in names and not joint.is_fixed)
     return [joint for joint in candidates if joint.name not in moving]
 
 
-def _body(links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray) -> Body:
-    return welded([link.body.moved(to_base @ poses[link.name]) for link in links if link.body is not None])
+def _rigid_body_of(
+    links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray
+) -> RigidBody:
+    return weld_bodies(
+        [link.body.in_outer_frame(to_base @ poses[link.name]) for link in links if link.body is not None]
+    )

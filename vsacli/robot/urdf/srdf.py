@@ -19,14 +19,14 @@ MAX_BYTES = 10_000_000
 """Largest file, as for a URDF; most of an SRDF are pairs of links that may collide."""
 
 
-class Ends(NamedTuple):
+class ChainEnds(NamedTuple):
     """The base link and the tip link of a chain."""
 
     base: str
     tip: str
 
 
-def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -> Ends:
+def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -> ChainEnds:
     """Return the base and tip link of the chain of a group.
 
     Args:
@@ -41,9 +41,9 @@ def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -
     source, text = read_source(path, MAX_BYTES)
     problems = Problems(source.path)
     root = parse_xml(text, problems, "an SRDF")
-    if root.tag != "robot" or any(root.all("link")):
+    if root.tag != "robot" or any(root.children_with_tag("link")):
         problems.fail(root.line, "expected an SRDF, in whose <robot> there are groups and no links")
-    groups = {element.attributes.get("name", ""): element for element in root.all("group")}
+    groups = {element.attributes.get("name", ""): element for element in root.children_with_tag("group")}
     if not groups:
         problems.fail(root.line, "there is no <group> in it")
     if group is None and len(groups) > 1:
@@ -60,13 +60,13 @@ class _Groups:
     def __init__(self, groups: Mapping[str, Element], urdf: Urdf, problems: Problems) -> None:
         self._groups, self._urdf, self._problems = groups, urdf, problems
 
-    def ends(self, name: str) -> Ends:
+    def ends(self, name: str) -> ChainEnds:
         group = self._groups[name]
         joints = self._joints(name, ())
         moving = [joint for joint in joints.values() if not joint.is_fixed]
         if not moving:
             self._problems.fail(group.line, f"no joint moves in the group {quoted(name)}")
-        paths = {joint.child: self._urdf.above(joint.child) for joint in joints.values()}
+        paths = {joint.child: self._urdf.joints_above(joint.child) for joint in joints.values()}
         serial = [link for link, path in paths.items() if all(joint in path for joint in moving)]
         if not serial:
             names = ", ".join(quoted(joint.name) for joint in moving)
@@ -79,26 +79,26 @@ class _Groups:
         if missing:
             names = ", ".join(quoted(joint.name) for joint in missing)
             self._problems.fail(group.line, f"the group {quoted(name)} leaves out {names} within its chain")
-        chain = next(group.all("chain"), None)
-        return Ends(first.parent if chain is None else chain.attributes["base_link"], tip)
+        chain = next(group.children_with_tag("chain"), None)
+        return ChainEnds(first.parent if chain is None else chain.attributes["base_link"], tip)
 
     def _joints(self, name: str, around: tuple[str, ...]) -> dict[str, UrdfJoint]:
         """Return the joints of a group by name: its own, and those of its links, chains and groups."""
         group = self._groups[name]
         if name in around:
             self._problems.fail(group.line, f"the group {quoted(name)} contains itself")
-        joints = [self._joint(element) for element in group.all("joint")]
-        for element in group.all("link"):
-            joints += self._urdf.above(self._link(element, "name"))[-1:]
-        for element in group.all("chain"):
+        joints = [self._joint(element) for element in group.children_with_tag("joint")]
+        for element in group.children_with_tag("link"):
+            joints += self._urdf.joints_above(self._link(element, "name"))[-1:]
+        for element in group.children_with_tag("chain"):
             joints += self._chain(element)
-        found = {joint.name: joint for joint in joints}
-        for element in group.all("group"):
+        by_name = {joint.name: joint for joint in joints}
+        for element in group.children_with_tag("group"):
             inner = element.attributes.get("name", "")
             if inner not in self._groups:
                 self._problems.fail(element.line, f"there is no group {quoted(inner)}")
-            found |= self._joints(inner, (*around, name))
-        return found
+            by_name |= self._joints(inner, (*around, name))
+        return by_name
 
     def _joint(self, element: Element) -> UrdfJoint:
         name = element.attributes.get("name", "")
@@ -116,7 +116,7 @@ class _Groups:
 
     def _chain(self, element: Element) -> list[UrdfJoint]:
         base, tip = self._link(element, "base_link"), self._link(element, "tip_link")
-        path = self._urdf.above(tip)
+        path = self._urdf.joints_above(tip)
         start = [number for number, joint in enumerate(path) if joint.parent == base]
         if not start:
             self._problems.fail(element.line, f"the link {quoted(tip)} does not hang below {quoted(base)}")

@@ -220,7 +220,7 @@ class Unread:
     """
 
     def __init__(self, file: str, root: Element) -> None:
-        names = (joint.attributes.get("name", "").strip() for joint in root.all("joint"))
+        names = (joint.attributes.get("name", "").strip() for joint in root.children_with_tag("joint"))
         self.left_out: dict[str, list[tuple[str, str]]] = {name: [] for name in names}
         self._file = file
         self._warnings: dict[str, tuple[str, list[int]]] = {}
@@ -238,46 +238,48 @@ class Unread:
 
 def sort_words(root: Element, unread: Unread, problems: Problems) -> None:
     """Note the words of a file that the reader does not use: as left out, as warnings, or as problems."""
-    for joint, element, rule in _ruled(root, ROBOT, ""):
-        for phrase in _left_out(element, rule):
+    for joint, element, rule in _elements_with_rules(root, ROBOT, ""):
+        for phrase in _describe_omissions(element, rule):
             if joint in unread.left_out:
                 unread.left_out[joint].append((f"{phrase} left out", ""))
             else:
                 unread.warn(element.line, f"{phrase} is left out")
-        for word, line, _ in _words(element):
-            if refusal := _refusal(word, element, rule, problems.file):
+        for word, line, _ in _words_with_lines(element):
+            if refusal := _describe_refusal(word, element, rule, problems.file):
                 problems.add(line, refusal)
             elif _is_unknown(word, rule):
-                unread.warn(line, f"unknown {_subject(word, element)} is ignored")
+                unread.warn(line, f"unknown {_name_subject(word, element)} is ignored")
         if element.text and not rule.has_text:
             unread.warn(element.line, f"text of <{element.tag}> is ignored")
 
 
-def _ruled(element: Element, rule: ElementRule, joint: str) -> Iterator[tuple[str, Element, ElementRule]]:
+def _elements_with_rules(
+    element: Element, rule: ElementRule, joint: str
+) -> Iterator[tuple[str, Element, ElementRule]]:
     """Yield elements that are read, each with the name of the joint that it is about, and its rule."""
-    named = next(element.all("joint"), element) if rule is TRANSMISSION else element
+    named = next(element.children_with_tag("joint"), element) if rule is TRANSMISSION else element
     joint = named.attributes.get({"joint": "name", "gazebo": "reference"}.get(named.tag, ""), joint).strip()
     yield joint, element, rule
     for child in element.children:
         if child.tag in rule.children:
-            yield from _ruled(child, rule.children[child.tag], joint)
+            yield from _elements_with_rules(child, rule.children[child.tag], joint)
 
 
-def _words(element: Element) -> Iterator[tuple[str, int, str]]:
+def _words_with_lines(element: Element) -> Iterator[tuple[str, int, str]]:
     """Yield each word in an element, its line, and its value or content."""
     yield from ((f"@{name}", element.line, text) for name, text in element.attributes.items())
     for child in element.children:
         yield child.tag, child.line, " ".join([child.text, *child.attributes.values()])
 
 
-def _shown(word: str) -> str:
+def _quote_word(word: str) -> str:
     """Return a word as it stands in messages."""
     return quoted(word[1:]) if word.startswith("@") else f"<{quoted(word)[1:-1]}>"
 
 
-def _subject(word: str, element: Element) -> str:
+def _name_subject(word: str, element: Element) -> str:
     kind = "attribute" if word.startswith("@") else "element"
-    return f"{kind} {_shown(word)} of <{element.tag}>"
+    return f"{kind} {_quote_word(word)} of <{element.tag}>"
 
 
 def _is_unknown(word: str, rule: ElementRule) -> bool:
@@ -286,16 +288,16 @@ def _is_unknown(word: str, rule: ElementRule) -> bool:
     return word not in listed and word[: word.find(":") + 1] not in listed
 
 
-def _left_out(element: Element, rule: ElementRule) -> Iterator[str]:
+def _describe_omissions(element: Element, rule: ElementRule) -> Iterator[str]:
     """Yield phrases on words that a robot file cannot express, unless they say as much as none."""
     phrases = {
         word: rule.left_out[word].phrase
-        for word, _, text in _words(element)
+        for word, _, text in _words_with_lines(element)
         if word in rule.left_out and not _is_neutral(text, rule.left_out[word].neutral)
     }
     yield from filter(None, phrases.values())
     if bare := [word for word, phrase in phrases.items() if not phrase]:
-        names = (word[1:] if word.startswith("@") else _shown(word) for word in bare)
+        names = (word[1:] if word.startswith("@") else _quote_word(word) for word in bare)
         yield f"{', '.join(names)} of <{element.tag}>"
 
 
@@ -306,24 +308,24 @@ def _is_neutral(text: str, neutral: tuple[str, ...]) -> bool:
     )
 
 
-def _refusal(word: str, element: Element, rule: ElementRule, file: str) -> str:
+def _describe_refusal(word: str, element: Element, rule: ElementRule, file: str) -> str:
     """Return why a word must not be ignored; empty if it may be."""
     if word in rule.refused:
-        return f"{_subject(word, element)} is not read; {rule.refused[word]}"
+        return f"{_name_subject(word, element)} is not read; {rule.refused[word]}"
     if not _is_unknown(word, rule):
         return ""
     if near := difflib.get_close_matches(word.lower(), [*rule.used, *rule.children], n=1, cutoff=MISSPELLED):
-        return f"unknown {_subject(word, element)}; did you mean {_shown(near[0])}?"
+        return f"unknown {_name_subject(word, element)}; did you mean {_quote_word(near[0])}?"
     if _may_be_a_macro(word, element, rule):
         reason = "may stand for links, joints or masses, as a macro that was not expanded"
-        return f"unknown {_subject(word, element)} {reason}; {expansion(file)}, or remove it"
+        return f"unknown {_name_subject(word, element)} {reason}; {expansion(file)}, or remove it"
     return ""
 
 
 def _may_be_a_macro(word: str, element: Element, rule: ElementRule) -> bool:
     """Return whether an unknown element is beside links and joints, has some, or is in place of a mass."""
-    inner = {part.tag for child in element.all(word) for part in child.everything()}
-    in_place_of_mass = rule is LINK and not any(element.all("inertial"))
+    inner = {part.tag for child in element.children_with_tag(word) for part in child.with_descendants()}
+    in_place_of_mass = rule is LINK and not any(element.children_with_tag("inertial"))
     return bool(inner) and (
         rule is ROBOT
         or in_place_of_mass
@@ -344,8 +346,8 @@ def refuse_macros(root: Element, problems: Problems) -> None:
     Raises:
         InputError: there is one.
     """
-    for element in root.everything():
-        macros = [_shown(element.tag)] if element.tag.startswith("xacro:") else []
+    for element in root.with_descendants():
+        macros = [_quote_word(element.tag)] if element.tag.startswith("xacro:") else []
         values = (word for name, word in element.attributes.items() if name != MESH)
         macros += [quoted(word) for word in values if MACRO.search(word)]
         for macro in macros:

@@ -29,13 +29,13 @@ class Element:
         """Text of the element, without surrounding whitespace."""
         return "".join(self.texts).strip()
 
-    def everything(self) -> Iterator[Element]:
+    def with_descendants(self) -> Iterator[Element]:
         """Yield the element and all its descendants."""
         yield self
         for child in self.children:
-            yield from child.everything()
+            yield from child.with_descendants()
 
-    def all(self, tag: str) -> Iterator[Element]:
+    def children_with_tag(self, tag: str) -> Iterator[Element]:
         """Return the children with a tag."""
         return (child for child in self.children if child.tag == tag)
 
@@ -52,10 +52,10 @@ def parse_xml(text: str, problems: Problems, expected: str) -> Element:
             or a limit is exceeded.
     """
     if not text.lstrip().startswith("<"):
-        found = "a CSV table" if is_table(problems.file) else "a YAML file" if _YAML.match(text) else ""
-        if found:
-            problems.fail(0, f"is {found}, expected {expected} (XML)")
-    builder = _Builder(problems)
+        content = "a CSV table" if is_table(problems.file) else "a YAML file" if _YAML.match(text) else ""
+        if content:
+            problems.fail(0, f"is {content}, expected {expected} (XML)")
+    builder = _XmlTreeBuilder(problems)
     try:
         builder.parser.Parse(text, True)
     except expat.ExpatError as error:
@@ -64,7 +64,7 @@ def parse_xml(text: str, problems: Problems, expected: str) -> Element:
     return builder.root
 
 
-class _Builder:
+class _XmlTreeBuilder:
     """A builder of the tree from the events of the parser; `root` is its result."""
 
     root: Element

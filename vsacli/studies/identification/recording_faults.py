@@ -18,7 +18,7 @@ from vsacli.studies.identification.recorded_columns import (
     TORQUE,
     Column,
 )
-from vsacli.trajectory.recorded.faults import wraps
+from vsacli.trajectory.recorded.faults import angle_wraps
 from vsacli.trajectory.recorded.health import column_faults
 from vsacli.trajectory.recorded.quantization import Quantization
 from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
@@ -129,7 +129,7 @@ def _position_clauses(column: Column, robot: Robot) -> Iterator[str]:
     turns = robot.joints[index].is_revolute
     follows = motor is None or robot.joints[index].actuator.has(VARIABLES["phi"])[motor - 1]
     largest = float(np.max(np.abs(column.values), initial=0.0))
-    jumps = wraps(column.values) if turns else None
+    jumps = angle_wraps(column.values) if turns else None
     if jumps is not None:
         when = time_text(float(column.time[jumps.at]))
         yield f"jumps by 2 pi at t = {when}, a wrapped angle: unwrap it"

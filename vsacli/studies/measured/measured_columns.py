@@ -225,7 +225,7 @@ def _other_joints(header: ColumnNames, places: Mapping[str, Place], robot: str) 
     own = tuple(f"{joint}." for joint in header.joint_names)
     parts = [(name, *name.rpartition(".")) for name in header.names if not name.startswith(own)]
     columns = {name: joint for name, joint, _, ending in parts if joint and ending in endings}
-    meant = header.misspelled(columns, [name for name in places if name not in header.names])
+    meant = header.find_intended_columns(columns, [name for name in places if name not in header.names])
     if len(meant) == len(columns):
         return "; ".join(misspellings(meant))
     joints = dict.fromkeys(columns.values())
@@ -248,8 +248,10 @@ def _unusable(header: ColumnNames, places: Mapping[str, Place], stranger: str) -
     if header.is_foreign:
         yield stranger or _no_column(header, places)
         return
-    yield from header.of_names()
-    yield from header.of_time("if the rows are equally spaced, give their rate in a file for --columns")
+    yield from header.naming_problems()
+    yield from header.missing_time_problems(
+        "if the rows are equally spaced, give their rate in a file for --columns"
+    )
     first: dict[Place, str] = {}
     for name in filter(places.get, header.names):
         other = first.setdefault(places[name]._replace(unit="", gear=1.0), name)
@@ -263,7 +265,9 @@ def _no_column(header: ColumnNames, places: Mapping[str, Place]) -> str:
     for name, place in places.items():
         first.setdefault(place.variable, name)
     usual = [first[name] for name in USUAL if name in first] or list(first.values())[:2]
-    near = [f"; {name!r} may be {meant!r}" for name, meant in header.meant.items() if meant in places]
+    near = [
+        f"; {name!r} may be {meant!r}" for name, meant in header.intended_columns.items() if meant in places
+    ]
     hint = f"{''.join(near[:1])}; if they have other names, {header.renaming}"
     return f"expected columns such as {', '.join([TIME, *usual])}{hint}"
 

@@ -15,8 +15,8 @@ from vsacli.trajectory.curves import ClosedForm
 from vsacli.trajectory.fits import INTERPOLATE, FitChoice
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.recorded.even_stamps import elapsed_times, even_rate
-from vsacli.trajectory.recorded.hermite import HermiteSpline, belong_together
-from vsacli.trajectory.recorded.samples import SampledProfile, Samples
+from vsacli.trajectory.recorded.hermite import HermiteSpline, derivatives_are_consistent
+from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples
 from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -133,7 +133,7 @@ def _has_derivatives(trajectory: Trajectory) -> bool:
 def _resampled(profile: Profile, start: float) -> Profile:
     """Return a profile that is resampled from a fit; values at samples are interpolated by a new fit."""
     if isinstance(profile, HermiteSpline):
-        samples = Samples(
+        samples = SignalSamples(
             signal=profile.signal,
             time=profile.time,
             values=profile.rows[0],
@@ -165,7 +165,7 @@ def as_one_function(trajectory: Trajectory) -> Trajectory:
 def reads_back(trajectory: Trajectory) -> bool:
     """Return whether a reader takes each signal given at the samples for one function between them."""
     return all(
-        belong_together(profile.time, profile.rows)
+        derivatives_are_consistent(profile.time, profile.rows)
         for _, profile in trajectory.profiles()
         if isinstance(profile, HermiteSpline)
     )

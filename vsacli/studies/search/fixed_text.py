@@ -21,9 +21,9 @@ from vsacli.base.storage import reading_copies, temporary_folder
 from vsacli.documents.edited import MappingNode, Node, ScalarNode, edited, moved_files, node_at, root_of
 from vsacli.documents.source import is_table
 from vsacli.studies.search.fix_report import Fix
-from vsacli.trajectory.curves import ClosedForm, Constant, RestToRest
+from vsacli.trajectory.curves import ClosedForm, ConstantProfile, RestToRest
 from vsacli.trajectory.curves.sinusoids import Sinusoids
-from vsacli.trajectory.curves.steps import Chain
+from vsacli.trajectory.curves.steps import PiecewiseProfile
 from vsacli.trajectory.curves.via_points import ViaPoints
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.profile import Profile
@@ -38,14 +38,14 @@ def formula(profile: Profile) -> dict[str, Any] | None:
     match profile:
         case RestToRest(degree=degree, start=start, end=end):
             return {"type": "polynomial", "degree": degree, "start": _values(start), "end": _values(end)}
-        case Constant(value=value):
+        case ConstantProfile(value=value):
             return {"type": "constant", "value": _values(value)}
         case ViaPoints(degree=degree, points=points, breakpoints=passed):
             times = (passed - passed[0]).tolist()
             return {"type": "via", "degree": degree, "points": list(map(_values, points)), "times": times}
         case Sinusoids():
             return _sinusoids(profile)
-        case Chain():
+        case PiecewiseProfile():
             return _sequence(profile) if profile.signal is POSITION else _steps(profile)
     return None
 
@@ -61,23 +61,23 @@ def _sinusoids(profile: Sinusoids) -> dict[str, Any]:
     }
 
 
-def _sequence(chain: Chain) -> dict[str, Any] | None:
+def _sequence(chain: PiecewiseProfile) -> dict[str, Any] | None:
     """Return the keys of a sequence: its parts with their durations, constant ones as dwells."""
     parts = []
     for part in chain.parts:
         declared = formula(part)
         if declared is None:
             return None
-        if isinstance(part, Constant):
+        if isinstance(part, ConstantProfile):
             declared = {"type": "dwell"}
         parts.append(declared if "times" in declared else {**declared, "duration": _length(part)})
     return {"type": "sequence", "parts": parts}
 
 
-def changes_of_steps(chain: Chain) -> list[RestToRest] | None:
+def changes_of_steps(chain: PiecewiseProfile) -> list[RestToRest] | None:
     """Return the transitions of a step profile, which have equal durations; None for another chain."""
     changes = [part for part in chain.parts if isinstance(part, RestToRest)]
-    held = [part for part in chain.parts if isinstance(part, Constant)]
+    held = [part for part in chain.parts if isinstance(part, ConstantProfile)]
     durations = list(map(_length, changes))
     if len(changes) + len(held) < len(chain.parts) or not changes:
         return None
@@ -88,7 +88,7 @@ def changes_of_steps(chain: Chain) -> list[RestToRest] | None:
     return changes
 
 
-def _steps(chain: Chain) -> dict[str, Any] | None:
+def _steps(chain: PiecewiseProfile) -> dict[str, Any] | None:
     """Return the keys of a step profile: levels, start times and duration of its transitions."""
     changes = changes_of_steps(chain)
     if changes is None:

@@ -14,7 +14,7 @@ from vsacli.studies.search.fixed_text import changes_of_steps
 from vsacli.studies.search.loads import TaskSamples
 from vsacli.studies.search.scans import WATCHED_STEPS, smallest_confirmed
 from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.curves.steps import Chain, stepwise
+from vsacli.trajectory.curves.steps import PiecewiseProfile, profile_of_levels
 from vsacli.trajectory.trajectory import Trajectory
 
 DIGITS = 3
@@ -29,7 +29,7 @@ def has_transitions(trajectory: Trajectory) -> bool:
 def _changes(trajectory: Trajectory) -> list[RestToRest]:
     """Return the transitions between levels; none if the stiffness is another curve."""
     stiffness = trajectory.commanded[STIFFNESS.key]
-    return (changes_of_steps(stiffness) or []) if isinstance(stiffness, Chain) else []
+    return (changes_of_steps(stiffness) or []) if isinstance(stiffness, PiecewiseProfile) else []
 
 
 def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple[float, float, Trajectory]:
@@ -88,7 +88,7 @@ class _Transitions:
             (change.span[0], min(change.span[0] + length, limit))
             for change, limit in zip(self._changes, self._limits, strict=True)
         ]
-        profile = stepwise(STIFFNESS, (0.0, self._trajectory.duration), first.degree, levels, spans)
+        profile = profile_of_levels(STIFFNESS, (0.0, self._trajectory.duration), first.degree, levels, spans)
         return with_stiffness(self._trajectory, profile)
 
     def stride(self, number: int) -> int:

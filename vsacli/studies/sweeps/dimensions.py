@@ -31,7 +31,7 @@ from vsacli.robot.file import ReadRobot
 from vsacli.robot.model import Robot
 from vsacli.studies.sensitivities.tolerances import Tolerance, distribution
 from vsacli.studies.sweeps.study_file import GRID, Drawn, Linked, Listed, Ranged, Spaced, StudyFile, Varied
-from vsacli.trajectory.changes import divided
+from vsacli.trajectory.changes import divide_changes_by_file
 from vsacli.trajectory.file import read_trajectory
 
 MOST_VALUES = 1_000_000
@@ -266,7 +266,7 @@ class Entries:
         return file_numbers(every, self._joints.types)
 
     def _change(self, path: str, value: object) -> None:
-        changes = divided({path: value})
+        changes = divide_changes_by_file({path: value})
         if changes.trajectory and self._tables:
             raise ChangeError.one("a trajectory of the study is a table, in which nothing can be set")
         if changes.robot:

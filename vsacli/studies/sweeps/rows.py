@@ -23,8 +23,8 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.columns import Recorder, first_limit, scalars
 from vsacli.studies.sweeps.study import ChangedError, Point, Study, load_study
-from vsacli.trajectory.changes import Divided
-from vsacli.trajectory.devices import with_devices
+from vsacli.trajectory.changes import ChangesByFile
+from vsacli.trajectory.devices import set_uncommanded_dampers
 from vsacli.trajectory.file import declared_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -115,7 +115,7 @@ class Computer:
             raise InputError.one(
                 "joints have other names than in the robot file, so that rows would not compare"
             )
-        trajectory = with_devices(self._trajectory(robot, point.trajectory, changes), robot)
+        trajectory = set_uncommanded_dampers(self._trajectory(robot, point.trajectory, changes), robot)
         self._study.check_read([*robot.sources, *trajectory.sources])
         costs, optimize = list[FloatArray](), self._study.file.optimize
         if optimize is not None:
@@ -131,7 +131,7 @@ class Computer:
         values = np.concatenate([*costs, scalars(self._study.kept, report)])
         return Row(run, key, report.verdict, first_limit(report.joints), "", values, recorder.curves)
 
-    def _trajectory(self, robot: Robot, index: int, changes: Divided) -> Trajectory:
+    def _trajectory(self, robot: Robot, index: int, changes: ChangesByFile) -> Trajectory:
         place, joints = (index, json.dumps(changes.trajectory)), CommandedJoints.of(robot)
         if self._read is None or self._read[:2] != (place, joints):
             declared = declared_trajectory(self._study.trajectories[index], robot, changes.trajectory)

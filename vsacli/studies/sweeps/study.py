@@ -31,7 +31,7 @@ from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.columns import KEPT, Column, over_time
 from vsacli.studies.sweeps.dimensions import Design, Dimension, Entries
 from vsacli.studies.sweeps.study_file import StudyFile
-from vsacli.trajectory.changes import Divided, divided
+from vsacli.trajectory.changes import ChangesByFile, divide_changes_by_file
 from vsacli.trajectory.file import load_trajectory
 
 
@@ -59,8 +59,10 @@ def _samples(
     robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
 ) -> int:
     """Return the samples in all runs of one robot, assuming those of the first run of each trajectory."""
-    changes = divided(design.values(0)).trajectory
-    robots = design.different([each for each in dimensions if divided({each.path: None}).robot])
+    changes = divide_changes_by_file(design.values(0)).trajectory
+    robots = design.different(
+        [each for each in dimensions if divide_changes_by_file({each.path: None}).robot]
+    )
     return sum(_steps(path, robot, changes) for path in trajectories) * design.points // robots
 
 
@@ -83,9 +85,9 @@ class Point(NamedTuple):
     values: dict[str, Any]
 
     @property
-    def changes(self) -> Divided:
+    def changes(self) -> ChangesByFile:
         """Values divided into those for the robot file and those for the trajectory file."""
-        return divided(self.values)
+        return divide_changes_by_file(self.values)
 
 
 @dataclass(frozen=True)

@@ -85,13 +85,13 @@ class ClosedForm(ABC):
         """Return the profile with a constant added to each component."""
 
 
-def added(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
+def add_constants(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
     """Return the sums of two values for each component."""
     return tuple(value + constant for value, constant in zip(values, by, strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
-class Constant(ClosedForm):
+class ConstantProfile(ClosedForm):
     """A constant `value`, one number per component."""
 
     value: tuple[float, ...]
@@ -109,4 +109,4 @@ class Constant(ClosedForm):
 
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
-        return replace(self, value=added(self.value, by))
+        return replace(self, value=add_constants(self.value, by))

@@ -133,12 +133,12 @@ class Declaration(DeclaredRecord, ABC):
     @classmethod
     def record(cls, use: Use) -> type[Self]:
         """Return the record class for a use."""
-        made: type[Self] = _record(cls, use)
+        made: type[Self] = _declare_record(cls, use)
         return made
 
 
 @cache
-def _record(cls: type[Declaration], use: Use) -> Any:
+def _declare_record(cls: type[Declaration], use: Use) -> Any:
     fields = [(name, Any, field) for name, field in cls.fields(use).items()]
     name = f"{'Rigid' if use.rigid else ''}{use.signal.key.capitalize()}{cls.__name__}"
     namespace = {"__doc__": cls.meaning(use), "use": use}
@@ -228,7 +228,7 @@ class Formula(Declaration):
         return None
 
     @abstractmethod
-    def over(self, span: tuple[float, float]) -> ClosedForm:
+    def profile_over(self, span: tuple[float, float]) -> ClosedForm:
         """Return the profile over a span, s."""
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
@@ -237,7 +237,7 @@ class Formula(Declaration):
             yield FieldProblem((), f"lasts {self.lasts:.10g} s, but the trajectory {duration:.10g} s")
             return
         try:
-            self.over((0.0, duration)).at(np.zeros(1))
+            self.profile_over((0.0, duration)).at(np.zeros(1))
         except InputError as error:
             yield FieldProblem((), str(error))
 
@@ -260,6 +260,6 @@ def same_time(one: float, other: float) -> bool:
     return math.isclose(one, other, rel_tol=SAME_TIME)
 
 
-def numbers(values: Values) -> tuple[float, ...]:
+def nan_for_none(values: Values) -> tuple[float, ...]:
     """Return values with NaN in place of None."""
     return tuple(math.nan if value is None else value for value in values)

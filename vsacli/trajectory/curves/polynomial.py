@@ -16,8 +16,8 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, WRENCH
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.fields import integer
-from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, Constant, added
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, numbers
+from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile, add_constants
+from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,13 +56,15 @@ class RestToRest(ClosedForm):
         rise = _rise(np.minimum(elapsed, remaining) / (last - first), self.degree)
         np.multiply.outer(end - start, np.where(late, -rise, rise), out=rows[0])
         rows[0] += np.where(late, end[:, None], start[:, None])
-        for row, rate in zip(rows[1:], _rates(elapsed, remaining, last - first, self.degree), strict=False):
+        for row, rate in zip(
+            rows[1:], _rise_rates(elapsed, remaining, last - first, self.degree), strict=False
+        ):
             np.multiply.outer(end - start, rate, out=row)
         return rows
 
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
-        return replace(self, start=added(self.start, by), end=added(self.end, by))
+        return replace(self, start=add_constants(self.start, by), end=add_constants(self.end, by))
 
 
 def _rise(u: FloatArray, degree: int) -> FloatArray:
@@ -73,10 +75,12 @@ def _rise(u: FloatArray, degree: int) -> FloatArray:
     """
     m = (degree - 1) // 2
     series = np.polyval([math.comb(m + k, k) for k in range(m, -1, -1)], 1 - u)
-    return series * _power(u, m + 1)
+    return series * _integer_power(u, m + 1)
 
 
-def _rates(elapsed: FloatArray, remaining: FloatArray, total: float, degree: int) -> Iterator[FloatArray]:
+def _rise_rates(
+    elapsed: FloatArray, remaining: FloatArray, total: float, degree: int
+) -> Iterator[FloatArray]:
     """Yield the time derivatives of order 1, 2, ... of the polynomial `_rise`.
 
     The first is c p^m / T with p = s (1-s), s = elapsed / T, m = (degree-1)/2 and c = degree! / m!^2. Since
@@ -89,12 +93,12 @@ def _rates(elapsed: FloatArray, remaining: FloatArray, total: float, degree: int
     while True:
         rate = np.zeros_like(p)
         for (i, j), c in terms.items():
-            rate += c / scale * _power(p, i) * _power(slope, j)
+            rate += c / scale * _integer_power(p, i) * _integer_power(slope, j)
         yield rate
-        terms, scale = _derivative(terms), scale * total
+        terms, scale = _differentiate_terms(terms), scale * total
 
 
-def _derivative(terms: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
+def _differentiate_terms(terms: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
     """Return d/ds of the sum of terms c p^i (1-2s)^j, given and returned as {(i, j): c}."""
     result: dict[tuple[int, int], float] = defaultdict(float)
     for (i, j), c in terms.items():
@@ -105,7 +109,7 @@ def _derivative(terms: dict[tuple[int, int], float]) -> dict[tuple[int, int], fl
     return result
 
 
-def _power(base: FloatArray, exponent: int) -> FloatArray:
+def _integer_power(base: FloatArray, exponent: int) -> FloatArray:
     """Return base^exponent by multiplication, which is much faster than `**` on arrays."""
     return reduce(np.multiply, [base] * exponent, np.ones_like(base))
 
@@ -139,14 +143,14 @@ class Polynomial(Formula):
     def meaning(cls, use: Use) -> str:
         """Return the meaning for users."""
         if use.rigid:
-            same = "The same for a robot whose joints are all rigid"
-            return f"{same}: its torques do not depend on jerk and snap."
-        way = "Rest to rest" if use.signal is POSITION else f"From one {use.signal.key} to another"
-        return f"{way}: all derivatives up to (degree-1)/2 vanish at both ends."
+            sentence = "The same for a robot whose joints are all rigid"
+            return f"{sentence}: its torques do not depend on jerk and snap."
+        sentence = "Rest to rest" if use.signal is POSITION else f"From one {use.signal.key} to another"
+        return f"{sentence}: all derivatives up to (degree-1)/2 vanish at both ends."
 
-    def over(self, span: tuple[float, float]) -> RestToRest:
-        """See `Formula.over`."""
-        start, end = numbers(self.start), numbers(self.end)
+    def profile_over(self, span: tuple[float, float]) -> RestToRest:
+        """See `Formula.profile_over`."""
+        start, end = nan_for_none(self.start), nan_for_none(self.end)
         return RestToRest(signal=self.signal, span=span, degree=self.degree, start=start, end=end)
 
 
@@ -167,6 +171,6 @@ class Hold(Formula):
             return "The robot stands still."
         return f"Constant {use.signal.key}."
 
-    def over(self, span: tuple[float, float]) -> Constant:
-        """See `Formula.over`."""
-        return Constant(signal=self.signal, span=span, value=numbers(self.value))
+    def profile_over(self, span: tuple[float, float]) -> ConstantProfile:
+        """See `Formula.profile_over`."""
+        return ConstantProfile(signal=self.signal, span=span, value=nan_for_none(self.value))

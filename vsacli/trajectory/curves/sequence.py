@@ -14,17 +14,17 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import POSITIVE, Items, OneOf, integer, number, value
-from vsacli.trajectory.curves.closed_form import DEGREES, LONGEST, SHORTEST, ClosedForm, Constant
+from vsacli.trajectory.curves.closed_form import DEGREES, LONGEST, SHORTEST, ClosedForm, ConstantProfile
 from vsacli.trajectory.curves.declaration import Declaration, Formula, Use, same_time
 from vsacli.trajectory.curves.polynomial import RestToRest
 from vsacli.trajectory.curves.sinusoids import SumOfSinusoids
-from vsacli.trajectory.curves.steps import Chain, Jump
+from vsacli.trajectory.curves.steps import Jump, PiecewiseProfile
 from vsacli.trajectory.curves.via_points import Via
 
 Position: TypeAlias = tuple[float, ...]
 
 
-class Part(Declaration):
+class SequencePart(Declaration):
     """A motion with a duration of its own, whose start may follow from the previous part."""
 
     opening: ClassVar[tuple[str | int, ...]]
@@ -41,15 +41,15 @@ class Part(Declaration):
         """Position at the start; None if it is the end of the previous part."""
 
     @abstractmethod
-    def placed(self, span: tuple[float, float], here: Position) -> ClosedForm:
-        """Return the profile over a span, s, after a part that ends at position `here`."""
+    def placed(self, span: tuple[float, float], start_position: Position) -> ClosedForm:
+        """Return the profile over a span, s, after a part that ends at position `start_position`."""
 
     def own_problems(self) -> Iterator[FieldProblem]:
         """Yield the problems of the part alone."""
         return iter(())
 
 
-class _Timed(Part):
+class _Timed(SequencePart):
     """A part with a required duration."""
 
     duration: float
@@ -71,9 +71,9 @@ class Dwell(_Timed):
     opening = ()
     begins = None
 
-    def placed(self, span: tuple[float, float], here: Position) -> Constant:
-        """See `Part.placed`."""
-        return Constant(signal=POSITION, span=span, value=here)
+    def placed(self, span: tuple[float, float], start_position: Position) -> ConstantProfile:
+        """See `SequencePart.placed`."""
+        return ConstantProfile(signal=POSITION, span=span, value=start_position)
 
 
 class PolynomialPart(_Timed):
@@ -104,16 +104,16 @@ class PolynomialPart(_Timed):
 
     @property
     def begins(self) -> Position | None:
-        """See `Part.begins`."""
+        """See `SequencePart.begins`."""
         return self.start
 
-    def placed(self, span: tuple[float, float], here: Position) -> RestToRest:
-        """See `Part.placed`."""
-        start = here if self.start is None else self.start
+    def placed(self, span: tuple[float, float], start_position: Position) -> RestToRest:
+        """See `SequencePart.placed`."""
+        start = start_position if self.start is None else self.start
         return RestToRest(signal=POSITION, span=span, degree=self.degree, start=start, end=self.end)
 
 
-class _Standalone(Formula, Part):
+class _Standalone(Formula, SequencePart):
     """A formula that is also a part; its start does not depend on the previous part."""
 
     @property
@@ -124,15 +124,15 @@ class _Standalone(Formula, Part):
     @property
     def begins(self) -> Position:
         """Position at the start."""
-        start: Position = tuple(self.over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
+        start: Position = tuple(self.profile_over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
         return start
 
-    def placed(self, span: tuple[float, float], _here: Position) -> ClosedForm:
-        """See `Part.placed`."""
-        return self.over(span)
+    def placed(self, span: tuple[float, float], _start_position: Position) -> ClosedForm:
+        """See `SequencePart.placed`."""
+        return self.profile_over(span)
 
     def own_problems(self) -> Iterator[FieldProblem]:
-        """See `Part.own_problems`."""
+        """See `SequencePart.own_problems`."""
         return self.problems_over(self.lasts)
 
 
@@ -189,7 +189,7 @@ class SinusoidsPart(SumOfSinusoids, _Standalone):
         return self.duration
 
 
-PARTS: dict[str, type[Part]] = {
+PARTS: dict[str, type[SequencePart]] = {
     "polynomial": PolynomialPart,
     "via": ViaPart,
     "sinusoids": SinusoidsPart,
@@ -200,7 +200,7 @@ PARTS: dict[str, type[Part]] = {
 class Sequence(Formula):
     """Parts one after the other. Each begins as the one before ends, to the fourth derivative."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[SequencePart, ...]
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
@@ -238,7 +238,7 @@ class Sequence(Formula):
 
     def _discontinuities(self) -> Iterator[FieldProblem]:
         with np.errstate(all="ignore"):  # too large numbers are reported elsewhere
-            jumps = list(self.over((0.0, self.lasts)).jumps(self.use.smoothness + 1))
+            jumps = list(self.profile_over((0.0, self.lasts)).jumps(self.use.smoothness + 1))
         for jump in jumps:
             part = ("parts", jump.part)
             if jump.order == 0:
@@ -264,16 +264,18 @@ class Sequence(Formula):
         """Sum of the durations, s."""
         return float(self._ends()[-1])
 
-    def over(self, span: tuple[float, float]) -> Chain:
-        """See `Formula.over`."""
-        return Chain(signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span)))
+    def profile_over(self, span: tuple[float, float]) -> PiecewiseProfile:
+        """See `Formula.profile_over`."""
+        return PiecewiseProfile(
+            signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span))
+        )
 
-    def _placed(self, span: tuple[float, float]) -> Iterator[tuple[Part, ClosedForm]]:
+    def _placed(self, span: tuple[float, float]) -> Iterator[tuple[SequencePart, ClosedForm]]:
         ends = [*(span[0] + (span[1] - span[0]) * self._ends()[:-1] / self.lasts).tolist(), span[1]]
-        here = next(part.begins for part in self.parts if part.begins is not None)
+        start_position = next(part.begins for part in self.parts if part.begins is not None)
         for part, piece in zip(self.parts, pairwise(ends), strict=True):
-            profile = part.placed(piece, here)
-            here = tuple(profile.at(np.array(piece[1:]))[0, :, 0].tolist())
+            profile = part.placed(piece, start_position)
+            start_position = tuple(profile.at(np.array(piece[1:]))[0, :, 0].tolist())
             yield part, profile
 
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:

@@ -14,9 +14,9 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, number, value
-from vsacli.trajectory.curves.closed_form import ClosedForm, added
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, numbers
-from vsacli.trajectory.curves.steps import stepwise
+from vsacli.trajectory.curves.closed_form import ClosedForm, add_constants
+from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
+from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.times import MAX_STEPS
 
 RAMP_DEGREE = 9
@@ -85,19 +85,21 @@ class Sinusoids(ClosedForm):
         """See `ClosedForm.at`."""
         rows = self._series(time)
         if self.ramp:
-            window = stepwise(self.signal, self.span, RAMP_DEGREE, ((0.0,), (1.0,), (0.0,)), self._ramps())
+            window = profile_of_levels(
+                self.signal, self.span, RAMP_DEGREE, ((0.0,), (1.0,), (0.0,)), self._ramps()
+            )
             rows = _product(window.at(time), rows)
         rows[0] += np.array(self.offset)[:, None]
         return rows
 
     def lowest(self) -> Lowest:
         """Return the smallest values over the span."""
-        stretches = [self._sampled_lowest(time) for time in self._searched()]
+        stretches = [self._sampled_lowest(time) for time in self._times_to_search()]
         values, times = (np.stack(rows) for rows in zip(*stretches, strict=True))
         first = np.nan_to_num(values, nan=np.inf).argmin(axis=0), np.arange(self.components)
         return Lowest(values[first], times[first])
 
-    def _searched(self) -> Iterator[FloatArray]:
+    def _times_to_search(self) -> Iterator[FloatArray]:
         """Yield ascending times of stretches that together contain the smallest value.
 
         Between the ramps one period is enough. In a ramp, the period next to the middle of the span is
@@ -119,13 +121,13 @@ class Sinusoids(ClosedForm):
     def _sampled_lowest(self, time: FloatArray) -> Lowest:
         """Return the smallest of the values at ascending times and at the minima next to them."""
         values = self.at(time)[0]
-        found = Lowest(np.full(self.components, np.nan), np.full(self.components, np.nan))
+        lowest = Lowest(np.full(self.components, np.nan), np.full(self.components, np.nan))
         for component in np.flatnonzero(~np.isnan(values[:, 0])).tolist():
             times = np.union1d(time, self._minima(time, values[component], component))
             of_component = self.at(times)[0, component]
             best = of_component.argmin()
-            found.value[component], found.at[component] = of_component[best], times[best]
-        return found
+            lowest.value[component], lowest.at[component] = of_component[best], times[best]
+        return lowest
 
     def _minima(self, time: FloatArray, values: FloatArray, component: int) -> FloatArray:
         """Return the times of minima, by bisection next to samples without a smaller neighbor."""
@@ -141,7 +143,7 @@ class Sinusoids(ClosedForm):
 
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
-        return replace(self, offset=added(self.offset, by))
+        return replace(self, offset=add_constants(self.offset, by))
 
     def _series(self, time: FloatArray) -> FloatArray:
         first, last = self.span
@@ -229,16 +231,16 @@ class SumOfSinusoids(Formula):
             if count > MAX_HARMONICS:
                 yield FieldProblem((name,), f"at most {MAX_HARMONICS} harmonics are possible, not {count}")
 
-    def over(self, span: tuple[float, float]) -> Sinusoids:
-        """See `Formula.over`."""
+    def profile_over(self, span: tuple[float, float]) -> Sinusoids:
+        """See `Formula.profile_over`."""
         duration = span[1] - span[0]
         return Sinusoids(
             signal=self.signal,
             span=span,
             cycles=self.frequency * duration,
-            offset=numbers(self.offset),
-            sine=tuple(map(numbers, self.sine)),
-            cosine=tuple(map(numbers, self.cosine)),
+            offset=nan_for_none(self.offset),
+            sine=tuple(map(nan_for_none, self.sine)),
+            cosine=tuple(map(nan_for_none, self.cosine)),
             ramp=self.ramp / duration,
         )
 
@@ -258,7 +260,7 @@ class SumOfSinusoids(Formula):
         """Yield a problem for each component of a signal that must stay positive but does not."""
         if not self.signal.positive:
             return
-        lowest, when = self.over((0.0, duration)).lowest()
+        lowest, when = self.profile_over((0.0, duration)).lowest()
         offset = np.array(self.offset, dtype=np.float64)
         for joint in np.flatnonzero(lowest <= LEAST_SHARE * offset).tolist():
             fall = f"the sum falls to {lowest[joint]:.4g} after {when[joint]:.3f} s"

@@ -15,8 +15,8 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import WRENCH, Signal
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, Number, integer, number, value
-from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, Constant
-from vsacli.trajectory.curves.declaration import SAME_TIME, Formula, Use, Values, numbers, odd
+from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile
+from vsacli.trajectory.curves.declaration import SAME_TIME, Formula, Use, Values, nan_for_none, odd
 from vsacli.trajectory.curves.polynomial import AXES, RestToRest
 from vsacli.trajectory.times import stretch
 
@@ -45,7 +45,7 @@ class Jump(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chain(ClosedForm):
+class PiecewiseProfile(ClosedForm):
     """A sequence of profiles, each of which begins when the previous one ends.
 
     Attributes:
@@ -104,27 +104,29 @@ class Chain(ClosedForm):
         for index, (before, after) in enumerate(pairwise(self.parts), start=1):
             left, right = before.at(np.array(before.span)), after.at(np.array(after.span))
             difference = np.abs(right[:orders, :, 0] - left[:orders, :, 1])
-            peaks = np.maximum(_peaks(before), _peaks(after))[:orders]
-            found = np.argwhere(difference > CONTINUOUS * peaks).tolist()
-            lowest = [(order, component) for order, component in found if order == found[0][0]]
+            peaks = np.maximum(_peak_magnitudes(before), _peak_magnitudes(after))[:orders]
+            discontinuous = np.argwhere(difference > CONTINUOUS * peaks).tolist()
+            lowest = [
+                (order, component) for order, component in discontinuous if order == discontinuous[0][0]
+            ]
             for order, component in lowest if lowest and lowest[0][0] == 0 else lowest[:1]:
                 sides = left[order, component, 1], right[order, component, 0]
                 yield Jump(index, order, component, *map(float, sides))
 
 
-def _peaks(profile: ClosedForm) -> FloatArray:
+def _peak_magnitudes(profile: ClosedForm) -> FloatArray:
     """Return the largest magnitude of each order and component, (orders, components)."""
     peaks: FloatArray = np.abs(profile.at(np.linspace(*profile.span, PROBES))).max(axis=2)
     return peaks
 
 
-def stepwise(
+def profile_of_levels(
     signal: Signal,
     span: tuple[float, float],
     degree: int,
     levels: Sequence[tuple[float, ...]],
     changes: Sequence[tuple[float, float]],
-) -> Chain:
+) -> PiecewiseProfile:
     """Return constant levels with rest-to-rest changes between them.
 
     Args:
@@ -138,12 +140,12 @@ def stepwise(
     held_from = span[0]
     for (before, after), (start, end) in zip(pairwise(levels), changes, strict=True):
         if start > held_from:
-            parts.append(Constant(signal=signal, span=(held_from, start), value=before))
+            parts.append(ConstantProfile(signal=signal, span=(held_from, start), value=before))
         parts.append(RestToRest(signal=signal, span=(start, end), degree=degree, start=before, end=after))
         held_from = end
     if span[1] > held_from:
-        parts.append(Constant(signal=signal, span=(held_from, span[1]), value=levels[-1]))
-    return Chain(signal=signal, span=span, parts=tuple(parts))
+        parts.append(ConstantProfile(signal=signal, span=(held_from, span[1]), value=levels[-1]))
+    return PiecewiseProfile(signal=signal, span=span, parts=tuple(parts))
 
 
 _SMOOTH = "two derivatives must vanish where a change begins"
@@ -189,11 +191,11 @@ class Steps(Formula):
         else:
             yield from super().problems_over(duration)
 
-    def over(self, span: tuple[float, float]) -> Chain:
-        """See `Formula.over`."""
+    def profile_over(self, span: tuple[float, float]) -> PiecewiseProfile:
+        """See `Formula.profile_over`."""
         starts = [span[0] + time for time in self.times]
         ends = [
             min(start + self.transition, after) for start, after in pairwise([*starts, span[1]])
         ]  # rounding must not make them overlap
-        levels, changes = list(map(numbers, self.levels)), list(zip(starts, ends, strict=True))
-        return stepwise(self.signal, span, self.degree, levels, changes)
+        levels, changes = list(map(nan_for_none, self.levels)), list(zip(starts, ends, strict=True))
+        return profile_of_levels(self.signal, span, self.degree, levels, changes)

@@ -16,15 +16,15 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, Items, Number, integer, value
-from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, added
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, numbers
+from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, add_constants
+from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
 SEAM = 1e-9
 """Largest jump between the expansions about two neighboring points, relative to the peak of each derivative;
 it is 1e-13 for well-spaced points."""
 
 
-class Extremes(NamedTuple):
+class ProfileExtremes(NamedTuple):
     """The smallest and largest value of each component, (components,), and their times, s."""
 
     lowest: FloatArray
@@ -79,10 +79,10 @@ class ViaPoints(ClosedForm):
         return times
 
     @cached_property
-    def _given(self) -> BoolArray:
+    def _specified(self) -> BoolArray:
         """Mask of components with values, (components,)."""
-        given: BoolArray = ~np.isnan(self.points[0])
-        return given
+        specified: BoolArray = ~np.isnan(self.points[0])
+        return specified
 
     @cached_property
     def _derivatives(self) -> FloatArray:
@@ -92,7 +92,7 @@ class ViaPoints(ClosedForm):
         """
         from scipy.interpolate import make_interp_spline
 
-        points, shares = np.array(self.points)[:, self._given], np.array(self.shares)
+        points, shares = np.array(self.points)[:, self._specified], np.array(self.shares)
         vanishing = (self.degree - 1) // 2
         rest = [(order, np.zeros(points.shape[1])) for order in range(1, vanishing + 1)]
         with np.errstate(all="ignore"):  # poorly spaced points are refused below
@@ -101,12 +101,12 @@ class ViaPoints(ClosedForm):
                 away = points - points[0]  # zero, and so exact, for a component at rest
                 spline = make_interp_spline(shares, away, k=self.degree, bc_type=ends)
             except (np.linalg.LinAlgError, ValueError):
-                raise _unfit(self.degree) from None
+                raise _degree_error(self.degree) from None
             rows = np.stack([spline(shares, nu=order).T for order in range(self.degree + 1)])
             rows[0] = points.T
             rows[1 : vanishing + 1, :, [0, -1]] = 0.0
             if not _is_smooth(rows, np.diff(shares), min(self.signal.orders, self.degree)):
-                raise _unfit(self.degree)
+                raise _degree_error(self.degree)
         return rows
 
     def at(self, time: FloatArray) -> FloatArray:
@@ -126,26 +126,26 @@ class ViaPoints(ClosedForm):
 
         rows = np.full((self.signal.orders, self.components, len(time)), np.nan)
         for order, total in enumerate(series):
-            rows[order, self._given] = total / np.float64(last - first) ** order
+            rows[order, self._specified] = total / np.float64(last - first) ** order
         return rows
 
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
-        return replace(self, points=tuple(added(point, by) for point in self.points))
+        return replace(self, points=tuple(add_constants(point, by) for point in self.points))
 
-    def extremes(self) -> Extremes:
+    def extremes(self) -> ProfileExtremes:
         """Return the smallest and largest values, from the zeros of the first derivative.
 
         Raises:
             InputError: see `at`.
         """
         times = [np.union1d(self.breakpoints, zeros) for zeros in self._zeros()]
-        found = np.full((4, self.components), np.nan)
-        for component, time in zip(np.flatnonzero(self._given), times, strict=True):
+        rows = np.full((4, self.components), np.nan)
+        for component, time in zip(np.flatnonzero(self._specified), times, strict=True):
             values = self.at(time)[0, component]
             low, high = values.argmin(), values.argmax()
-            found[:, component] = values[low], time[low], values[high], time[high]
-        return Extremes(*found)
+            rows[:, component] = values[low], time[low], values[high], time[high]
+        return ProfileExtremes(*rows)
 
     def _zeros(self) -> Sequence[FloatArray]:
         """Return the times, s, at which the first derivative of each given component vanishes."""
@@ -157,7 +157,7 @@ class ViaPoints(ClosedForm):
         powers = self._derivatives[orders, :, :-1] * (orders / factorials)[:, None, None]
         slope = PPoly(np.moveaxis(powers, 1, 2), np.array(self.shares))
         roots = slope.roots(discontinuity=False, extrapolate=False)
-        return [first + (last - first) * found[np.isfinite(found)] for found in roots]
+        return [first + (last - first) * root[np.isfinite(root)] for root in roots]
 
 
 def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
@@ -175,9 +175,9 @@ def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
 
     corners = np.nan_to_num(np.asarray(points, dtype=np.float64))
     steps = np.diff(corners / (np.abs(corners).max() or 1.0), axis=0)
-    way = np.concatenate(([0.0], np.cumsum(np.sqrt(np.linalg.norm(steps, axis=1)))))
+    lengths = np.concatenate(([0.0], np.cumsum(np.sqrt(np.linalg.norm(steps, axis=1)))))
     half = (degree + 1) // 2
-    shares: FloatArray = betaincinv(half, half, way / (way[-1] or 1.0))
+    shares: FloatArray = betaincinv(half, half, lengths / (lengths[-1] or 1.0))
     return shares
 
 
@@ -196,7 +196,7 @@ def _is_smooth(rows: FloatArray, lengths: FloatArray, orders: int) -> bool:
     return bool(np.all(np.abs(before - after).max(axis=2) <= SEAM * peaks))
 
 
-def _unfit(degree: int) -> InputError:
+def _degree_error(degree: int) -> InputError:
     return InputError.one(
         f"the points are too unevenly spaced in time for a spline of degree {degree};"
         " space them more evenly, or take a lower degree"
@@ -300,9 +300,9 @@ class Via(Formula):
         """Last of the times, s; None without times."""
         return None if self.times is None else self.times[-1]
 
-    def over(self, span: tuple[float, float]) -> ViaPoints:
-        """See `Formula.over`."""
-        points = tuple(map(numbers, self.points))
+    def profile_over(self, span: tuple[float, float]) -> ViaPoints:
+        """See `Formula.profile_over`."""
+        points = tuple(map(nan_for_none, self.points))
         if self.times is None:
             shares = passing_shares(points, self.degree)
         else:
@@ -317,7 +317,7 @@ class Via(Formula):
         yield from problems
         if problems or not self.signal.positive:
             return
-        lowest, when, *_ = self.over((0.0, duration)).extremes()
+        lowest, when, *_ = self.profile_over((0.0, duration)).extremes()
         for joint in np.flatnonzero(lowest <= 0).tolist():
             fall = f"the spline through them falls to {lowest[joint]:.4g} after {when[joint]:.3f} s"
             message = f"{fall}, but must stay positive; add a point there, or give other times"
@@ -326,11 +326,13 @@ class Via(Formula):
     def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
         """Yield a note on times that were derived from the points."""
         if self.times is None:
-            yield f"passes its via points at t = {_listed(self.over(span).breakpoints.tolist())} s"
+            yield (
+                f"passes its via points at t = {_list_times(self.profile_over(span).breakpoints.tolist())} s"
+            )
 
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
         """Yield warnings about joints whose spline goes far beyond its points."""
-        profile = self.over(span)
+        profile = self.profile_over(span)
         for name, joint_type, points, *extremes in zip(
             joints, joints.values(), np.transpose(profile.points), *profile.extremes(), strict=True
         ):
@@ -341,7 +343,7 @@ class Via(Formula):
                 yield f"{name} goes {further:.3g} {unit} beyond its via points, at t = {when:.3f} s"
 
 
-def _listed(times: list[float]) -> str:
+def _list_times(times: list[float]) -> str:
     shown = [f"{time:.4g}" for time in times]
     if len(shown) > SHOWN_TIMES:
         half = SHOWN_TIMES // 2

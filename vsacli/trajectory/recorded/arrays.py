@@ -14,18 +14,18 @@ from vsacli.trajectory.fits import METHODS, FitChoice
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import check_health
 from vsacli.trajectory.recorded.problems import sample_problems, time_problems
-from vsacli.trajectory.recorded.samples import SampledProfile, Samples
+from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples
 from vsacli.trajectory.times import RecordedTimes
 
 
 def profiles_of_arrays(
-    time: npt.ArrayLike, given: Mapping[Signal, Sequence[npt.ArrayLike | None]], fit: str | None
+    time: npt.ArrayLike, signal_arrays: Mapping[Signal, Sequence[npt.ArrayLike | None]], fit: str | None
 ) -> tuple[RecordedTimes, dict[str, SampledProfile], tuple[str, ...]]:
     """Return times, profiles by signal key, and warnings, from arrays of samples.
 
     Args:
         time: times, (samples,), s.
-        given: value and derivatives of each signal, (samples, components) each; None if not given.
+        signal_arrays: value and derivatives of each signal, (samples, components) each; None if not given.
         fit: method of all fits, see `fit_samples`.
 
     Raises:
@@ -34,7 +34,11 @@ def profiles_of_arrays(
     if fit not in (None, *METHODS):
         raise InputError.one(f"fit must be one of {', '.join(METHODS)}, not {fit!r}")
     times = checked_array("time", time, None)
-    records = [record for signal, arrays in given.items() for record in _recorded(signal, times, *arrays)]
+    records = [
+        record
+        for signal, arrays in signal_arrays.items()
+        for record in _samples_of_signal(signal, times, *arrays)
+    ]
     problems = [*time_problems(times), *sample_problems(records)]
     if problems:
         raise InputError(Problem("", 0, str(problem)) for problem in problems)
@@ -44,19 +48,19 @@ def profiles_of_arrays(
     return RecordedTimes(times, rounding_notes(times)), profiles, warnings
 
 
-def _recorded(
+def _samples_of_signal(
     signal: Signal, times: FloatArray, values: npt.ArrayLike | None, *derivatives: npt.ArrayLike | None
-) -> Iterator[Samples]:
+) -> Iterator[SignalSamples]:
     if values is not None:
         yield samples_of_arrays(signal, times, values, *derivatives)
-    elif any(given is not None for given in derivatives):
+    elif any(derivative is not None for derivative in derivatives):
         name = signal.names[0]
         raise InputError.one(f"derivatives of a {name} are given, but not the {name}")
 
 
 def samples_of_arrays(
     signal: Signal, time: FloatArray, values: npt.ArrayLike, *derivatives: npt.ArrayLike | None
-) -> Samples:
+) -> SignalSamples:
     """Return samples from arrays of the shape (samples, components).
 
     Raises:
@@ -69,7 +73,7 @@ def samples_of_arrays(
         for name, array in zip(names, derivatives, strict=True)
     )
     labels = tuple(f"column {index}" for index in range(len(rows)))
-    return Samples.recorded(signal, time, rows, further, labels)
+    return SignalSamples.recorded(signal, time, rows, further, labels)
 
 
 def checked_array(name: str, array: npt.ArrayLike, *shape: int | None) -> FloatArray:
@@ -79,10 +83,12 @@ def checked_array(name: str, array: npt.ArrayLike, *shape: int | None) -> FloatA
         InputError: the array is not numeric, or has a wrong shape.
     """
     try:
-        found = np.asarray(array, dtype=np.float64)
+        numbers = np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError.one(f"{name} must be an array of numbers: {error}") from None
-    if found.ndim != len(shape) or any(n not in (None, m) for n, m in zip(shape, found.shape, strict=True)):
+    if numbers.ndim != len(shape) or any(
+        n not in (None, m) for n, m in zip(shape, numbers.shape, strict=True)
+    ):
         expected = ", ".join("any" if length is None else str(length) for length in shape)
-        raise InputError.one(f"{name} has the shape {found.shape}, expected ({expected})")
-    return found
+        raise InputError.one(f"{name} has the shape {numbers.shape}, expected ({expected})")
+    return numbers

@@ -28,7 +28,7 @@ _WRENCH_NAMING: Naming = {name: dict(enumerate(wrench_columns(name))) for name i
 
 
 @dataclass(frozen=True)
-class Column:
+class SignalColumn:
     """A column of a table.
 
     Attributes:
@@ -52,23 +52,23 @@ class ColumnLayout:
         unused: names of columns of joints that their signal does not command, by signal key.
     """
 
-    time: Column
-    quantities: Mapping[str, Mapping[int, Column]]
+    time: SignalColumn
+    quantities: Mapping[str, Mapping[int, SignalColumn]]
     unused: Mapping[str, Sequence[str]]
 
 
-def known_columns(joints: CommandedJoints) -> set[str]:
+def trajectory_column_names(joints: CommandedJoints) -> set[str]:
     """Return all possible column names of a recorded trajectory of these joints."""
     return {
         TIME,
-        *_all(_WRENCH_NAMING),
-        *(name for naming in _of_every_joint(joints) for name in _all(naming)),
+        *_names_in_naming(_WRENCH_NAMING),
+        *(name for naming in _namings_of_all_joints(joints) for name in _names_in_naming(naming)),
     }
 
 
-def _of_every_joint(joints: CommandedJoints) -> list[Naming]:
+def _namings_of_all_joints(joints: CommandedJoints) -> list[Naming]:
     """Return both namings of columns, as if every signal commanded all joints."""
-    return [_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in NAMINGS]
+    return [_name_columns(pattern, CommandedJoints(joints.types, exempt={})) for pattern in NAMINGS]
 
 
 def column_layout(
@@ -96,14 +96,18 @@ def column_layout(
     """
     headings = [split_heading(text) for text in header]
     names = [name for name, _ in headings]
-    namings = [_columns(pattern, joints) for pattern in NAMINGS]
-    used = [naming for naming in namings if any(column in names for column in _all(naming))]
+    namings = [_name_columns(pattern, joints) for pattern in NAMINGS]
+    used = [naming for naming in namings if any(column in names for column in _names_in_naming(naming))]
     naming = used[0] if used else namings[0]
-    expected = [TIME, *_all(naming), *(_all(_WRENCH_NAMING) if WRENCH in wanted else ())]
+    expected = [
+        TIME,
+        *_names_in_naming(naming),
+        *(_names_in_naming(_WRENCH_NAMING) if WRENCH in wanted else ()),
+    ]
 
     renaming = f"use a trajectory file as printed by vsacli info {file}"
-    found = ColumnNames(names, known_columns(joints), expected, joints.names, file, renaming)
-    if found.is_foreign:
+    column_names = ColumnNames(names, trajectory_column_names(joints), expected, joints.names, file, renaming)
+    if column_names.is_foreign:
         examples = ", ".join(expected[:2])
         advice = (
             f"for a motor catalog use --catalog {file}"
@@ -112,35 +116,35 @@ def column_layout(
         )
         message = f"is not a trajectory: expected columns such as {examples}; {advice}"
         raise InputError.one(message, file, line)
-    problems = list(found.of_names())
+    problems = list(column_names.naming_problems())
     naming = naming | _WRENCH_NAMING
     if len(used) == len(namings):
         examples = " and ".join(
-            repr(next(column for column in names if column in _all(naming))) for naming in namings
+            repr(next(column for column in names if column in _names_in_naming(naming))) for naming in namings
         )
         problems.append(f"columns are named both by joint and by number ({examples}); use one way")
-        problems += found.of_strangers()
+        problems += column_names.unknown_column_problems()
     else:
-        problems += found.of_gaps(naming, {signal.names[0] for signal in wanted})
-    factors = unit_factors(headings, _units(naming, joints), problems)
-    columns = {names[place]: Column(place, names[place], factor) for place, factor in factors.items()}
+        problems += column_names.missing_column_problems(naming, {signal.names[0] for signal in wanted})
+    factors = unit_factors(headings, _column_units(naming, joints), problems)
+    columns = {names[place]: SignalColumn(place, names[place], factor) for place, factor in factors.items()}
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
     of_signals = {
         key: {
             column
-            for each in _of_every_joint(joints)
+            for each in _namings_of_all_joints(joints)
             for name in signal.names
             for column in each[name].values()
         }
         for key, signal in COMMANDED.items()
     }
-    return _layout(names, columns, naming, of_signals)
+    return _assemble_layout(names, columns, naming, of_signals)
 
 
-def _layout(
+def _assemble_layout(
     names: Sequence[str],
-    columns: Mapping[str, Column],
+    columns: Mapping[str, SignalColumn],
     naming: Naming,
     of_signals: Mapping[str, Collection[str]],
 ) -> ColumnLayout:
@@ -159,22 +163,22 @@ def _layout(
     )
 
 
-def _columns(pattern: str, joints: CommandedJoints) -> Naming:
+def _name_columns(pattern: str, joints: CommandedJoints) -> Naming:
     return {
         name: {
             index: pattern.format(name=name, joint=joint, number=index + 1, ending="")
-            for index, joint in joints.taking(signal).items()
+            for index, joint in joints.joints_of(signal).items()
         }
         for signal in (POSITION, *COMMANDED.values())
         for name in signal.names
     }
 
 
-def _all(naming: Naming) -> list[str]:
+def _names_in_naming(naming: Naming) -> list[str]:
     return [column for columns in naming.values() for column in columns.values()]
 
 
-def _units(naming: Naming, joints: CommandedJoints) -> dict[str, str]:
+def _column_units(naming: Naming, joints: CommandedJoints) -> dict[str, str]:
     """Return the units of columns by name."""
     types = tuple(joints.types.values())
     return {TIME: VARIABLES[TIME].quantity.unit("")} | {

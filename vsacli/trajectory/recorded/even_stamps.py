@@ -31,17 +31,20 @@ def elapsed_times(stamps: FloatArray) -> FloatArray:
     elapsed = stamps - stamps[:1]
     if len(stamps) < ENOUGH_ROWS or not np.all(np.diff(stamps) > 0):
         return elapsed
-    even, step = _even(elapsed), float(elapsed[-1]) / (len(stamps) - 1)
+    even, step = _evenly_spaced(elapsed), float(elapsed[-1]) / (len(stamps) - 1)
     deviation = float(np.abs(even - elapsed).max())
     if deviation <= EVEN * step:
         return elapsed
-    digit, rounding = resolution(stamps), _rounding(stamps)  # half of each from a stamp, half from both ends
+    digit, rounding = (
+        stamp_resolution(stamps),
+        _float_spacing(stamps),
+    )  # half of each from a stamp, half from both ends
     if deviation <= rounding or (deviation <= digit + rounding and digit <= COARSEST * step):
         return even
     return elapsed
 
 
-def _even(elapsed: FloatArray) -> FloatArray:
+def _evenly_spaced(elapsed: FloatArray) -> FloatArray:
     """Return the nearest multiples of an interval that divides the last time into an integer number."""
     steps = np.diff(elapsed)
     step = float(np.mean(steps[steps < LOST * np.median(steps)]))
@@ -49,17 +52,17 @@ def _even(elapsed: FloatArray) -> FloatArray:
     return np.asarray(elapsed[-1] * places / places[-1])
 
 
-def resolution(stamps: FloatArray) -> float:
+def stamp_resolution(stamps: FloatArray) -> float:
     """Return the resolution of stamps, s: their last decimal, or the spacing of floating-point numbers."""
     few = stamps[:: max(1, len(stamps) // 1000)]
-    rounding = _rounding(stamps)
+    rounding = _float_spacing(stamps)
     for decimals in range(MOST_DECIMALS + 1):
         if np.abs(few - np.round(few, decimals)).max() <= 2 * rounding:
             return max(10.0**-decimals, rounding)
     return rounding
 
 
-def _rounding(stamps: FloatArray) -> float:
+def _float_spacing(stamps: FloatArray) -> float:
     """Return the spacing of floating-point numbers at the stamps, s."""
     return float(np.spacing(np.abs(stamps).max()))
 
@@ -74,7 +77,7 @@ def even_rate(stamps: FloatArray) -> float | None:
     if steps < 1 or np.abs(np.diff(elapsed) * steps / elapsed[-1] - 1).max() > 2 * EVEN:
         return None
     even = elapsed[-1] * np.arange(steps + 1) / steps
-    off = float(np.abs(stamps - stamps[0] - even).max()) + _rounding(stamps)
+    off = float(np.abs(stamps - stamps[0] - even).max()) + _float_spacing(stamps)
     rate, allowed = steps / float(elapsed[-1]), 2 * off / float(elapsed[-1])  # both ends may be off
     rounded = (float(f"{rate:.{digits}g}") for digits in range(1, DIGITS))
     return next((each for each in rounded if abs(each - rate) <= allowed * rate), rate)

@@ -102,17 +102,21 @@ def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -
     size = np.abs(quantization.differences)
     centers = np.arange(len(size)) + ORDER // 2
     off = size > _noticeable(quantization, centers)
-    events = _events(centers[off], size[off])
-    isolated = [_isolated(time, values, event, quantization) for event in events]
-    found = dict(_at_ends(values, quantization))
+    events = _largest_disturbances(centers[off], size[off])
+    isolated = [_isolated_outliers(time, values, event, quantization) for event in events]
+    error_of_sample = dict(_outliers_at_ends(values, quantization))
     for event, samples in zip(events, isolated, strict=True):
-        alike = [there for other, there in zip(events, isolated, strict=True) if 3 * other.size >= event.size]
-        if len(list(filter(None, alike))) >= LEAST_SHARE * len(alike):
-            found.update(samples)
-    if not found:
+        comparable = [
+            outliers_there
+            for other_event, outliers_there in zip(events, isolated, strict=True)
+            if 3 * other_event.size >= event.size
+        ]
+        if len(list(filter(None, comparable))) >= LEAST_SHARE * len(comparable):
+            error_of_sample.update(samples)
+    if not error_of_sample:
         return None
-    where = np.array(sorted(found))
-    errors = np.array([found[sample] for sample in where.tolist()])
+    where = np.array(sorted(error_of_sample))
+    errors = np.array([error_of_sample[sample] for sample in where.tolist()])
     return Outliers(where, where, np.abs(errors), values[where] - errors)
 
 
@@ -139,7 +143,7 @@ def derivative_outliers(
     return off.except_for(of_value <= np.maximum(of_curve, DIFFERENCED * off.sizes))
 
 
-class _Event(NamedTuple):
+class _Disturbance(NamedTuple):
     """Samples first to last that enter differences that are too large, and the largest of those."""
 
     first: int
@@ -147,7 +151,7 @@ class _Event(NamedTuple):
     size: float
 
 
-def _events(centers: IndexArray, size: FloatArray) -> list[_Event]:
+def _largest_disturbances(centers: IndexArray, size: FloatArray) -> list[_Disturbance]:
     """Return the `MOST_EVENTS` largest events."""
     if not centers.size:
         return []
@@ -156,23 +160,23 @@ def _events(centers: IndexArray, size: FloatArray) -> list[_Event]:
     largest = np.maximum.reduceat(size, starts)
     chosen = np.argsort(-largest, kind="stable")[:MOST_EVENTS]
     firsts, lasts = centers[starts[chosen]] - ORDER // 2, centers[stops[chosen]] + ORDER // 2
-    return list(map(_Event, firsts.tolist(), lasts.tolist(), largest[chosen].tolist()))
+    return list(map(_Disturbance, firsts.tolist(), lasts.tolist(), largest[chosen].tolist()))
 
 
-def _at_ends(values: FloatArray, quantization: Quantization) -> Iterator[tuple[int, float]]:
+def _outliers_at_ends(values: FloatArray, quantization: Quantization) -> Iterator[tuple[int, float]]:
     """Yield the first or last sample, and its error, if the next ones predict it worse than each other."""
     for end, inward in ((0, values), (len(values) - 1, values[::-1])):
         if len(values) < 2 * END_SAMPLES:
             continue
         near = sliding_window_view(inward[: END_SAMPLES + len(END_WEIGHTS)], len(END_WEIGHTS))
-        error, *others = near @ END_WEIGHTS
+        error, *other_errors = near @ END_WEIGHTS
         least = float(_noticeable(quantization, np.array([end]))[0]) * float(np.linalg.norm(END_WEIGHTS))
-        if abs(error) > max(END_SHARE * np.abs(others).max(), least):
+        if abs(error) > max(END_SHARE * np.abs(other_errors).max(), least):
             yield end, float(error)
 
 
-def _isolated(
-    time: FloatArray, values: FloatArray, event: _Event, quantization: Quantization
+def _isolated_outliers(
+    time: FloatArray, values: FloatArray, event: _Disturbance, quantization: Quantization
 ) -> list[tuple[int, float]]:
     """Return the outliers of an event, which are off the polynomial through all others near, with errors."""
     if event.last - event.first > 2 * (ORDER + MOST_TOGETHER):
@@ -182,40 +186,42 @@ def _isolated(
     least = float(_noticeable(quantization, np.array([event.first]))[0])
     place = time[first : last + 1] - time[first]
     powers = np.vander(2 * place / place[-1] - 1, POLYNOMIAL + 1)
-    found: list[tuple[int, float]] = []
+    errors_of_samples: list[tuple[int, float]] = []
     for _ in range(min(MOST_TOGETHER, len(near) - POLYNOMIAL - 3)):
-        residual, leverage = _misfit(powers, near, kept)
+        residual, leverage = _residuals_and_leverages(powers, near, kept)
         studentized = np.abs(residual) / np.sqrt(np.maximum(1 - leverage, 1e-9))
         kept[int(np.argmax(np.where(kept, studentized, 0.0)))] = False
-        residual, leverage = _misfit(powers, near, kept)
+        residual, leverage = _residuals_and_leverages(powers, near, kept)
         rest = np.sqrt(np.sum(residual[kept] ** 2) / (kept.sum() - POLYNOMIAL - 1))
         sure = max(FIT_DEVIATIONS * rest, least) * np.sqrt(1 + leverage)
         if np.all(np.abs(residual) >= sure, where=~kept):
             samples = first + np.flatnonzero(~kept)
-            found = list(zip(samples.tolist(), residual[~kept].tolist(), strict=True))
+            errors_of_samples = list(zip(samples.tolist(), residual[~kept].tolist(), strict=True))
     unconfirmed = {0, len(values) - 1}  # the ends have neighbors on one side only
-    return [] if unconfirmed & dict(found).keys() else found
+    return [] if unconfirmed & dict(errors_of_samples).keys() else errors_of_samples
 
 
-def _misfit(powers: FloatArray, values: FloatArray, kept: BoolArray) -> tuple[FloatArray, FloatArray]:
+def _residuals_and_leverages(
+    powers: FloatArray, values: FloatArray, kept: BoolArray
+) -> tuple[FloatArray, FloatArray]:
     """Return values minus the polynomial fitted to those kept, and leverages: variance per noise variance."""
     inverse = np.linalg.pinv(powers[kept])
     return values - powers @ (inverse @ values[kept]), np.sum((powers @ inverse) ** 2, axis=1)
 
 
-def held(values: FloatArray, quantization: Quantization) -> int:
+def rows_per_value(values: FloatArray, quantization: Quantization) -> int:
     """Return the number of rows in which each value is repeated; 1 if that varies."""
     changes = np.flatnonzero(values[1:] != values[:-1])
     rows = np.diff(changes)
     if len(rows) < HELD_CHANGES:
         return 1
     usual = int(np.median(rows))
-    alike = np.count_nonzero(rows == usual) >= HELD_SHARE * len(rows)
+    regular = np.count_nonzero(rows == usual) >= HELD_SHARE * len(rows)
     jump = float(np.median(np.abs(values[changes + 1] - values[changes])))
-    return usual if alike and usual <= HELD_ROWS and jump >= QUANTA * quantization.quantum else 1
+    return usual if regular and usual <= HELD_ROWS and jump >= QUANTA * quantization.quantum else 1
 
 
-def frozen(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
+def frozen_stretches(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
     """Return stretches of equal samples while the motion goes on, as a jump or an abrupt stop shows."""
     first, last = _equal_runs(values, FROZEN_STEPS)
     ends = (first == 0) | (last == len(values) - 1)
@@ -224,7 +230,7 @@ def frozen(time: FloatArray, values: FloatArray, quantization: Quantization) -> 
     stuck[inner] = _catches_up(time, values, quantization, first[inner], last[inner])
     for run in np.flatnonzero(ends & (last - first >= FROZEN_AT_END_STEPS)).tolist():
         stuck[run] = _stops_abruptly(values, quantization, int(first[run]), int(last[run]))
-    return _stretches(time, first[stuck], last[stuck])
+    return _faults_of_stretches(time, first[stuck], last[stuck])
 
 
 def _catches_up(
@@ -260,7 +266,7 @@ def _stops_abruptly(values: FloatArray, quantization: Quantization, first: int, 
     return bool((np.all(steps > 0) or np.all(steps < 0)) and abs(steps[-1]) >= least)
 
 
-def saturated(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
+def saturated_stretches(time: FloatArray, values: FloatArray, quantization: Quantization) -> Faults | None:
     """Return stretches at the largest or smallest value where a motion beyond it is cut off."""
     first, last = _equal_runs(values, SATURATED_STEPS)
     extreme = (values[first] == values.max()) | (values[first] == values.min())
@@ -269,7 +275,7 @@ def saturated(time: FloatArray, values: FloatArray, quantization: Quantization) 
     least = _noticeable(quantization, first)
     beyond = [_overshoot(values, first, -1) >= least, _overshoot(values, last, 1) >= least]
     cut = beyond[0] & beyond[1]
-    return _stretches(time, first[cut], last[cut])
+    return _faults_of_stretches(time, first[cut], last[cut])
 
 
 def _overshoot(values: FloatArray, edge: IndexArray, outward: int) -> FloatArray:
@@ -287,7 +293,7 @@ def _overshoot(values: FloatArray, edge: IndexArray, outward: int) -> FloatArray
     return np.asarray(np.where(step > 0, np.minimum(farther, step), -1.0))
 
 
-def wraps(values: FloatArray) -> Faults | None:
+def angle_wraps(values: FloatArray) -> Faults | None:
     """Return jumps by about 2 pi amid small steps."""
     steps = np.abs(np.diff(values))
     near = np.abs(steps - 2 * np.pi) < WRAP_TOLERANCE
@@ -311,5 +317,5 @@ def _equal_runs(values: FloatArray, least: int) -> tuple[IndexArray, IndexArray]
     return first[long], last[long]
 
 
-def _stretches(time: FloatArray, first: IndexArray, last: IndexArray) -> Faults | None:
+def _faults_of_stretches(time: FloatArray, first: IndexArray, last: IndexArray) -> Faults | None:
     return Faults(first, last, time[last] - time[first]) if first.size else None

@@ -68,7 +68,7 @@ POSES = ("roll", "pitch", "yaw", "tool", "odom", "imu", "linear", "angular", "or
 """Words that do so only if a name has no others, since joints of legs and wrists have such names, too."""
 
 
-def words_of(name: str) -> tuple[str, ...]:
+def words_of_column_name(name: str) -> tuple[str, ...]:
     """Return the words and numbers of a name in lower case, equal for `joint_01`, `Joint1` and `joint-1`."""
     return tuple(word.lower().lstrip("0") or "0" for word in WORDS.findall(name))
 
@@ -78,10 +78,10 @@ def role_of(name: str) -> tuple[str, str]:
 
     A word and that for a quantity may be written together, as in `qdes` and `actpos1`.
     """
-    apart = _TOGETHER.sub(lambda match: "_".join(filter(None, match.groups())), name)
-    words = words_of(apart)
+    separated = _TOGETHER.sub(lambda match: "_".join(filter(None, match.groups())), name)
+    words = words_of_column_name(separated)
     role = next((role for role in reversed(ROLES) if set(words).intersection(ROLES[role])), PLAIN)
-    return role, WORDS.sub(lambda word: "" if word[0].lower() in _ROLE_WORDS else word[0], apart)
+    return role, WORDS.sub(lambda word: "" if word[0].lower() in _ROLE_WORDS else word[0], separated)
 
 
 def motor_of(words: Sequence[str], joints: JointNames) -> tuple[int, tuple[str, ...]] | None:
@@ -109,41 +109,45 @@ class JointNames:
 
     def __init__(self, names: Sequence[str]) -> None:
         self.names = tuple(names)
-        self._words = {name: words_of(name) for name in names}
-        first, last = _common(list(self._words.values()))
+        self._words = {name: words_of_column_name(name) for name in names}
+        first, last = _count_common_words(list(self._words.values()))
         self._cores = {name: words[first : len(words) - last] for name, words in self._words.items()}
 
     def in_words(self, words: Sequence[str]) -> str:
         """Return the joint with the longest name found in these words; empty for none or for a tie."""
         phrase = f" {' '.join(words)} "
         for whole, of_joints in ((True, self._words), (False, self._cores)):
-            there = [name for name, own in of_joints.items() if own and f" {' '.join(own)} " in phrase]
-            longest = max((len(of_joints[name]) for name in there), default=0)
-            found = [name for name in there if len(of_joints[name]) == longest]
-            if len(found) == 1 and (whole or self._tells(of_joints[found[0]], words)):
-                return found[0]
+            candidates = [
+                name
+                for name, name_words in of_joints.items()
+                if name_words and f" {' '.join(name_words)} " in phrase
+            ]
+            longest = max((len(of_joints[name]) for name in candidates), default=0)
+            matches = [name for name in candidates if len(of_joints[name]) == longest]
+            if len(matches) == 1 and (whole or self._suffices(of_joints[matches[0]], words)):
+                return matches[0]
         return ""
 
     def called(self, words: Sequence[str]) -> str:
         """Return the joint whose name is the whole column name; empty if there is none."""
         rest = "".join(word for word in words if word not in OF_JOINTS)
         for name in self.names:
-            own, core = self._words[name], self._cores[name]
-            bare = "".join(word for word in own if word not in OF_JOINTS)
-            if "".join(words) == "".join(own) or (rest and rest in (bare, "".join(core))):
+            name_words, core = self._words[name], self._cores[name]
+            bare = "".join(word for word in name_words if word not in OF_JOINTS)
+            if "".join(words) == "".join(name_words) or (rest and rest in (bare, "".join(core))):
                 return name
         return ""
 
-    def _tells(self, core: Sequence[str], words: Sequence[str]) -> bool:
+    def _suffices(self, core: Sequence[str], words: Sequence[str]) -> bool:
         """Return whether the distinguishing part suffices: a number alone only among generic words."""
-        common = {word for own in self._words.values() for word in own}
-        others = [word for word in words if word not in core]
+        common = {word for name_words in self._words.values() for word in name_words}
+        remaining = [word for word in words if word not in core]
         return not all(word.isdecimal() for word in core) or all(
-            word in GENERIC or word in common for word in others
+            word in GENERIC or word in common for word in remaining
         )
 
 
-def _common(names: Sequence[Sequence[str]]) -> tuple[int, int]:
+def _count_common_words(names: Sequence[Sequence[str]]) -> tuple[int, int]:
     """Return the numbers of words common to all names at their beginning, and at their end."""
     if len(names) < 2:  # a single name would be common to all
         return 0, 0

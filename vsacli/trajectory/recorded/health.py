@@ -17,16 +17,16 @@ from vsacli.base.units import Quantity, WrenchQuantity, time_text
 from vsacli.trajectory.recorded.faults import (
     Faults,
     Outliers,
+    angle_wraps,
     derivative_outliers,
-    frozen,
-    held,
+    frozen_stretches,
     outliers,
-    saturated,
-    wraps,
+    rows_per_value,
+    saturated_stretches,
 )
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.quantization import ORDER, Quantization
-from vsacli.trajectory.recorded.samples import Samples
+from vsacli.trajectory.recorded.samples import SignalSamples
 from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
 from vsacli.trajectory.recorded.thresholds import GAP_STEPS, LARGEST_ANGLE, LARGEST_TRAVEL
 
@@ -39,11 +39,13 @@ class CheckedSignals(NamedTuple):
         problems: probable faults of the recording.
     """
 
-    records: list[Samples]
+    records: list[SignalSamples]
     problems: list[SampleProblem]
 
 
-def check_health(stamps: FloatArray, records: Sequence[Samples], types: Sequence[str] = ()) -> CheckedSignals:
+def check_health(
+    stamps: FloatArray, records: Sequence[SignalSamples], types: Sequence[str] = ()
+) -> CheckedSignals:
     """Find probable faults of a usable recording, and leave outliers out.
 
     Args:
@@ -62,8 +64,8 @@ def check_health(stamps: FloatArray, records: Sequence[Samples], types: Sequence
         for quantity, name, lower in zip(record.signal.quantities, names, (None, *names), strict=False):
             if name not in columns or not (lower is None or measured):
                 continue
-            for component in np.flatnonzero(record.given).tolist():
-                row, unit = columns[name][component], _unit(quantity, component, types)
+            for component in np.flatnonzero(record.has_values).tolist():
+                row, unit = columns[name][component], _format_unit(quantity, component, types)
                 if lower is None:
                     angle = record.signal is POSITION
                     ends = LEFT_OUT if measured else USED
@@ -81,7 +83,7 @@ def check_health(stamps: FloatArray, records: Sequence[Samples], types: Sequence
     return checked
 
 
-def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterator[SampleProblem]:
+def unit_doubts(records: Sequence[SignalSamples], types: Mapping[int, str]) -> Iterator[SampleProblem]:
     """Yield positions that are too large for rad or m.
 
     Args:
@@ -93,9 +95,13 @@ def unit_doubts(records: Sequence[Samples], types: Mapping[int, str]) -> Iterato
             name, largest = POSITION.names[0], float(np.abs(record.values[index]).max())
             if kind == "revolute" and largest > LARGEST_ANGLE:
                 extent = f"{largest:.4g} rad, {largest / (2 * np.pi):.3g} turns"
-                yield SampleProblem(name, f"goes to {extent}; are these degrees? {_write('deg')}", index)
+                yield SampleProblem(
+                    name, f"goes to {extent}; are these degrees? {_advise_unit('deg')}", index
+                )
             elif kind == "prismatic" and largest > LARGEST_TRAVEL:
-                yield SampleProblem(name, f"goes to {largest:.4g} m; are these mm? {_write('mm')}", index)
+                yield SampleProblem(
+                    name, f"goes to {largest:.4g} m; are these mm? {_advise_unit('mm')}", index
+                )
 
 
 LEFT_OUT = "left out, with the curve in its place", "left out, with the curve in their place"
@@ -146,7 +152,7 @@ def _check_values(
     if np.ptp(values) == 0:
         return None, []
     quantization = Quantization.of(time, values)
-    if (rows := held(values, quantization)) > 1:
+    if (rows := rows_per_value(values, quantization)) > 1:
         slow = f"has each value in {rows} rows: its sensor is slower than the stamps; keep one row in {rows}"
         return None, [(0, slow)]
     off = outliers(time, values, quantization)
@@ -171,11 +177,11 @@ def _outlier_sentences(
     off: Outliers | None, stamps: FloatArray, unit: str, ends: tuple[str, str]
 ) -> Iterator[tuple[int, str]]:
     if off is not None:
-        extent = _extent(off, stamps, [f"{size:.3g}{unit}" for size in off.sizes.tolist()])
+        extent = _format_worst(off, stamps, [f"{size:.3g}{unit}" for size in off.sizes.tolist()])
         yield (
             off.at,
-            f"is off {_occasions(off, stamps)}, by {extent} from a smooth curve, amid samples that are on it:"
-            f" {ends[off.count > 1]}",
+            f"is off {_format_occasions(off, stamps)}, by {extent} from a smooth curve, amid samples that"
+            f" are on it: {ends[off.count > 1]}",
         )
 
 
@@ -188,54 +194,55 @@ def _stretch_faults(
     *,
     angle: bool,
 ) -> Iterator[tuple[int, str]]:
-    if stuck := frozen(time, values, quantization):
+    if stuck := frozen_stretches(time, values, quantization):
         yield (
             stuck.at,
-            f"is frozen {_occasions(stuck, stamps)}, for {_lasting(stuck, stamps)}, {_equal(stuck)}, while"
-            f" the motion goes on: these samples were lost; {_instead(stuck, stamps)}, or record again",
+            f"is frozen {_format_occasions(stuck, stamps)}, for {_format_longest(stuck, stamps)},"
+            f" {_count_equal_samples(stuck)}, while the motion goes on: these samples were lost;"
+            f" {_advise_frozen_rows(stuck, stamps)}, or record again",
         )
-    if cut := saturated(time, values, quantization):
+    if cut := saturated_stretches(time, values, quantization):
         at = f"{values[cut.first[0]]:.4g}{unit}"
         yield (
             cut.at,
-            f"is cut off at {at} {_occasions(cut, stamps)}, for {_lasting(cut, stamps)}"
+            f"is cut off at {at} {_format_occasions(cut, stamps)}, for {_format_longest(cut, stamps)}"
             " while the motion goes on: the sensor or the log file has no larger range; record again",
         )
-    if angle and (wrapped := wraps(values)):
+    if angle and (wrapped := angle_wraps(values)):
         yield (
             wrapped.at,
-            f"jumps by 2 pi {_occasions(wrapped, stamps)}: an angle that was wrapped? Set unwrap: true under"
-            " position in a trajectory file",
+            f"jumps by 2 pi {_format_occasions(wrapped, stamps)}: an angle that was wrapped? Set unwrap: true"
+            " under position in a trajectory file",
         )
 
 
-def _unit(quantity: Quantity, component: int, types: Sequence[str]) -> str:
+def _format_unit(quantity: Quantity, component: int, types: Sequence[str]) -> str:
     """Return the unit after a space; "" if unknown."""
     if isinstance(quantity, WrenchQuantity):
         return f" {quantity.of_axis(component)}"
     return f" {quantity.unit(types[component])}" if types else ""
 
 
-def _write(unit: str) -> str:
+def _advise_unit(unit: str) -> str:
     return f"Write [{unit}] after its name in the header, or [rad] or [m] if it is right"
 
 
-def _occasions(faults: Faults, stamps: FloatArray) -> str:
+def _format_occasions(faults: Faults, stamps: FloatArray) -> str:
     """Return a phrase with the time of a fault, or the number of faults and the first time."""
     when = f"at t = {time_text(float(stamps[faults.first[0]]))}"
     return when if faults.count == 1 else f"{faults.count} times, first {when}"
 
 
-def _lasting(faults: Faults, stamps: FloatArray) -> str:
-    return _extent(faults, stamps, [step_text(size) for size in faults.sizes.tolist()])
+def _format_longest(faults: Faults, stamps: FloatArray) -> str:
+    return _format_worst(faults, stamps, [step_text(size) for size in faults.sizes.tolist()])
 
 
-def _equal(stuck: Faults) -> str:
+def _count_equal_samples(stuck: Faults) -> str:
     """Return the number of equal samples of the longest frozen stretch."""
     return f"{int(stuck.last[stuck.worst] - stuck.first[stuck.worst]) + 1} equal samples"
 
 
-def _instead(stuck: Faults, stamps: FloatArray) -> str:
+def _advise_frozen_rows(stuck: Faults, stamps: FloatArray) -> str:
     """Return what to do with frozen stretches: within a recording, deleting a long one leaves a gap."""
     inner = (stuck.first > 0) & (stuck.last + 1 < len(stamps))
     if not inner.any():
@@ -246,7 +253,7 @@ def _instead(stuck: Faults, stamps: FloatArray) -> str:
     return "delete all but the first of these rows"
 
 
-def _extent(faults: Faults, stamps: FloatArray, sizes: Sequence[str]) -> str:
+def _format_worst(faults: Faults, stamps: FloatArray, sizes: Sequence[str]) -> str:
     """Return the size of a single fault, or of the worst with its time."""
     size = sizes[faults.worst]
     when = time_text(float(stamps[faults.first[faults.worst]]))

@@ -71,7 +71,7 @@ class HermiteSpline:
 
     def at(self, time: FloatArray) -> FloatArray:
         """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
-        return interpolated(self.time, self.rows, time)
+        return interpolate_hermite(self.time, self.rows, time)
 
     def samples(self, start: int, stop: int, _time: FloatArray, /) -> FloatArray:
         """Return the given values at samples start..stop-1."""
@@ -83,7 +83,7 @@ class HermiteSpline:
         return replace(self, time=factor * self.time, rows=self.rows / scale)
 
 
-def interpolated(time: FloatArray, rows: FloatArray, at: FloatArray) -> FloatArray:
+def interpolate_hermite(time: FloatArray, rows: FloatArray, at: FloatArray) -> FloatArray:
     """Return value and derivatives at any times, (orders, components, times).
 
     Args:
@@ -93,46 +93,48 @@ def interpolated(time: FloatArray, rows: FloatArray, at: FloatArray) -> FloatArr
     """
     piece = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
     width = time[piece + 1] - time[piece]
-    coefficients = _coefficients(rows[:, :, piece], rows[:, :, piece + 1], width)
+    coefficients = _hermite_coefficients(rows[:, :, piece], rows[:, :, piece + 1], width)
     share = (at - time[piece]) / width
-    return np.stack([_derivative(coefficients, order, share) / width**order for order in range(len(rows))])
+    return np.stack(
+        [_evaluate_derivative(coefficients, order, share) / width**order for order in range(len(rows))]
+    )
 
 
-def belong_together(time: FloatArray, rows: FloatArray) -> bool:
+def derivatives_are_consistent(time: FloatArray, rows: FloatArray) -> bool:
     """Return whether samples and all their derivatives are consistent, i.e. of one smooth function.
 
     Derivatives that were measured, or rounded to few digits, are not: polynomials between them oscillate.
 
     Args:
-        time: see `interpolated`.
-        rows: see `interpolated`; components that are all NaN are ignored.
+        time: see `interpolate_hermite`.
+        rows: see `interpolate_hermite`; components that are all NaN are ignored.
     """
-    given = rows[:, ~np.isnan(rows[0]).all(axis=1)]
-    peaks = np.abs(given).max(axis=2)
-    changes = np.abs(np.diff(given[:-MATCHED])).max(axis=2)
+    present = rows[:, ~np.isnan(rows[0]).all(axis=1)]
+    peaks = np.abs(present).max(axis=2)
+    changes = np.abs(np.diff(present[:-MATCHED])).max(axis=2)
     lower = AGREEING * changes + ROUNDINGS * np.spacing(peaks[:-MATCHED])
     allowed = np.concatenate([lower, AGREEING * peaks[-1:]])
     parts = (slice(first, first + TOGETHER + 1) for first in range(0, len(time) - 1, TOGETHER))
     with np.errstate(all="ignore"):  # NaN after overflow counts as inconsistent
-        return all(np.all(_missed(time[part], given[:, :, part]) <= allowed) for part in parts)
+        return all(np.all(_integration_errors(time[part], present[:, :, part]) <= allowed) for part in parts)
 
 
-def _missed(time: FloatArray, rows: FloatArray) -> FloatArray:
+def _integration_errors(time: FloatArray, rows: FloatArray) -> FloatArray:
     """Return errors of integrals at the next samples, and of the highest derivative between samples."""
     width = np.diff(time)
-    coefficients = _coefficients(rows[:, :, :-1], rows[:, :, 1:], width)
+    coefficients = _hermite_coefficients(rows[:, :, :-1], rows[:, :, 1:], width)
     one, highest = np.ones_like(width), rows[-1]
     ends = [
-        _derivative(coefficients, order, one) / width**order - row[:, 1:]
+        _evaluate_derivative(coefficients, order, one) / width**order - row[:, 1:]
         for order, row in enumerate(rows[:-MATCHED])
     ]
-    inside = _derivative(coefficients, len(rows) - 1, LOOKED_AT * one) / width ** (len(rows) - 1)
+    inside = _evaluate_derivative(coefficients, len(rows) - 1, LOOKED_AT * one) / width ** (len(rows) - 1)
     between = inside - (highest[:, :-1] + LOOKED_AT * np.diff(highest))
     missed: FloatArray = np.abs(np.stack([*ends, between])).max(axis=2)
     return missed
 
 
-def _coefficients(left: FloatArray, right: FloatArray, width: FloatArray) -> FloatArray:
+def _hermite_coefficients(left: FloatArray, right: FloatArray, width: FloatArray) -> FloatArray:
     """Return coefficients of powers of the place in a piece, (powers, components, pieces), from its ends."""
     orders = len(left)
     scaled = left * width ** np.arange(orders)[:, None, None]
@@ -148,7 +150,7 @@ def _coefficients(left: FloatArray, right: FloatArray, width: FloatArray) -> Flo
     return np.stack(powers)
 
 
-def _derivative(coefficients: FloatArray, order: int, share: FloatArray) -> FloatArray:
+def _evaluate_derivative(coefficients: FloatArray, order: int, share: FloatArray) -> FloatArray:
     """Return a derivative of polynomials with coefficients, (powers, components, times), by Horner's rule."""
     total: FloatArray = np.zeros_like(coefficients[0])
     for power in range(len(coefficients) - 1, order - 1, -1):

@@ -12,7 +12,7 @@ from vsacli.base.texts import counted
 from vsacli.base.units import time_text
 from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
 from vsacli.trajectory.recorded.disorder import find_disorder
-from vsacli.trajectory.recorded.samples import Samples
+from vsacli.trajectory.recorded.samples import SignalSamples
 
 LARGEST_VALUE = 1e100
 """Largest value; larger ones are no motion of a robot, and their squares, which fits need, may overflow."""
@@ -46,7 +46,7 @@ def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
         )
 
 
-def sample_problems(records: Sequence[Samples]) -> Iterator[SampleProblem]:
+def sample_problems(records: Sequence[SignalSamples]) -> Iterator[SampleProblem]:
     """Yield the problems of recorded signals: too few samples, once for all signals, and of their values."""
     most = max(records, key=lambda each: each.signal.spline_degree, default=None)
     if most is not None and len(most.time) <= (degree := most.signal.spline_degree):
@@ -56,22 +56,24 @@ def sample_problems(records: Sequence[Samples]) -> Iterator[SampleProblem]:
         yield from _value_problems(record)
 
 
-def _value_problems(samples: Samples) -> Iterator[SampleProblem]:
+def _value_problems(samples: SignalSamples) -> Iterator[SampleProblem]:
     """Yield the problems of values: not finite, too large, or not positive where required."""
     signal = samples.signal
     name = signal.names[0]
-    given, stamps = np.flatnonzero(samples.given).tolist(), samples.start + samples.time
+    components, stamps = np.flatnonzero(samples.has_values).tolist(), samples.start + samples.time
     for column, rows in zip(signal.names, (samples.values, *samples.derivatives), strict=True):
-        for joint, row in () if rows is None else zip(given, rows[given], strict=True):
-            yield from _breach(column, joint, stamps, row, np.isfinite(row), "finite")
+        for joint, row in () if rows is None else zip(components, rows[components], strict=True):
+            yield from _requirement_problem(column, joint, stamps, row, np.isfinite(row), "finite")
             small = ~(np.isfinite(row) & (np.abs(row) > LARGEST_VALUE))
-            yield from _breach(column, joint, stamps, row, small, f"at most {LARGEST_VALUE:g} in size")
+            yield from _requirement_problem(
+                column, joint, stamps, row, small, f"at most {LARGEST_VALUE:g} in size"
+            )
     if signal.positive:
-        for joint, row in zip(given, samples.values[given], strict=True):
-            yield from _breach(name, joint, stamps, row, ~(row <= 0), "positive")
+        for joint, row in zip(components, samples.values[components], strict=True):
+            yield from _requirement_problem(name, joint, stamps, row, ~(row <= 0), "positive")
 
 
-def _breach(
+def _requirement_problem(
     quantity: str, joint: int, time: FloatArray, row: FloatArray, holds: BoolArray, requirement: str
 ) -> Iterator[SampleProblem]:
     """Yield a problem with the first sample that violates a requirement, and the number of such samples."""

@@ -46,7 +46,7 @@ class Quantization:
     @classmethod
     def of(cls, time: FloatArray, values: FloatArray) -> Quantization:
         """Return the resolution of a column with more than four samples, (samples,)."""
-        differences = _differences(time, values)
+        differences = _divided_differences(time, values)
         whole = len(differences) // BLOCK * BLOCK
         rows = differences[:whole].reshape(-1, BLOCK) if whole else differences[None]
         near = np.pad(np.median(np.abs(rows), axis=1) / NORMAL_MEDIAN, 1, mode="edge")
@@ -59,10 +59,10 @@ class Quantization:
         return np.asarray(self.noise[np.minimum(blocks, len(self.noise) - 1)])
 
 
-def _differences(time: FloatArray, values: FloatArray) -> FloatArray:
+def _divided_differences(time: FloatArray, values: FloatArray) -> FloatArray:
     """Return divided differences; computed in chunks, since the weights need the memory of five columns."""
     count = len(values) - ORDER
-    found = np.empty(count)
+    differences = np.empty(count)
     for start in range(0, count, CHUNK):
         stop = min(start + CHUNK, count)
         nodes = [time[start + i : stop + i] for i in range(ORDER + 1)]
@@ -70,12 +70,12 @@ def _differences(time: FloatArray, values: FloatArray) -> FloatArray:
         total, size = np.zeros(stop - start), np.zeros(stop - start)
         for i, node in enumerate(nodes):
             weight = np.ones(stop - start)
-            for other in (*nodes[:i], *nodes[i + 1 :]):
-                weight *= span / (node - other)
+            for other_node in (*nodes[:i], *nodes[i + 1 :]):
+                weight *= span / (node - other_node)
             total += weight * values[start + i : stop + i]
             size += weight**2
-        found[start:stop] = total / np.sqrt(size)
-    return found
+        differences[start:stop] = total / np.sqrt(size)
+    return differences
 
 
 def _quantum(values: FloatArray) -> float:
@@ -84,5 +84,5 @@ def _quantum(values: FloatArray) -> float:
     changes = np.abs(np.diff(values, n=2))
     changes = changes[changes > ROUNDING * largest]
     place = int(FINEST * len(changes))
-    found = float(np.partition(changes, place)[place]) if len(changes) else 0.0
-    return max(found, UNRESOLVED * largest)
+    change = float(np.partition(changes, place)[place]) if len(changes) else 0.0
+    return max(change, UNRESOLVED * largest)

@@ -23,14 +23,19 @@ from vsacli.documents.reading import ChangeError
 from vsacli.documents.source import Source
 from vsacli.documents.table import Lines, Table, read_table
 from vsacli.documents.time_column import TIME
-from vsacli.robot.commanded_joints import CommandedJoints, takers
+from vsacli.robot.commanded_joints import CommandedJoints, describe_commanded_joints
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
-from vsacli.trajectory.recorded.columns import Column, ColumnLayout, column_layout, known_columns
+from vsacli.trajectory.recorded.columns import (
+    ColumnLayout,
+    SignalColumn,
+    column_layout,
+    trajectory_column_names,
+)
 from vsacli.trajectory.recorded.disorder import Disorder, replace_stamps
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import check_health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem, sample_problems, time_problems
-from vsacli.trajectory.recorded.samples import SampledProfile, Samples
+from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples
 from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -42,7 +47,7 @@ MOST_NAMED = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class RecordedSignals:
     """The content of a CSV file.
 
     Attributes:
@@ -82,28 +87,30 @@ class Recording:
         except InputError as error:
             raise InputError.one(f"rate: {error}", file) from None
 
-    def check_times(self, other: Recording) -> None:
+    def check_times(self, other: RecordedSignals) -> None:
         """Raise an error if another recording, to be combined with this one, has other times.
 
         Raises:
             InputError: times differ; names the first such row of `other`.
         """
-        here, there = self.times.time, other.times.time
-        common = min(len(here), len(there))
-        differ = here[:common] != there[:common]
+        times, other_times = self.times.time, other.times.time
+        common = min(len(times), len(other_times))
+        differ = times[:common] != other_times[:common]
         if differ.any():
             row = int(np.argmax(differ))
-            message = f"time is {there[row]} s, but {here[row]} s in the same row of {self.source.path}"
+            message = (
+                f"time is {other_times[row]} s, but {times[row]} s in the same row of {self.source.path}"
+            )
             raise InputError.one(message, other.source.path, other.lines.of(row))
         if self.first_stamp != other.first_stamp:
             message = f"times begin with {other.first_stamp}, but {self.first_stamp} in {self.source.path}"
             raise InputError.one(message, other.source.path)
-        if len(here) != len(there):
-            message = f"the file has {len(there)} rows, but {self.source.path} has {len(here)}"
+        if len(times) != len(other_times):
+            message = f"the file has {len(other_times)} rows, but {self.source.path} has {len(times)}"
             raise InputError.one(message, other.source.path)
 
 
-def read_recording(
+def read_recorded_signals(
     path: str | os.PathLike[str],
     joints: CommandedJoints,
     wanted: Mapping[Signal, FitChoice] | None = None,
@@ -112,7 +119,7 @@ def read_recording(
     resampled: bool = False,
     unwrap: bool = False,
     progress: Progress = unseen,
-) -> Recording:
+) -> RecordedSignals:
     """Read signals from a CSV file.
 
     Args:
@@ -131,11 +138,11 @@ def read_recording(
     table, layout, time, records, replaced = read_samples(path, joints, wanted, mapping)
     file, signals = table.source.path, [record.signal for record in records]
     wanted = dict.fromkeys(signals, AS_IT_ASKS_FOR) if wanted is None else wanted
-    turns = list(_unwrapped(records, joints)) if unwrap else []
+    turns = list(_unwrap_positions(records, joints)) if unwrap else []
     records, faults = check_health(time, records, list(joints.types.values()))
-    faults += unit_doubts(records, _without_unit(table, layout, joints))
-    warnings = tuple(str(_located(fault, table, layout)) for fault in faults)
-    clauses = (*turns, *_understood(table, replaced), *_unused(layout, signals))
+    faults += unit_doubts(records, _types_without_unit(table, layout, joints))
+    warnings = tuple(str(_locate_problem(fault, table, layout)) for fault in faults)
+    clauses = (*turns, *_notes_on_reading(table, replaced), *_notes_on_unused_columns(layout, signals))
     notes = tuple(f"{file}: {clause}" for clause in clauses)
     source, lines, first_stamp = table.source, table.lines, table.first_stamp
     rated = table.rated or replaced is not None
@@ -145,7 +152,7 @@ def read_recording(
         for each in records
     )
     times = RecordedTimes(time, rounding_notes(time))
-    return Recording(times, profiles, warnings, notes, source, lines, first_stamp, rated)
+    return RecordedSignals(times, profiles, warnings, notes, source, lines, first_stamp, rated)
 
 
 class _ReadSamples(NamedTuple):
@@ -162,7 +169,7 @@ class _ReadSamples(NamedTuple):
     table: Table
     layout: ColumnLayout
     time: FloatArray
-    records: list[Samples]
+    records: list[SignalSamples]
     replaced: Disorder | None
 
 
@@ -172,12 +179,14 @@ def read_samples(
     wanted: Collection[Signal] | None,
     mapping: ColumnMapping,
 ) -> _ReadSamples:
-    """Read the samples of signals, or raise the problems for which a run refuses them; see `read_recording`.
+    """Read the samples of signals, or raise the problems for which a run refuses them.
+
+    See `read_recorded_signals` for the arguments.
 
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    table = read_table(path, mapping, known_columns(joints), empty_cells=True)
+    table = read_table(path, mapping, trajectory_column_names(joints), empty_cells=True)
     table = table.without_hollow_columns().without_empty_rows().with_joined_rows()
     signals = NEEDED if wanted is None else tuple(wanted)
     _check_hollow(table, signals)
@@ -187,11 +196,11 @@ def read_samples(
     if wanted is None:
         devices = (signal for signal in COMMANDED.values() if signal.device is not None)
         signals += tuple(each for each in devices if layout.quantities.get(each.key))
-    time, replaced = replace_stamps(_si(table, layout.time), mapping.rate)
-    records = [_samples(signal, joints.names, time, table, layout) for signal in signals]
+    time, replaced = replace_stamps(_column_in_si_units(table, layout.time), mapping.rate)
+    records = [_samples_from_table(signal, joints.names, time, table, layout) for signal in signals]
     problems = [*time_problems(time), *sample_problems(records)]
     if problems:
-        raise InputError(_located(problem, table, layout) for problem in problems)
+        raise InputError(_locate_problem(problem, table, layout) for problem in problems)
     return _ReadSamples(table, layout, time, records, replaced)
 
 
@@ -228,7 +237,7 @@ def _check_filled(table: Table) -> None:
     raise InputError.one(message, table.source.path, table.line_of(row))
 
 
-def _understood(table: Table, disorder: Disorder | None) -> Iterator[str]:
+def _notes_on_reading(table: Table, disorder: Disorder | None) -> Iterator[str]:
     if table.hollow:
         holds = "it holds" if len(table.hollow) == 1 else "they hold"
         yield f"left out, as {holds} no number: {', '.join(table.hollow)}"
@@ -249,28 +258,31 @@ def _understood(table: Table, disorder: Disorder | None) -> Iterator[str]:
         yield f"ignored: {', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}"
 
 
-def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:
+def _notes_on_unused_columns(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:
     for signal in (POSITION, *COMMANDED.values(), WRENCH):
         if signal not in wanted and any(layout.quantities.get(name) for name in signal.names):
             yield f"its columns of {signal.names[0]} are not used"
     for key, columns in layout.unused.items():
         if columns:
-            yield f"not used: {', '.join(columns)}; only {takers(COMMANDED[key], 'joints')} take a {key}"
+            yield (
+                f"not used: {', '.join(columns)}; only"
+                f" {describe_commanded_joints(COMMANDED[key], 'joints')} take a {key}"
+            )
 
 
-def _samples(
+def _samples_from_table(
     signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: Table, layout: ColumnLayout
-) -> Samples:
+) -> SignalSamples:
     labels = WRENCH_AXES if signal is WRENCH else joint_names
     values, *derivatives = (
-        _rows(table, layout.quantities[name], len(labels)) if name in layout.quantities else None
+        _rows_in_si_units(table, layout.quantities[name], len(labels)) if name in layout.quantities else None
         for name in signal.names
     )
     assert values is not None, "columns of values are required"
-    return Samples.recorded(signal, time, values, tuple(derivatives), labels)
+    return SignalSamples.recorded(signal, time, values, tuple(derivatives), labels)
 
 
-def _unwrapped(records: Sequence[Samples], joints: CommandedJoints) -> Iterator[str]:
+def _unwrap_positions(records: Sequence[SignalSamples], joints: CommandedJoints) -> Iterator[str]:
     """Remove jumps by 2 pi from the positions of revolute joints; yield clauses on their number."""
     for record in records:
         for index, (joint, kind) in enumerate(joints.types.items() if record.signal is POSITION else ()):
@@ -282,7 +294,7 @@ def _unwrapped(records: Sequence[Samples], joints: CommandedJoints) -> Iterator[
                 yield f"{'a jump' if jumps == 1 else f'{jumps} jumps'} by 2 pi taken out of {joint}.q"
 
 
-def _without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoints) -> dict[int, str]:
+def _types_without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoints) -> dict[int, str]:
     """Return the types of joints whose position has no unit in the header, by index."""
     headings = {
         index: table.columns[column.index]
@@ -292,15 +304,15 @@ def _without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoints) -
     return {index: types[index] for index, heading in headings.items() if "[" not in heading}
 
 
-def _rows(table: Table, columns: Mapping[int, Column], components: int) -> FloatArray:
+def _rows_in_si_units(table: Table, columns: Mapping[int, SignalColumn], components: int) -> FloatArray:
     """Return columns in SI units, (components, samples); NaN for components without a column."""
     rows = np.full((components, len(table.values)), np.nan)
     for component, column in columns.items():
-        rows[component] = _si(table, column)
+        rows[component] = _column_in_si_units(table, column)
     return rows
 
 
-def _si(table: Table, column: Column) -> FloatArray:
+def _column_in_si_units(table: Table, column: SignalColumn) -> FloatArray:
     """Return a column in SI units; by division if that is exact, so that 3 ms are 0.003 s."""
     values = np.ascontiguousarray(table.values[:, column.index])
     divisor = round(1 / column.factor)
@@ -310,7 +322,7 @@ def _si(table: Table, column: Column) -> FloatArray:
         return values * column.factor
 
 
-def _located(problem: SampleProblem, table: Table, layout: ColumnLayout) -> Problem:
+def _locate_problem(problem: SampleProblem, table: Table, layout: ColumnLayout) -> Problem:
     line = 0 if problem.sample is None else table.line_of(problem.sample)
     column = (
         problem.quantity if problem.joint is None else layout.quantities[problem.quantity][problem.joint].name
@@ -328,16 +340,16 @@ def recorded_trajectory(
 
     Args:
         path: path of the file.
-        joints: see `read_recording`.
-        progress: see `read_recording`.
+        joints: see `read_recorded_signals`.
+        progress: see `read_recorded_signals`.
         rate: sample rate, 1/s, of the file if it has no times, else of the trajectory.
 
     Raises:
-        InputError: see `read_recording`.
+        InputError: see `read_recorded_signals`.
         ChangeError: the rate is not possible.
     """
     mapping, resampled = ColumnMapping(rate=rate), rate is not None
-    recording = read_recording(path, joints, mapping=mapping, resampled=resampled, progress=progress)
+    recording = read_recorded_signals(path, joints, mapping=mapping, resampled=resampled, progress=progress)
     profiles = {profile.signal.key: profile for profile in recording.profiles}
     source = recording.source
     try:

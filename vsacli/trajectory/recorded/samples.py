@@ -21,7 +21,7 @@ from vsacli.trajectory.times import stretch
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Samples:
+class SignalSamples:
     """A signal at recorded times; `time_problems` and `sample_problems` check whether it can be used.
 
     Attributes:
@@ -48,7 +48,7 @@ class Samples:
         values: FloatArray,
         derivatives: tuple[FloatArray | None, ...],
         labels: tuple[str, ...],
-    ) -> Samples:
+    ) -> SignalSamples:
         """Return samples from stamps, (samples,), s, counted from any instant."""
         start = float(stamps[0]) if len(stamps) else 0.0
         return cls(
@@ -61,7 +61,7 @@ class Samples:
         )
 
     @property
-    def given(self) -> BoolArray:
+    def has_values(self) -> BoolArray:
         """Mask of components with values, (components,)."""
         absent: BoolArray = np.all(np.isnan(self.values), axis=1)
         return ~absent if self.signal.optional else np.ones_like(absent)
@@ -69,18 +69,20 @@ class Samples:
     @property
     def complete(self) -> bool:
         """Whether all derivatives are given."""
-        return all(given is not None for given in self.derivatives)
+        return all(derivative is not None for derivative in self.derivatives)
 
     @cached_property
     def rows(self) -> FloatArray:
         """Value and all derivatives, (orders, components, samples), if all are given."""
-        return np.stack([self.values, *(given for given in self.derivatives if given is not None)])
+        return np.stack(
+            [self.values, *(derivative for derivative in self.derivatives if derivative is not None)]
+        )
 
     @property
     def missing(self) -> tuple[str, ...]:
         """Names of the derivatives that are not given."""
         pairs = zip(self.signal.names[1:], self.derivatives, strict=True)
-        return tuple(name for name, given in pairs if given is None)
+        return tuple(name for name, derivative in pairs if derivative is None)
 
     @property
     def columns(self) -> dict[str, FloatArray]:
@@ -88,7 +90,7 @@ class Samples:
         pairs = zip(self.signal.names, (self.values, *self.derivatives), strict=True)
         return {name: rows for name, rows in pairs if rows is not None}
 
-    def with_columns(self, columns: Mapping[str, FloatArray]) -> Samples:
+    def with_columns(self, columns: Mapping[str, FloatArray]) -> SignalSamples:
         """Return the samples with other numbers in the same columns, see `columns`."""
         value, *names = self.signal.names
         return replace(self, values=columns[value], derivatives=tuple(map(columns.get, names)))
@@ -107,11 +109,11 @@ class Samples:
                 self.signal.names, self.labels, self.time, self.derivatives, fit, start=self.start
             )
 
-    def stretched(self, factor: float) -> Samples:
+    def stretched(self, factor: float) -> SignalSamples:
         """Return the samples further apart by a factor, with given derivatives scaled accordingly."""
         derivatives = tuple(
-            None if given is None else given / factor**order
-            for order, given in enumerate(self.derivatives, start=1)
+            None if derivative is None else derivative / factor**order
+            for order, derivative in enumerate(self.derivatives, start=1)
         )
         return replace(self, time=stretch(self.time, 0.0, factor), derivatives=derivatives)
 
@@ -132,7 +134,7 @@ class SampledProfile:
         warnings: sentences on estimated values, and on given derivatives that do not follow from the values.
     """
 
-    record: Samples
+    record: SignalSamples
     fit: Fit
     choice: FitChoice = AS_IT_ASKS_FOR
     resampled: bool = False
@@ -141,7 +143,7 @@ class SampledProfile:
     @classmethod
     def of(
         cls,
-        record: Samples,
+        record: SignalSamples,
         choice: FitChoice = AS_IT_ASKS_FOR,
         *,
         resampled: bool = False,
@@ -187,11 +189,11 @@ class SampledProfile:
         """Notes on the interpretation of noise, and on given derivatives that are not used."""
         record = self.record
         of_fit = tuple(fit_notes(record.signal.names[0], record.labels, self.fit)) if self.fitted else ()
-        given = [name for name in record.signal.names[1:] if name not in record.missing]
-        if not self.resampled or not given:
+        unused = [name for name in record.signal.names[1:] if name not in record.missing]
+        if not self.resampled or not unused:
             return of_fit
-        verb = "plays" if len(given) == 1 else "play"
-        return (*of_fit, f"the given {', '.join(given)} {verb} no part, since the steps are resampled")
+        verb = "plays" if len(unused) == 1 else "play"
+        return (*of_fit, f"the given {', '.join(unused)} {verb} no part, since the steps are resampled")
 
     @property
     def fitted(self) -> bool:
@@ -217,14 +219,18 @@ class SampledProfile:
     @property
     def known_between(self) -> bool:
         """Whether `at` agrees with the samples: all derivatives come from the fit, or are consistent."""
-        nothing_given = all(given is None for given in self.record.derivatives)
-        return self.resampled or nothing_given or self._through_all
+        without_derivatives = all(derivative is None for derivative in self.record.derivatives)
+        return self.resampled or without_derivatives or self._through_all
 
     @cached_property
     def _through_all(self) -> bool:
         """Whether all derivatives are given and consistent, so that they determine values between samples."""
         record = self.record
-        return not self.resampled and record.complete and hermite.belong_together(record.time, record.rows)
+        return (
+            not self.resampled
+            and record.complete
+            and hermite.derivatives_are_consistent(record.time, record.rows)
+        )
 
     def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
         """Return value and derivatives at samples start..stop-1: given ones, and the fit for others."""
@@ -238,15 +244,15 @@ class SampledProfile:
             rows = self.at(record.time[start:stop])
             exact = self.fit.exact
         rows[0, exact] = record.values[exact, start:stop]
-        for row, given in zip(rows[1:], record.derivatives, strict=True):
-            if given is not None:
-                row[:] = given[:, start:stop]
+        for row, derivative in zip(rows[1:], record.derivatives, strict=True):
+            if derivative is not None:
+                row[:] = derivative[:, start:stop]
         return rows
 
     def at(self, time: FloatArray) -> FloatArray:
         """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
         if self._through_all:
-            return hermite.interpolated(self.record.time, self.record.rows, time)
+            return hermite.interpolate_hermite(self.record.time, self.record.rows, time)
         return self.fit.at(time, self.record.signal.orders)
 
     def advice_without_derivative(self) -> dict[str, str]:
@@ -266,23 +272,23 @@ class SampledProfile:
         It is zero for given derivatives, and NaN for components of unknown uncertainty, e.g. if the spline
         follows a vibration that may be noise. For components that are not `stated` it is only a bound.
         """
-        found = self.fit.covariance(time)
+        covariances = self.fit.covariance(time)
         for members, covariance in unresolved(self.fit, self.signal.orders):
-            found[members] = covariance[..., None]
+            covariances[members] = covariance[..., None]
         for member, covariance in vibrations(self.fit, self.signal.orders):
-            found[member] += covariance[..., None]
-        given = [name not in self.estimated for name in self.signal.names]
-        found[:, given] = 0
-        found[:, :, given] = 0
-        return found
+            covariances[member] += covariance[..., None]
+        exact = [name not in self.estimated for name in self.signal.names]
+        covariances[:, exact] = 0
+        covariances[:, :, exact] = 0
+        return covariances
 
     @cached_property
     def stated(self) -> BoolArray:
         """Mask of components with a reliable standard deviation, (components,)."""
         stated = np.ones(self.components, dtype=bool)
         for part in self.fit.parts:
-            known = part.smoothing
-            stated[part.members] = known is None or (known.resolved and not known.lines.others)
+            smoothing = part.smoothing
+            stated[part.members] = smoothing is None or (smoothing.resolved and not smoothing.lines.others)
         return stated
 
     def stretched(self, factor: float) -> SampledProfile:

@@ -9,7 +9,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import time_text
 from vsacli.documents.time_column import UNITS, unit_of_steps
-from vsacli.trajectory.recorded.even_stamps import resolution
+from vsacli.trajectory.recorded.even_stamps import stamp_resolution
 from vsacli.trajectory.recorded.problems import SampleProblem
 from vsacli.trajectory.recorded.thresholds import (
     ENOUGH_ROWS,
@@ -25,7 +25,7 @@ def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
     steps = np.diff(stamps)
     usual = float(np.median(steps))
     if len(stamps) >= ENOUGH_ROWS and not SHORTEST_STEP <= usual <= LONGEST_STEP:
-        yield SampleProblem("time", _of_another_unit(usual, float(stamps[-1] - stamps[0])))
+        yield SampleProblem("time", _suspect_unit(usual, float(stamps[-1] - stamps[0])))
         return
     long = np.flatnonzero(steps > GAP_STEPS * usual)
     if long.size:
@@ -61,7 +61,7 @@ def step_text(step: float) -> str:
     return f"{size:.3g} {unit}"
 
 
-def _of_another_unit(usual: float, duration: float) -> str:
+def _suspect_unit(usual: float, duration: float) -> str:
     rows = f"rows are {usual:.4g} s apart, and the recording lasts {float(f'{duration:.4g}'):g} s"
     unit = unit_of_steps(usual)
     if unit is None:
@@ -75,4 +75,4 @@ def _jitter(stamps: FloatArray, steps: FloatArray, usual: float) -> float:
     if len(steps) < 2:
         return 0.0
     change = float(np.median(np.abs(np.diff(steps))))
-    return max(0.0, change - 2 * resolution(stamps)) / usual
+    return max(0.0, change - 2 * stamp_resolution(stamps)) / usual

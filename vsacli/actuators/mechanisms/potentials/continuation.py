@@ -1,8 +1,8 @@
 """Solution of (14) for a potential by numerical continuation, on the branch of a start.
 
 `LevelCurves.step` is a predictor-corrector step along a level curve of the torque that stays on one monotone
-piece of the stiffness. `Branch` continues the start to the torque of a sample, and from there to both ends of
-the piece and to the demanded stiffness.
+piece of the stiffness. `ContinuedBranch` continues the start to the torque of a sample, and from there to
+both ends of the piece and to the demanded stiffness.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ CONTRACTION = 0.1
 """Largest ratio of two successive Newton corrections with which the method counts as convergent."""
 
 
-class Spot(NamedTuple):
+class LevelPoint(NamedTuple):
     """A point (phi, theta_2); arrays (samples,).
 
     Attributes:
@@ -73,13 +73,13 @@ class Spot(NamedTuple):
     @property
     def steepness(self) -> FloatArray:
         """Length of the torque's gradient."""
-        return length(self.torque_1, self.torque_2)
+        return vector_length(self.torque_1, self.torque_2)
 
     @property
     def sine(self) -> FloatArray:
         """Sine of the angle from the torque's gradient to that of the stiffness: zero where A is singular."""
         determinant = self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
-        return determinant / (self.steepness * length(self.stiffness_1, self.stiffness_2))
+        return determinant / (self.steepness * vector_length(self.stiffness_1, self.stiffness_2))
 
     @property
     def slope(self) -> FloatArray:
@@ -91,7 +91,7 @@ class Spot(NamedTuple):
         """Unit vector along the level curve, over the ranges; the stiffness grows if the sine is positive."""
         return -self.torque_2 / self.steepness, self.torque_1 / self.steepness
 
-    def to(self, tau_e: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def newton_step(self, tau_e: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the Newton step to a torque and a stiffness, as a share of the ranges."""
         missing = tau_e - self.tau_e, stiffness - self.stiffness
         determinant = self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
@@ -100,12 +100,12 @@ class Spot(NamedTuple):
             (self.torque_1 * missing[1] - self.stiffness_1 * missing[0]) / determinant,
         )
 
-    def chosen(self, mask: BoolArray, other: Spot) -> Spot:
+    def where(self, mask: BoolArray, other: LevelPoint) -> LevelPoint:
         """Return this point where the mask holds, else the other."""
-        return Spot(*(np.where(mask, *pair) for pair in zip(self, other, strict=True)))
+        return LevelPoint(*(np.where(mask, *pair) for pair in zip(self, other, strict=True)))
 
 
-def length(a: FloatArray, b: FloatArray) -> FloatArray:
+def vector_length(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the length of a vector; `numpy.hypot` takes ten times as long to avoid overflow."""
     return np.sqrt(a * a + b * b)
 
@@ -126,11 +126,11 @@ class LevelCurves:
         self._low = phi[0], theta_2[0]
         self._width = phi[1] - phi[0], theta_2[1] - theta_2[0]
 
-    def spot(self, phi: FloatArray, s: FloatArray, q: FloatArray) -> Spot:
+    def point_at(self, phi: FloatArray, s: FloatArray, q: FloatArray) -> LevelPoint:
         """Return the point at a deflection, a position of motor 2 and one of the joint."""
         u = self._potential.derivatives((phi, s, q), ROWS)
         rows, (by_phi, by_s) = u.matrix, self._width
-        return Spot(
+        return LevelPoint(
             phi,
             s,
             -u(0),
@@ -141,66 +141,66 @@ class LevelCurves:
             rows.stiffness_2 * by_s,
         )
 
-    def moved(self, spot: Spot, step: tuple[FloatArray, FloatArray], q: FloatArray) -> Spot:
+    def move(self, point: LevelPoint, step: tuple[FloatArray, FloatArray], q: FloatArray) -> LevelPoint:
         """Return a point moved by a step, as a share of the ranges."""
-        return self.spot(spot.phi + self._width[0] * step[0], spot.s + self._width[1] * step[1], q)
+        return self.point_at(point.phi + self._width[0] * step[0], point.s + self._width[1] * step[1], q)
 
-    def onto(self, spot: Spot, tau_e: FloatArray) -> Spot:
+    def project_onto(self, point: LevelPoint, tau_e: FloatArray) -> LevelPoint:
         """Return the nearest point on the level curve of a torque, with its stiffness, to first order."""
-        share = (tau_e - spot.tau_e) / (spot.steepness * spot.steepness)
-        by_torque = spot.stiffness_1 * spot.torque_1 + spot.stiffness_2 * spot.torque_2
-        return spot._replace(
-            phi=spot.phi + self._width[0] * spot.torque_1 * share,
-            s=spot.s + self._width[1] * spot.torque_2 * share,
-            stiffness=spot.stiffness + by_torque * share,
+        share = (tau_e - point.tau_e) / (point.steepness * point.steepness)
+        by_torque = point.stiffness_1 * point.torque_1 + point.stiffness_2 * point.torque_2
+        return point._replace(
+            phi=point.phi + self._width[0] * point.torque_1 * share,
+            s=point.s + self._width[1] * point.torque_2 * share,
+            stiffness=point.stiffness + by_torque * share,
         )
 
-    def distance(self, spot: Spot) -> FloatArray:
+    def distance_to_range_end(self, point: LevelPoint) -> FloatArray:
         """Return the distance to the nearest end of a range, as a share of it; negative outside."""
         phi, s = (
-            (value - low) / width for value, low, width in zip(spot[:2], self._low, self._width, strict=True)
+            (value - low) / width for value, low, width in zip(point[:2], self._low, self._width, strict=True)
         )
         return np.minimum(np.minimum(phi, 1 - phi), np.minimum(s, 1 - s))
 
-    def room(self, spot: Spot) -> FloatArray:
+    def room(self, point: LevelPoint) -> FloatArray:
         """Return a measure of the distance from all ends of the piece, zero at each of them."""
-        room: FloatArray = np.abs(spot.sine) * spot.stiffness
-        for value, low, width in zip(spot[:2], self._low, self._width, strict=True):
+        room: FloatArray = np.abs(point.sine) * point.stiffness
+        for value, low, width in zip(point[:2], self._low, self._width, strict=True):
             part = (value - low) / width
             room = room * part * (1 - part)
         return room
 
     def step(
-        self, spot: Spot, h: FloatArray, tau_e: FloatArray, q: FloatArray, dq: FloatArray | float = 0.0
-    ) -> tuple[Spot, BoolArray]:
+        self, point: LevelPoint, h: FloatArray, tau_e: FloatArray, q: FloatArray, dq: FloatArray | float = 0.0
+    ) -> tuple[LevelPoint, BoolArray]:
         """Return a step of length h along a level curve, back onto tau_e, and whether it stays on the piece.
 
         Args:
-            spot: Point at which to begin.
+            point: Point at which to begin.
             h: Length, as a share of the ranges; the stiffness grows with it if the sine is positive.
             tau_e: Torque of the level curve.
             q: Position of the joint.
-            dq: Distance of q from the joint position at `spot`.
+            dq: Distance of q from the joint position at `point`.
         """
-        first, second = spot.along
-        by_q = spot.torque_1 / self._width[0] - spot.stiffness  # of the torque, at constant phi and theta_2
-        onto = (tau_e - spot.tau_e - by_q * dq) / (spot.steepness * spot.steepness)
-        step = h * first + onto * spot.torque_1, h * second + onto * spot.torque_2
-        predicted = self.moved(spot, step, q)
+        first, second = point.along
+        by_q = point.torque_1 / self._width[0] - point.stiffness  # of the torque, at constant phi and theta_2
+        onto = (tau_e - point.tau_e - by_q * dq) / (point.steepness * point.steepness)
+        step = h * first + onto * point.torque_1, h * second + onto * point.torque_2
+        predicted = self.move(point, step, q)
         onto = (tau_e - predicted.tau_e) / (predicted.steepness * predicted.steepness)
         correction = onto * predicted.torque_1, onto * predicted.torque_2
-        reached = self.moved(spot, (step[0] + correction[0], step[1] + correction[1]), q)
-        size, left = length(*correction), np.abs(tau_e - reached.tau_e) / reached.steepness
-        explained = h * (spot.slope + reached.slope) / 2
-        change = self.onto(reached, tau_e).stiffness - self.onto(spot, tau_e).stiffness
+        reached = self.move(point, (step[0] + correction[0], step[1] + correction[1]), q)
+        size, left = vector_length(*correction), np.abs(tau_e - reached.tau_e) / reached.steepness
+        explained = h * (point.slope + reached.slope) / 2
+        change = self.project_onto(reached, tau_e).stiffness - self.project_onto(point, tau_e).stiffness
         turned = first * reached.along[0] + second * reached.along[1]
         stays = (
-            (length(step[0], step[1]) + size <= 2 * MAX_STEP)
+            (vector_length(step[0], step[1]) + size <= 2 * MAX_STEP)
             & (left <= np.minimum(CONTRACTION * size + LEAST_STEP, LEVEL_ERROR))
             & (turned >= LEAST_COSINE)
             & ((np.abs(h) < SHORT) | (np.abs(change - explained) <= MOST_UNEXPLAINED * np.abs(explained)))
-            & (reached.stiffness >= LEAST_SHARE * spot.stiffness)
-            & (reached.sine / spot.sine >= LEAST_SHARE)
+            & (reached.stiffness >= LEAST_SHARE * point.stiffness)
+            & (reached.sine / point.sine >= LEAST_SHARE)
         )
         return reached, stays
 
@@ -222,15 +222,15 @@ RESIDUAL = OfRounding(1e-10, power=0.75)
 """Largest error of a solution: of the stiffness; of the torque, as a share of its change over the ranges."""
 
 
-class Piece(NamedTuple):
+class StiffnessPiece(NamedTuple):
     """A point of the piece, and its ends of least and of largest stiffness."""
 
-    seed: Spot
-    low: Spot
-    high: Spot
+    seed: LevelPoint
+    low: LevelPoint
+    high: LevelPoint
 
 
-class Branch:
+class ContinuedBranch:
     """Solutions continued from a start, at which q = 0.
 
     Attributes:
@@ -240,16 +240,16 @@ class Branch:
 
     def __init__(self, curves: LevelCurves, phi: float, theta_2: float) -> None:
         self._curves = curves
-        self._known: tuple[tuple[FloatArray, FloatArray], Piece] | None = None
+        self._last: tuple[tuple[FloatArray, FloatArray], StiffnessPiece] | None = None
         with np.errstate(all="ignore"):
-            self.start = curves.spot(np.array([phi]), np.array([theta_2]), np.zeros(1))
+            self.start = curves.point_at(np.array([phi]), np.array([theta_2]), np.zeros(1))
             self.orientation = float(np.sign(self.start.sine[0]))
 
     @property
-    def stiffest(self) -> Spot:
+    def stiffest(self) -> LevelPoint:
         """Point of the largest stiffness at the torque of the start, arrays (1,)."""
         with np.errstate(all="ignore"):
-            return self._followed(self.start.tau_e, np.zeros(1)).high
+            return self._piece_by_walks(self.start.tau_e, np.zeros(1)).high
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """See `Mechanism.solve`."""
@@ -258,40 +258,42 @@ class Branch:
             none = low.stiffness <= LEAST_STIFFNESS * self.start.stiffness
             lower = np.where(none, 0.0, low.stiffness)
             inside = (stiffness > lower) & (stiffness < high.stiffness)
-            found = self._met(seed, np.where(inside, stiffness, seed.stiffness), tau_e, q)
-            failed = inside & ~self._is_met(found, stiffness, tau_e)
-            end = high.chosen(stiffness >= high.stiffness, low)
+            solution = self._point_of_stiffness(seed, np.where(inside, stiffness, seed.stiffness), tau_e, q)
+            failed = inside & ~self._is_solved(solution, stiffness, tau_e)
+            end = high.where(stiffness >= high.stiffness, low)
         return PairSolution(
             lower=np.where(failed, np.nan, lower),
             upper=np.where(failed, np.nan, high.stiffness),
             lower_critical=~none & self._is_critical(low),
             upper_critical=self._is_critical(high),
             slack_below=np.zeros_like(failed),
-            phi_1=np.where(inside, found.phi, end.phi),
-            phi_2=np.where(inside, found.s, end.s),
+            phi_1=np.where(inside, solution.phi, end.phi),
+            phi_2=np.where(inside, solution.s, end.s),
         )
 
-    def _piece(self, tau_e: FloatArray, q: FloatArray) -> Piece:
+    def _piece(self, tau_e: FloatArray, q: FloatArray) -> StiffnessPiece:
         """Return the pieces at torques and positions.
 
         The last pieces are kept, since searches solve for the same torques repeatedly.
         """
         if not isinstance(tau_e, np.ndarray):
-            return self._followed(tau_e, q)
-        known = self._known
-        if known is None or not all(map(np.array_equal, known[0], (tau_e, q))):
-            self._known = known = (tau_e.copy(), q.copy()), self._followed(tau_e, q)
-        return known[1]
+            return self._piece_by_walks(tau_e, q)
+        last = self._last
+        if last is None or not all(map(np.array_equal, last[0], (tau_e, q))):
+            self._last = last = (tau_e.copy(), q.copy()), self._piece_by_walks(tau_e, q)
+        return last[1]
 
-    def _followed(self, tau_e: FloatArray, q: FloatArray) -> Piece:
+    def _piece_by_walks(self, tau_e: FloatArray, q: FloatArray) -> StiffnessPiece:
         """Return the pieces, by walks to both ends, computed as one array."""
         seed, count = self._seed(tau_e, q), len(tau_e)
         both = [np.concatenate((each, each)) for each in (tau_e, q, *seed)]
         side = np.concatenate((np.full_like(tau_e, -1.0), np.ones_like(tau_e)))
-        ends = self._walk(Spot(*both[2:]), side, side * np.inf, both[0], both[1])
-        return Piece(seed, Spot(*(each[:count] for each in ends)), Spot(*(each[count:] for each in ends)))
+        ends = self._walk(LevelPoint(*both[2:]), side, side * np.inf, both[0], both[1])
+        return StiffnessPiece(
+            seed, LevelPoint(*(each[:count] for each in ends)), LevelPoint(*(each[count:] for each in ends))
+        )
 
-    def _seed(self, tau_e: FloatArray, q: FloatArray) -> Spot:
+    def _seed(self, tau_e: FloatArray, q: FloatArray) -> LevelPoint:
         """Return a point of the branch at torques and positions, NaN where there is none.
 
         Torque and position move proportionally from the start to their values. Meanwhile the point moves
@@ -300,70 +302,82 @@ class Branch:
 
         def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
             share, gain, h, *values = state
-            spot, (tau_e, q) = Spot(*values), constants
+            point, (tau_e, q) = LevelPoint(*values), constants
             start = self.start.tau_e + np.zeros_like(tau_e)
             target = np.minimum(share + gain, 1.0)
             reached, stays = self._curves.step(
-                spot, np.zeros_like(h), start + target * (tau_e - start), target * q, (target - share) * q
+                point, np.zeros_like(h), start + target * (tau_e - start), target * q, (target - share) * q
             )
-            stays = stays & (self._curves.distance(reached) >= 0)
-            spot, share = reached.chosen(stays, spot), np.where(stays, target, share)
-            aside, better = self._curves.step(spot, h, start + share * (tau_e - start), share * q)
-            better = better & (self._curves.distance(aside) >= 0)
-            better = better & (self._curves.room(aside) > self._curves.room(spot))
+            stays = stays & (self._curves.distance_to_range_end(reached) >= 0)
+            point, share = reached.where(stays, point), np.where(stays, target, share)
+            aside, better = self._curves.step(point, h, start + share * (tau_e - start), share * q)
+            better = better & (self._curves.distance_to_range_end(aside) >= 0)
+            better = better & (self._curves.room(aside) > self._curves.room(point))
             h = np.where(better, 1.5 * h, -h / 2)
             h = np.where(np.abs(h) > MAX_STEP, MAX_STEP, h)
             gain = np.where(stays, 2 * gain, gain / 3)
-            return (share, gain, h, *aside.chosen(better, spot)), (share == 1) | ~(gain > LEAST_STEP)
+            return (share, gain, h, *aside.where(better, point)), (share == 1) | ~(gain > LEAST_STEP)
 
         like = np.zeros_like(tau_e)
         begin = (like, like + 0.25, like + 0.02, *(like + each for each in self.start))
         share, _, _, *values = repeat(step, begin, (tau_e, q), MAX_STEPS)
-        return Spot(*(np.where(share == 1, each, np.nan) for each in values))
+        return LevelPoint(*(np.where(share == 1, each, np.nan) for each in values))
 
     def _walk(
-        self, seed: Spot, direction: FloatArray, goal: FloatArray, tau_e: FloatArray, q: FloatArray
-    ) -> Spot:
+        self, seed: LevelPoint, direction: FloatArray, goal: FloatArray, tau_e: FloatArray, q: FloatArray
+    ) -> LevelPoint:
         """Return the goal, or the end of the piece before it; direction 1 for growing stiffness, else -1."""
 
         def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
             h, *values = state
-            spot, (direction, goal, tau_e, q) = Spot(*values), constants
-            reached, stays = self._curves.step(spot, h * direction * self.orientation, tau_e, q)
-            here, there = (
-                np.minimum(self._curves.distance(each), direction * (goal - each.stiffness) / spot.stiffness)
-                for each in (self._curves.onto(spot, tau_e), self._curves.onto(reached, tau_e))
+            point, (direction, goal, tau_e, q) = LevelPoint(*values), constants
+            reached, stays = self._curves.step(point, h * direction * self.orientation, tau_e, q)
+            room_before, room_after = (
+                np.minimum(
+                    self._curves.distance_to_range_end(each),
+                    direction * (goal - each.stiffness) / point.stiffness,
+                )
+                for each in (
+                    self._curves.project_onto(point, tau_e),
+                    self._curves.project_onto(reached, tau_e),
+                )
             )
-            inside = stays & (there >= 0)
-            share = np.where(stays, np.minimum(np.maximum(here / (here - there), 0.02), 0.98), 1 / 3)
-            over = ~inside & ((h * share <= LEAST_STEP) | (here <= LEAST_STEP))
-            over = over | (length(*spot.to(tau_e, goal)) <= CLOSE * np.abs(spot.sine))
-            spot = reached.chosen(inside, spot)
-            none = spot.stiffness <= LEAST_STIFFNESS * self.start.stiffness
+            inside = stays & (room_after >= 0)
+            share = np.where(
+                stays, np.minimum(np.maximum(room_before / (room_before - room_after), 0.02), 0.98), 1 / 3
+            )
+            over = ~inside & ((h * share <= LEAST_STEP) | (room_before <= LEAST_STEP))
+            over = over | (vector_length(*point.newton_step(tau_e, goal)) <= CLOSE * np.abs(point.sine))
+            point = reached.where(inside, point)
+            none = point.stiffness <= LEAST_STIFFNESS * self.start.stiffness
             h = np.where(inside, np.minimum(1.5 * h, MAX_STEP), h * share)
-            return (h, *spot), over | none | ~(spot.sine * self.orientation > LEAST_SINE)
+            return (h, *point), over | none | ~(point.sine * self.orientation > LEAST_SINE)
 
         begin = (np.full_like(tau_e, MAX_STEP / 4), *seed)
         _, *values = repeat(step, begin, (direction, goal, tau_e, q), MAX_STEPS)
-        end = self._curves.onto(Spot(*values), tau_e)
-        return self._curves.spot(end.phi, end.s, q)
+        end = self._curves.project_onto(LevelPoint(*values), tau_e)
+        return self._curves.point_at(end.phi, end.s, q)
 
-    def _met(self, seed: Spot, demand: FloatArray, tau_e: FloatArray, q: FloatArray) -> Spot:
+    def _point_of_stiffness(
+        self, seed: LevelPoint, demand: FloatArray, tau_e: FloatArray, q: FloatArray
+    ) -> LevelPoint:
         """Return the point of the piece with a stiffness: by a walk, then by Newton's method."""
         direction = np.where(demand >= seed.stiffness, 1.0, -1.0)
-        spot = self._walk(seed, direction, demand, tau_e, q)
+        point = self._walk(seed, direction, demand, tau_e, q)
         for _ in range(NEWTON_STEPS):
-            step = spot.to(tau_e, demand)
-            small = length(*step) <= CONTRACTION * np.abs(spot.sine)
-            spot = self._curves.moved(spot, (np.where(small, step[0], 0.0), np.where(small, step[1], 0.0)), q)
-        return spot
+            step = point.newton_step(tau_e, demand)
+            small = vector_length(*step) <= CONTRACTION * np.abs(point.sine)
+            point = self._curves.move(
+                point, (np.where(small, step[0], 0.0), np.where(small, step[1], 0.0)), q
+            )
+        return point
 
-    def _is_met(self, spot: Spot, demand: FloatArray, tau_e: FloatArray) -> BoolArray:
-        met: BoolArray = (np.abs(tau_e - spot.tau_e) <= RESIDUAL * spot.steepness) & (
-            np.abs(demand - spot.stiffness) <= RESIDUAL * (self.start.stiffness + demand)
+    def _is_solved(self, point: LevelPoint, demand: FloatArray, tau_e: FloatArray) -> BoolArray:
+        solved: BoolArray = (np.abs(tau_e - point.tau_e) <= RESIDUAL * point.steepness) & (
+            np.abs(demand - point.stiffness) <= RESIDUAL * (self.start.stiffness + demand)
         )
-        return met
+        return solved
 
-    def _is_critical(self, spot: Spot) -> BoolArray:
-        critical: BoolArray = np.abs(spot.sine) / 10 <= LEAST_SINE
+    def _is_critical(self, point: LevelPoint) -> BoolArray:
+        critical: BoolArray = np.abs(point.sine) / 10 <= LEAST_SINE
         return critical

@@ -13,7 +13,7 @@ import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms.mechanism import Mechanism
-from vsacli.actuators.mechanisms.potentials.continuation import Branch, LevelCurves
+from vsacli.actuators.mechanisms.potentials.continuation import ContinuedBranch, LevelCurves
 from vsacli.actuators.mechanisms.potentials.potential_energy import (
     ACCELERATIONS,
     RESERVED,
@@ -126,13 +126,13 @@ class Potential(Mechanism):
             distance = np.where(lost, np.hypot(far[0][:, None], far[1]), np.inf)
             phi, s = np.unravel_index(distance.argmin(), distance.shape)
             what = "the energy or one of its first four derivatives is not finite"
-            yield f"{what} {_place(axes[0][phi], axes[1][s])}; narrow the range to where it holds"
+            yield f"{what} {_format_position(axes[0][phi], axes[1][s])}; narrow the range to where it holds"
 
     def _poles(self) -> Iterator[str]:
         """Yield a point at which the stiffness grows without bound on the branch of the start."""
         stiffest = self._branch.stiffest
         if stiffest.stiffness[0] > UNBOUNDED * self._branch.start.stiffness[0]:
-            place = _place(stiffest.phi[0], stiffest.s[0])
+            place = _format_position(stiffest.phi[0], stiffest.s[0])
             yield f"the energy is not finite {place}, where the stiffness grows beyond all bounds"
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
@@ -149,14 +149,14 @@ class Potential(Mechanism):
         return PotentialEnergy(read_energy(self.energy, constants), constants)
 
     @cached_property
-    def _branch(self) -> Branch:
+    def _branch(self) -> ContinuedBranch:
         curves = LevelCurves(self._potential, self.range.phi, self.range.theta_2)
-        return Branch(curves, self.start.theta_1, self.start.theta_2)
+        return ContinuedBranch(curves, self.start.theta_1, self.start.theta_2)
 
     def _problems(self) -> Iterator[FieldProblem]:
         """Yield the problems of the energy; without any, those of the branch."""
-        found = [*self._word_problems(), *self._range_problems()]
-        yield from found or self._branch_problems()
+        problems = [*self._word_problems(), *self._range_problems()]
+        yield from problems or self._branch_problems()
 
     def _word_problems(self) -> Iterator[FieldProblem]:
         constants = dict(self.constants)
@@ -193,8 +193,8 @@ class Potential(Mechanism):
         with np.errstate(all="ignore"):
             (sine,), (stiffness,) = np.abs(start.sine), start.stiffness
             at_start = np.array([[self.start.theta_1], [self.start.theta_2], [0.0]])
-            known = self._potential.derivatives(at_start, ACCELERATIONS).finite
-        if not known.all():
+            finite = self._potential.derivatives(at_start, ACCELERATIONS).finite
+        if not finite.all():
             reason = "the energy or one of its first four derivatives is not finite here"
         elif stiffness <= 0:
             reason = f"the stiffness, the second derivative over q, must be positive here, not {stiffness:g}"
@@ -214,7 +214,7 @@ class Potential(Mechanism):
         return bool((solution.lower < solution.upper)[0])
 
 
-def _place(phi: float, theta_2: float) -> str:
+def _format_position(phi: float, theta_2: float) -> str:
     return f"at phi = {phi:.4g}, theta_2 = {theta_2:.4g}"
 
 

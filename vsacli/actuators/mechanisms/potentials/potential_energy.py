@@ -63,25 +63,27 @@ class PotentialEnergy:
         self._constants = {name: np.float64(number) for name, number in constants.items()}
         self._row_functions: dict[Truncation, RowFunction] = {}
 
-    def derivatives(self, coordinates: Components, truncation: Truncation) -> Derivatives:
+    def derivatives(self, coordinates: Components, truncation: Truncation) -> PotentialDerivatives:
         """Return the derivatives by q, theta_1 and theta_2 at coordinates phi, theta_2 and q.
 
         For numbers, a program traced from the series is run: the series itself would take ten times as long,
         for bookkeeping of the orders.
         """
-        if not all(isinstance(each, np.ndarray) for each in coordinates):
-            return Derivatives(
+        if not all(isinstance(row, np.ndarray) for row in coordinates):
+            return PotentialDerivatives(
                 dict(zip(truncation.orders, self._series(coordinates, truncation), strict=True))
             )
         if truncation not in self._row_functions:
-            self._row_functions[truncation] = self._traced(truncation)
+            self._row_functions[truncation] = self._trace_series(truncation)
         function, shape = self._row_functions[truncation], coordinates[0].shape
-        flat = [np.ravel(each) for each in coordinates]
+        flat = [np.ravel(row) for row in coordinates]
         values = np.empty((len(truncation.orders), flat[0].size))
         function(flat, values, function.workspace(flat[0].size))
-        return Derivatives(dict(zip(truncation.orders, values.reshape(len(values), *shape), strict=True)))
+        return PotentialDerivatives(
+            dict(zip(truncation.orders, values.reshape(len(values), *shape), strict=True))
+        )
 
-    def _traced(self, truncation: Truncation) -> RowFunction:
+    def _trace_series(self, truncation: Truncation) -> RowFunction:
         from vsacli.compute.tracing import Kind, trace
         from vsacli.compute.tracing.row_functions import RowFunction
 
@@ -103,7 +105,7 @@ class PotentialEnergy:
         return [energy.derivative(order) + zero for order in truncation.orders]
 
 
-class Derivatives:
+class PotentialDerivatives:
     """Derivatives of a potential over q, theta_1 and theta_2, by how often it is differentiated over each."""
 
     def __init__(self, by_order: Mapping[Order, FloatArray]) -> None:
@@ -137,11 +139,11 @@ class PotentialState(MechanismState):
         self._potential, self._coordinates = potential, coordinates
 
     @cached_property
-    def _first(self) -> Derivatives:
+    def _first(self) -> PotentialDerivatives:
         return self._potential.derivatives(self._coordinates, TORQUES)
 
     @cached_property
-    def _all(self) -> Derivatives:
+    def _all(self) -> PotentialDerivatives:
         return self._potential.derivatives(self._coordinates, ACCELERATIONS)
 
     @property
@@ -202,16 +204,17 @@ class PotentialState(MechanismState):
 
     def _rate(self, of: tuple[int, ...], rates: Components) -> FloatArray:
         """Return the rate of a derivative of the potential."""
-        return sum((self._all(*of, i) * each for i, each in _motion(rates)), np.zeros_like(rates[0]))
+        return sum((self._all(*of, i) * each for i, each in _position_rates(rates)), np.zeros_like(rates[0]))
 
     def _curvature(self, of: tuple[int, ...], rates: Components) -> FloatArray:
         """Return the terms quadratic in the rates of the second time derivative of a partial derivative."""
         return sum(
-            (self._rate((*of, i), rates) * each for i, each in _motion(rates)), np.zeros_like(rates[0])
+            (self._rate((*of, i), rates) * each for i, each in _position_rates(rates)),
+            np.zeros_like(rates[0]),
         )
 
 
-def _motion(rates: Components) -> Iterator[tuple[int, FloatArray]]:
+def _position_rates(rates: Components) -> Iterator[tuple[int, FloatArray]]:
     """Return the rates of q, theta_1 and theta_2 by index, from rates of the coordinates."""
     dphi, ds, dq = rates
     return enumerate((dq, dphi + dq, ds))

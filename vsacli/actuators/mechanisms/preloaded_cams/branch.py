@@ -19,7 +19,7 @@ PRETENSION, FOLD, PEAK, DOMAIN = range(4)
 """Kinds of ends of the branch."""
 
 
-class Cells(NamedTuple):
+class TorqueCells(NamedTuple):
     """Both ends of the branch over the cube root of the torque, by cubics; arrays (cells,).
 
     The cubics approximate the ratio of deflection from rest to that root, which is smooth even for a cam
@@ -40,8 +40,8 @@ class Cells(NamedTuple):
     sign: FloatArray
 
 
-class Ends(NamedTuple):
-    """Deflections from rest between which the branch lies, see `Cells`; arrays (samples,)."""
+class ApproximateEnds(NamedTuple):
+    """Deflections from rest between which the branch lies, see `TorqueCells`; arrays (samples,)."""
 
     outer: FloatArray
     inner: FloatArray
@@ -49,7 +49,7 @@ class Ends(NamedTuple):
     sign: FloatArray
 
 
-class Branch(NamedTuple):
+class CamBranch(NamedTuple):
     """The branch at every torque.
 
     Attributes:
@@ -57,10 +57,10 @@ class Branch(NamedTuple):
         torque_range: Torques that can be carried.
     """
 
-    cells: Cells
+    cells: TorqueCells
     torque_range: tuple[float, float]
 
-    def ends(self, tau_e: FloatArray) -> Ends:
+    def ends(self, tau_e: FloatArray) -> ApproximateEnds:
         """Return both ends of the branch, to a relative error of about 1e-5."""
         root = np.cbrt(tau_e)
         cell = np.searchsorted(self.cells.root[1:], root, side="right")
@@ -69,7 +69,7 @@ class Branch(NamedTuple):
         )
         x = root - start
         outer, inner = (a + x * (b + x * (c + x * d)) for a, b, c, d in (cubics[:4], cubics[4:]))
-        return Ends(root * outer, root * inner, end, sign)
+        return ApproximateEnds(root * outer, root * inner, end, sign)
 
 
 SHARES = np.concatenate((np.geomspace(1e-9, 0.01, 150, endpoint=False), np.linspace(0.01, 1, 800)))
@@ -95,7 +95,7 @@ LiftOf = Callable[[FloatArray], Lift]
 
 def map_branch(
     lift: LiftOf, domain: tuple[float, float], k: float, pretension: tuple[float, float]
-) -> Branch:
+) -> CamBranch:
     """Return the branch of a cam.
 
     Args:
@@ -104,22 +104,22 @@ def map_branch(
         k: Stiffness of the spring, N/m.
         pretension: Smallest and largest, m.
     """
-    sides = _Side(lift, domain[1], k, pretension), _Side(_mirrored(lift), -domain[0], k, pretension)
+    sides = _CamSide(lift, domain[1], k, pretension), _CamSide(_mirror_lift(lift), -domain[0], k, pretension)
     symmetric = domain[0] == -domain[1] and all(map(np.array_equal, *(side.lift_at_nodes for side in sides)))
     above = sides[0].nodes()
     below = above if symmetric else sides[1].nodes()
     parts = below.mirrored().cells(), above.cells()
-    cells = Cells(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
-    return Branch(cells, (-sides[1].largest_torque, sides[0].largest_torque))
+    cells = TorqueCells(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
+    return CamBranch(cells, (-sides[1].largest_torque, sides[0].largest_torque))
 
 
-def _mirrored(lift: LiftOf) -> LiftOf:
+def _mirror_lift(lift: LiftOf) -> LiftOf:
     """Return the lift of the mirrored cam."""
     return lambda phi: lift(-phi).mirrored()
 
 
 class _Nodes(NamedTuple):
-    """Ends of the branch at ascending torques, as in `Cells`, with slopes; arrays (nodes,)."""
+    """Ends of the branch at ascending torques, as in `TorqueCells`, with slopes; arrays (nodes,)."""
 
     root: FloatArray
     outer: FloatArray
@@ -140,10 +140,10 @@ class _Nodes(NamedTuple):
         """Return a selection of the nodes."""
         return _Nodes(*(values[chosen] for values in self))
 
-    def merged(self, others: _Nodes) -> _Nodes:
+    def merged(self, added: _Nodes) -> _Nodes:
         """Return these nodes and others, sorted."""
-        joined = _Nodes(*map(np.concatenate, zip(self, others, strict=True)))
-        return joined.take(np.argsort(joined.root))
+        nodes = _Nodes(*map(np.concatenate, zip(self, added, strict=True)))
+        return nodes.take(np.argsort(nodes.root))
 
     def misses(self, middle: _Nodes) -> BoolArray:
         """Return where the kind of end changes within a cell, or a cubic is inaccurate in its middle."""
@@ -153,21 +153,21 @@ class _Nodes(NamedTuple):
             (self.outer, self.outer_slope, middle.outer),
             (self.inner, self.inner_slope, middle.inner),
         ):
-            a, b, c, d = _hermite(width, values, slope)
+            a, b, c, d = _cubic_coefficients(width, values, slope)
             guess = a + width / 2 * (b + width / 2 * (c + width / 2 * d))
             differ |= ~(np.abs(guess - wanted) <= GUESS_RTOL * np.abs(wanted))
         return differ
 
-    def cells(self) -> Cells:
+    def cells(self) -> TorqueCells:
         """Return cubics between the nodes; each cell has the kind of end of its node nearer to rest."""
         width = np.diff(self.root)
-        outer = _hermite(width, self.outer, self.outer_slope)
-        inner = _hermite(width, self.inner, self.inner_slope)
+        outer = _cubic_coefficients(width, self.outer, self.outer_slope)
+        inner = _cubic_coefficients(width, self.inner, self.inner_slope)
         nearer = slice(1, None) if self.root[0] < 0 else slice(None, -1)
-        return Cells(self.root[:-1], outer, inner, self.end[nearer], self.sign[nearer])
+        return TorqueCells(self.root[:-1], outer, inner, self.end[nearer], self.sign[nearer])
 
 
-def _hermite(width: FloatArray, values: FloatArray, slopes: FloatArray) -> FloatArray:
+def _cubic_coefficients(width: FloatArray, values: FloatArray, slopes: FloatArray) -> FloatArray:
     """Return coefficients of cubics with values and slopes, or of lines where too steep; (4, cells)."""
     mean, first, last = np.diff(values) / width, slopes[:-1], slopes[1:]
     usable = np.abs(first) + np.abs(last) <= MAX_SLOPE_SUM * np.abs(values).max() / width
@@ -176,7 +176,7 @@ def _hermite(width: FloatArray, values: FloatArray, slopes: FloatArray) -> Float
     return np.stack((values[:-1], first, quadratic, cubic))
 
 
-class _Curve:
+class _ZeroCurve:
     """A curve on which a function of deflection and torque is zero."""
 
     def __init__(self, lift: LiftOf, function: Callable[[Lift], LinearInTorque]) -> None:
@@ -191,40 +191,40 @@ class _Curve:
 
     def slope(self, phi: FloatArray, tau_e: FloatArray) -> FloatArray:
         """Return the derivative of the deflection over the torque along the curve; infinite at its turns."""
-        here = self(phi)
+        on_curve = self(phi)
         with np.errstate(all="ignore"):
-            return -here.b / here.slope(tau_e)
+            return -on_curve.b / on_curve.slope(tau_e)
 
     def turns(self, phi: FloatArray) -> FloatArray:
         """Return deflections strictly between nodes at which the torque has an extremum along the curve."""
 
         def turning(phi: FloatArray) -> FloatArray:
-            here = self(phi)
-            return here.a_slope * here.b - here.a * here.b_slope
+            on_curve = self(phi)
+            return on_curve.a_slope * on_curve.b - on_curve.a * on_curve.b_slope
 
         sign = np.sign(turning(phi))
         turn = np.flatnonzero(sign[:-1] * sign[1:] < 0)
         return bracketed_root(turning, phi[turn], phi[turn + 1])
 
 
-class _Side:
+class _CamSide:
     """The cam on one side of rest: positive torques at positive deflections."""
 
     def __init__(self, lift: LiftOf, end: float, k: float, pretension: tuple[float, float]) -> None:
         low, high = pretension
-        self._held = _Curve(lift, lambda lift: lift.held(k, high))
-        self._turning = _Curve(lift, lambda lift: lift.turning(k))
+        self._outer_curve = _ZeroCurve(lift, lambda lift: lift.torque_error(k, high))
+        self._fold_curve = _ZeroCurve(lift, lambda lift: lift.fold_condition(k))
         self._ends = {
-            PRETENSION: _Curve(lift, lambda lift: lift.held(k, low)),
-            FOLD: self._turning,
-            PEAK: _Curve(lift, lambda lift: lift.rising(k)),
+            PRETENSION: _ZeroCurve(lift, lambda lift: lift.torque_error(k, low)),
+            FOLD: self._fold_curve,
+            PEAK: _ZeroCurve(lift, lambda lift: lift.torque_peak_condition(k)),
         }
         phi = end * SHARES
         self.lift_at_nodes = lift(phi)
-        turns = [curve.turns(phi) for curve in (self._held, *self._ends.values())]
+        turns = [curve.turns(phi) for curve in (self._outer_curve, *self._ends.values())]
         self._phi = np.unique(np.concatenate((phi, *turns)))
         self._at_nodes = {end: curve(self._phi) for end, curve in self._ends.items()}
-        held = self._held(self._phi)
+        held = self._outer_curve(self._phi)
         falling = np.flatnonzero(held.a_slope <= 0)
         count = falling[0] + 1 if falling.size else self._phi.size
         self._outer_phi = np.append(0.0, self._phi[:count])
@@ -257,15 +257,15 @@ class _Side:
         """Return both ends of the branch at torques with these cube roots."""
         tau_e = np.minimum(root**3, self.largest_torque)
         node = np.clip(np.searchsorted(self._outer_torque, tau_e), 1, self._outer_phi.size - 1)
-        outer = self._held.root(self._outer_phi[node - 1], self._outer_phi[node], tau_e)
+        outer = self._outer_curve.root(self._outer_phi[node - 1], self._outer_phi[node], tau_e)
         inner, end = self._inner_ends(tau_e, outer)
         slope = np.zeros_like(inner)
-        for which, curve in self._ends.items():
-            slope = np.where(end == which, curve.slope(inner, tau_e), slope)
-        sign = np.where(self._turning(outer).at(tau_e) < 0, -1.0, 1.0)
+        for kind, curve in self._ends.items():
+            slope = np.where(end == kind, curve.slope(inner, tau_e), slope)
+        sign = np.where(self._fold_curve(outer).at(tau_e) < 0, -1.0, 1.0)
         return _Nodes(
             root,
-            *_over_root(root, outer, self._held.slope(outer, tau_e)),
+            *_over_root(root, outer, self._outer_curve.slope(outer, tau_e)),
             *_over_root(root, inner, slope),
             end.astype(float),
             sign,
@@ -275,16 +275,16 @@ class _Side:
         """Return the first end of the branch at deflections above the outer one, and its kind."""
         inner, end = np.full_like(outer, self._phi[-1]), np.full(outer.shape, DOMAIN)
         beyond = self._phi > outer[:, None]
-        for which, curve in self._ends.items():
-            of_nodes = self._at_nodes[which]
+        for kind, curve in self._ends.items():
+            of_nodes = self._at_nodes[kind]
             positive = of_nodes.a + of_nodes.b * tau_e[:, None] > 0
             changed = beyond & (positive != (curve(outer).at(tau_e) > 0)[:, None])
-            here = np.flatnonzero(changed.any(axis=1))
-            node = np.argmax(changed[here], axis=1)
-            before = np.maximum(self._phi[np.maximum(node - 1, 0)], outer[here])
-            found = curve.root(before, self._phi[node], tau_e[here])
-            first = found < inner[here]
-            inner[here[first]], end[here[first]] = found[first], which
+            crossed = np.flatnonzero(changed.any(axis=1))
+            node = np.argmax(changed[crossed], axis=1)
+            before = np.maximum(self._phi[np.maximum(node - 1, 0)], outer[crossed])
+            crossing = curve.root(before, self._phi[node], tau_e[crossed])
+            first = crossing < inner[crossed]
+            inner[crossed[first]], end[crossed[first]] = crossing[first], kind
         return inner, end
 
 

@@ -46,7 +46,7 @@ ROUNDING_SHARE = 1e-12
 """Share of the range of the lift below which a misfit is rounding."""
 
 
-class Profile(NamedTuple):
+class CamProfile(NamedTuple):
     """A fitted profile.
 
     Attributes:
@@ -60,7 +60,7 @@ class Profile(NamedTuple):
     misfit: FloatArray
 
 
-def fit_profile(deflection: FloatArray, lift: FloatArray) -> Profile:
+def fit_profile(deflection: FloatArray, lift: FloatArray) -> CamProfile:
     """Fit lifts (rows,) at ascending deflections (rows,), the lowest neither first nor last."""
     most = max(PIECES[0], len(lift) // ROWS_PER_PIECE)
     if _is_symmetric(deflection, lift):
@@ -71,7 +71,7 @@ def fit_profile(deflection: FloatArray, lift: FloatArray) -> Profile:
         pieces = _pieces(deflection - near, lift, most)
         rest = near + _rest(deflection - near, lift, pieces)
     fit = _fit(deflection - rest, lift, pieces)
-    return Profile(rest, fit.curve, fit.misfit)
+    return CamProfile(rest, fit.curve, fit.misfit)
 
 
 def _pieces(phi: FloatArray, lift: FloatArray, most: int) -> int:
@@ -80,7 +80,7 @@ def _pieces(phi: FloatArray, lift: FloatArray, most: int) -> int:
     return min(counts, key=lambda pieces: _fit(phi, lift, pieces).criterion)
 
 
-class _Fit(NamedTuple):
+class _ProfileFit(NamedTuple):
     """A curve, and the Bayesian information criterion that weighs its misfit against its pieces."""
 
     curve: SplineCurve
@@ -88,13 +88,13 @@ class _Fit(NamedTuple):
     criterion: float
 
 
-def _fit(phi: FloatArray, lift: FloatArray, pieces: int) -> _Fit:
+def _fit(phi: FloatArray, lift: FloatArray, pieces: int) -> _ProfileFit:
     """Return the fit with this number of pieces, over deflections from rest."""
     knots = spline_knots(float(phi[0]), float(phi[-1]), pieces, DEGREE)
     count = len(knots) - DEGREE - 1
     shapes = [spline_curve(knots, weights, DEGREE, _lift) for weights in np.eye(count)]
     columns = np.column_stack([shape(phi, 0, 0)[0] for shape in shapes])
-    weights, _ = _weights(columns, lift, _least(phi, lift))
+    weights, _ = _weights(columns, lift, _smallest_curvature(phi, lift))
     if _is_symmetric(phi, lift):
         weights = (weights + weights[::-1]) / 2
     curve = spline_curve(knots, weights, DEGREE, _lift)
@@ -102,14 +102,14 @@ def _fit(phi: FloatArray, lift: FloatArray, pieces: int) -> _Fit:
     misfit -= (misfit.min() + misfit.max()) / 2
     size = np.sum(misfit**2) / len(lift) + (ROUNDING_SHARE * np.ptp(lift)) ** 2
     criterion = len(lift) * math.log(size) + PIECE_PENALTY * count * math.log(len(lift))
-    return _Fit(curve, misfit, criterion)
+    return _ProfileFit(curve, misfit, criterion)
 
 
 def _lift(spline: PPoly) -> PPoly:
     return times_deflection(spline).antiderivative()
 
 
-def _least(phi: FloatArray, lift: FloatArray) -> float:
+def _smallest_curvature(phi: FloatArray, lift: FloatArray) -> float:
     """Return the smallest g: a share of that of a parabola as high as the lift."""
     return LEAST_CURVATURE_SHARE * 2 * float(np.ptp(lift)) / float(np.abs(phi).max()) ** 2
 
@@ -134,14 +134,14 @@ def _rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
     bases = [PPoly.from_spline((knots, weights, DEGREE)) for weights in np.eye(len(knots) - DEGREE - 1)]
     of_first = np.column_stack([times_deflection(basis).antiderivative()(phi) for basis in bases])
     of_rest = np.column_stack([basis.antiderivative()(phi) for basis in bases])
-    least, lowest = _least(phi, lift), int(np.argmin(lift))
-    found = minimize_scalar(
+    least, lowest = _smallest_curvature(phi, lift), int(np.argmin(lift))
+    best = minimize_scalar(
         lambda rest: _weights(of_first - rest * of_rest, lift, least)[1],
         bounds=(phi[lowest - 1], phi[lowest + 1]),
         method="bounded",
         options={"xatol": float(np.finfo(float).eps * np.ptp(phi))},
     )
-    return float(found.x)
+    return float(best.x)
 
 
 def _is_symmetric(phi: FloatArray, lift: FloatArray) -> bool:
@@ -184,7 +184,7 @@ class Cam(PreloadedCam):
         return {"k": 60000, "r": 0.005, "pretension": [0.01, 0.05], "profile": "cam_profile.csv"}
 
     @cached_property
-    def _fitted(self) -> Profile:
+    def _fitted(self) -> CamProfile:
         return fit_profile(*self.profile.values.T)
 
     def _misfits(self) -> Iterator[Problem]:

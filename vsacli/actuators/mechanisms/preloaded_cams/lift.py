@@ -87,14 +87,14 @@ class Lift(NamedTuple):
         k_x = np.where(at_rest, 0.0, tau_e / np.where(at_rest, 1.0, self.l1))
         return k * self.l1 * self.l1 + self.l2 * k_x
 
-    def held(self, k: float, pretension: float) -> LinearInTorque:
+    def torque_error(self, k: float, pretension: float) -> LinearInTorque:
         """Return T - tau_e, zero where the pretension carries the torque."""
         spring = self.spring(k, pretension)
         return LinearInTorque(
             spring.tau, spring.sigma, np.full_like(spring.tau, -1.0), np.zeros_like(spring.tau)
         )
 
-    def turning(self, k: float) -> LinearInTorque:
+    def fold_condition(self, k: float) -> LinearInTorque:
         """Return -l'^2 dG/dphi, zero at folds, where G has an extremum."""
         twice_squared = 2 * k * self.l1 * self.l1
         return LinearInTorque(
@@ -104,7 +104,7 @@ class Lift(NamedTuple):
             self.l2 * self.l3 - self.l1 * self.l4,
         )
 
-    def rising(self, k: float) -> LinearInTorque:
+    def torque_peak_condition(self, k: float) -> LinearInTorque:
         """Return l' G, zero where the torque has a maximum over the deflection."""
         squared = k * self.l1 * self.l1
         return LinearInTorque(squared * self.l1, 3 * squared * self.l2, self.l2, self.l3)

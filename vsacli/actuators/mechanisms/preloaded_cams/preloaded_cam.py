@@ -64,8 +64,8 @@ class PreloadedCam(Mechanism):
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
         """See `Mechanism.solve`; on the branch of the largest pretension."""
-        found = _solver(self).solve(tau_e, stiffness)
-        return found._replace(phi_1=self.rest + found.phi_1, phi_2=found.phi_2 / self.r)
+        solution = _solver(self).solve(tau_e, stiffness)
+        return solution._replace(phi_1=self.rest + solution.phi_1, phi_2=solution.phi_2 / self.r)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
         """Return the derivatives of k/2 (l + r s)^2."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.mechanisms.preloaded_cams.branch import FOLD, PEAK, PRETENSION, Branch
+from vsacli.actuators.mechanisms.preloaded_cams.branch import FOLD, PEAK, PRETENSION, CamBranch
 from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift, LinearInTorque
 from vsacli.actuators.pairs.bracketing import bracketed_root
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -37,14 +37,14 @@ AT_REST_SHARE = 1e-40
 """Share of the stiffness below which k l'^2 marks a deflection close to underflow, which counts as rest."""
 
 
-class End(NamedTuple):
+class BranchEnd(NamedTuple):
     """An end of the branch: deflection from rest, and joint stiffness; arrays (samples,)."""
 
     phi: FloatArray
     stiffness: FloatArray
 
 
-class Piece(NamedTuple):
+class BranchAtTorque(NamedTuple):
     """The branch at given torques.
 
     Attributes:
@@ -55,8 +55,8 @@ class Piece(NamedTuple):
         curvature: Second derivative of the lift at the inner end.
     """
 
-    outer: End
-    inner: End
+    outer: BranchEnd
+    inner: BranchEnd
     at_fold: BoolArray
     sign: FloatArray
     curvature: FloatArray
@@ -78,7 +78,7 @@ class CamSolver:
     domain: tuple[float, float]
     k: float
     pretension: tuple[float, float]
-    branch: Branch
+    branch: CamBranch
 
     @cached_property
     def _least_curvature(self) -> float:
@@ -104,7 +104,7 @@ class CamSolver:
             phi_2=np.minimum(np.maximum(x - lift.l, least), most),
         )
 
-    def _piece(self, tau_e: FloatArray) -> Piece:
+    def _piece(self, tau_e: FloatArray) -> BranchAtTorque:
         """Return the branch between its ends."""
         k, (least, most) = self.k, self.pretension
         guess = self.branch.ends(tau_e)
@@ -112,52 +112,54 @@ class CamSolver:
         last = np.where(guess.inner < 0, *self.domain)
 
         def at_outer(lift: Lift, _: FloatArray) -> LinearInTorque:
-            return lift.held(k, most)
+            return lift.torque_error(k, most)
 
         def at_inner(lift: Lift, phi: FloatArray) -> LinearInTorque:
             return LinearInTorque(
                 *(
                     np.where(held, a, np.where(fold, b, np.where(peak, c, d)))
                     for a, b, c, d in zip(
-                        lift.held(k, least),
-                        lift.turning(k),
-                        lift.rising(k),
-                        _distance(phi, last),
+                        lift.torque_error(k, least),
+                        lift.fold_condition(k),
+                        lift.torque_peak_condition(k),
+                        _distance_to_end(phi, last),
                         strict=True,
                     )
                 )
             )
 
-        outer, of_outer = self._corrected(guess.outer, tau_e, at_outer)
-        inner, of_inner = self._corrected(guess.inner, tau_e, at_inner)
+        outer, of_outer = self._correct_by_newton(guess.outer, tau_e, at_outer)
+        inner, of_inner = self._correct_by_newton(guess.inner, tau_e, at_inner)
         low, high = self.branch.torque_range
         carried = (tau_e >= low) & (tau_e <= high)
         stiffness = np.where(held, of_inner.spring(k, least).sigma, of_inner.stiffness(k, tau_e))
-        return Piece(
-            End(outer, np.where(carried, of_outer.spring(k, most).sigma, np.nan)),
-            End(inner, np.where(carried, np.where(peak, 0.0, stiffness), np.nan)),
+        return BranchAtTorque(
+            BranchEnd(outer, np.where(carried, of_outer.spring(k, most).sigma, np.nan)),
+            BranchEnd(inner, np.where(carried, np.where(peak, 0.0, stiffness), np.nan)),
             fold,
             guess.sign,
             of_inner.l2,
         )
 
-    def _corrected(
+    def _correct_by_newton(
         self, phi: FloatArray, tau_e: FloatArray, function: Callable[[Lift, FloatArray], LinearInTorque]
     ) -> tuple[FloatArray, Lift]:
         """Return the zero of a function after two Newton steps, and the lift there."""
         lift = self.lift(phi)
-        step = _newton_step(function(lift, phi), phi, tau_e)
-        step = step + _newton_step(function(lift.after(step), phi + step), phi, tau_e)
+        step = _limited_newton_step(function(lift, phi), phi, tau_e)
+        step = step + _limited_newton_step(function(lift.after(step), phi + step), phi, tau_e)
         return phi + step, lift.after(step)
 
-    def _deflection(self, piece: Piece, tau_e: FloatArray, demand: FloatArray) -> tuple[FloatArray, Lift]:
+    def _deflection(
+        self, piece: BranchAtTorque, tau_e: FloatArray, demand: FloatArray
+    ) -> tuple[FloatArray, Lift]:
         """Return the deflection from rest with the demanded stiffness at the torque, and the lift there."""
         low = np.minimum(piece.outer.phi, piece.inner.phi)
         high = np.maximum(piece.outer.phi, piece.inner.phi)
         start = np.minimum(np.maximum(self._first_guess(piece, tau_e, demand), low), high)
-        known = (tau_e, demand, piece.sign)
+        constants = (tau_e, demand, piece.sign)
         phi, _, _, error, *lift = repeat(
-            self._step, (start, low, high, *[np.zeros_like(start)] * 6), known, MAX_STEPS
+            self._step, (start, low, high, *[np.zeros_like(start)] * 6), constants, MAX_STEPS
         )
         phi, *lift = where_needed(
             ~(error <= STEP_RTOL) & ~np.isnan(demand),
@@ -167,7 +169,7 @@ class CamSolver:
         )
         return phi, Lift(*lift)
 
-    def _first_guess(self, piece: Piece, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
+    def _first_guess(self, piece: BranchAtTorque, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
         """Return the root if the lift were a parabola, whose curvature is that at the inner end."""
         curvature = np.maximum(piece.curvature, self._least_curvature)
         scale = np.sqrt(demand / (3 * self.k))
@@ -210,13 +212,13 @@ class CamSolver:
         return np.where(at_rest, demand / lift.l2, tau_e / lift.l1) / self.k
 
 
-def _distance(phi: FloatArray, last: FloatArray) -> LinearInTorque:
+def _distance_to_end(phi: FloatArray, last: FloatArray) -> LinearInTorque:
     """Return the distance to the end of the domain, zero there at any torque."""
     zero = np.zeros_like(phi)
     return LinearInTorque(phi - last, np.ones_like(phi), zero, zero)
 
 
-def _newton_step(here: LinearInTorque, phi: FloatArray, tau_e: FloatArray) -> FloatArray:
-    slope, most = here.slope(tau_e), MAX_GUESS_ERROR * np.abs(phi)
-    step = np.where(slope == 0, 0.0, -here.at(tau_e) / slope)
+def _limited_newton_step(on_curve: LinearInTorque, phi: FloatArray, tau_e: FloatArray) -> FloatArray:
+    slope, most = on_curve.slope(tau_e), MAX_GUESS_ERROR * np.abs(phi)
+    step = np.where(slope == 0, 0.0, -on_curve.at(tau_e) / slope)
     return np.minimum(np.maximum(step, -most), most)

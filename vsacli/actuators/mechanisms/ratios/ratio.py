@@ -12,7 +12,7 @@ import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution, SpringState
 from vsacli.actuators.mechanisms.mechanism import Mechanism, Partials
-from vsacli.actuators.mechanisms.ratios.scales import Scale
+from vsacli.actuators.mechanisms.ratios.scales import ScaleDerivatives
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
@@ -76,7 +76,7 @@ TURN = Sine(k=2.0, ratio=2.0)
 """g = sin 2phi, of w = sin^2(phi)."""
 
 
-def ratio_partials(scale: Scale, energy: FloatArray, form: SpringState) -> Partials:
+def ratio_partials(scale: ScaleDerivatives, energy: FloatArray, form: SpringState) -> Partials:
     """Return the partial derivatives of the potential K(s) w(phi).
 
     Args:
@@ -112,7 +112,7 @@ class SineRatio(Mechanism):
     joint_types: ClassVar[tuple[str, ...]] = ("revolute",)
 
     @abstractmethod
-    def scale(self, s: FloatArray) -> Scale:
+    def scale(self, s: FloatArray) -> ScaleDerivatives:
         """Return K(s) with its derivatives, positive and monotone over the range of the setting."""
 
     @abstractmethod
@@ -179,10 +179,10 @@ class Awas(SineRatio):
         shortest, longest = self.arm
         return self.k * shortest * shortest, self.k * longest * longest
 
-    def scale(self, s: FloatArray) -> Scale:
+    def scale(self, s: FloatArray) -> ScaleDerivatives:
         """Return K = k r^2."""
         curvature = self.k * self.lead * self.lead
-        return Scale(curvature * s * s, 2 * curvature * s, np.full_like(s, 2 * curvature))
+        return ScaleDerivatives(curvature * s * s, 2 * curvature * s, np.full_like(s, 2 * curvature))
 
     def setting(self, scale: FloatArray) -> FloatArray:
         """Return the arm, sqrt(K/k)."""
@@ -229,14 +229,14 @@ class Lever(SineRatio):
         low, high = (float(self.scale(np.array(pivot / self.lead)).value) for pivot in self.pivot)
         return low, high
 
-    def scale(self, s: FloatArray) -> Scale:
+    def scale(self, s: FloatArray) -> ScaleDerivatives:
         """Return K = k/2 (L x)^2 with x = p/(L - p)."""
         rest = self.length - self.lead * s
         ratio, slope = self.lead * s / rest, self.length * self.lead / (rest * rest)
         factor = self.k * self.length * self.length
         # x'' is 2 x' lead/(L - p)
         bent = slope * slope + 2 * self.lead * ratio * slope / rest
-        return Scale(factor / 2 * ratio * ratio, factor * ratio * slope, factor * bent)
+        return ScaleDerivatives(factor / 2 * ratio * ratio, factor * ratio * slope, factor * bent)
 
     def setting(self, scale: FloatArray) -> FloatArray:
         """Return theta_2 of the pivot position, L x/(1 + x)."""

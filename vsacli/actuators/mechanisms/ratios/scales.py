@@ -71,7 +71,7 @@ SETTINGS = 2001
 """Points of the range at which the scale is checked; neither a power nor a quartic changes faster."""
 
 
-class Scale(NamedTuple):
+class ScaleDerivatives(NamedTuple):
     """The scale K(s), its slope K' and its curvature K'', arrays of one shape."""
 
     value: FloatArray
@@ -89,7 +89,7 @@ class ScaleLaw(DeclaredRecord, ABC):
         return ()
 
     @abstractmethod
-    def at(self, s: FloatArray) -> Scale:
+    def at(self, s: FloatArray) -> ScaleDerivatives:
         """Return K with its derivatives at settings."""
 
     def setting(self, scale: FloatArray, settings: tuple[float, float]) -> FloatArray:
@@ -131,12 +131,12 @@ class Power(ScaleLaw):
     )
     offset: float = number(units.DIMENSIONLESS, "length at theta_2 = 0", default=0.0)
 
-    def at(self, s: FloatArray) -> Scale:
+    def at(self, s: FloatArray) -> ScaleDerivatives:
         """Return K with its derivatives."""
         length = self.offset + self.lead * s
         scale = length**self.exponent
         slope = self.exponent * self.lead * scale / length
-        return Scale(scale, slope, (self.exponent - 1) * self.lead * slope / length)
+        return ScaleDerivatives(scale, slope, (self.exponent - 1) * self.lead * slope / length)
 
     def setting(self, scale: FloatArray, _settings: tuple[float, float]) -> FloatArray:
         """Return the root of K."""
@@ -153,7 +153,7 @@ class PolynomialScale(ScaleLaw):
     c3: float = number(units.DIMENSIONLESS, "coefficient of theta_2^3", default=0.0)
     c4: float = number(units.DIMENSIONLESS, "coefficient of theta_2^4", default=0.0)
 
-    def at(self, s: FloatArray) -> Scale:
+    def at(self, s: FloatArray) -> ScaleDerivatives:
         """Return K with its derivatives, by Horner's scheme."""
         row = (self.c0, self.c1, self.c2, self.c3, self.c4)
         rate = tuple(power * each for power, each in enumerate(row))[1:]
@@ -162,7 +162,7 @@ class PolynomialScale(ScaleLaw):
             reduce(lambda total, each: total * s + each, reversed(coefficients), np.zeros_like(s))
             for coefficients in (row, rate, bent)
         )
-        return Scale(value, slope, curvature)
+        return ScaleDerivatives(value, slope, curvature)
 
 
 SCALES = LazyRegistry(
@@ -201,12 +201,14 @@ class MeasuredScale(ScaleLaw):
         settings, scales = self.file.values.T
         return (settings[:-1], *CubicSpline(settings, scales).c[::-1])
 
-    def at(self, s: FloatArray) -> Scale:
+    def at(self, s: FloatArray) -> ScaleDerivatives:
         """Return the spline with its derivatives."""
         piece = np.searchsorted(self._pieces[0][1:], s, side="right")
         start, a, b, c, d = look_up(self._pieces, piece)
         x = s - start
-        return Scale(a + x * (b + x * (c + x * d)), b + x * (2 * c + x * (3 * d)), 2 * c + 6 * d * x)
+        return ScaleDerivatives(
+            a + x * (b + x * (c + x * d)), b + x * (2 * c + x * (3 * d)), 2 * c + 6 * d * x
+        )
 
     def problems(self, settings: tuple[float, float]) -> Iterator[str]:
         """Yield also the reasons why the table is too short for the range."""

@@ -33,7 +33,7 @@ ENDLESS = 1e3
 """Deflection, rad (m), at which an unbounded domain is cut off: no springs deflect so far."""
 
 
-class _Limit(NamedTuple):
+class _DeflectionLimit(NamedTuple):
     """The end of the deflection to one side of rest on the branch.
 
     Attributes:
@@ -49,7 +49,7 @@ class _Limit(NamedTuple):
     stiffness: float
 
 
-class _End(NamedTuple):
+class _EndAtTorque(NamedTuple):
     """An end of the branch at given torques; arrays (samples,)."""
 
     phi: FloatArray
@@ -149,11 +149,11 @@ class VariableRatio(Mechanism):
     def _torque_over_stiffness(self, phi: FloatArray, ratio: FloatArray) -> Values:
         """Return g/g' minus a ratio, which increases with phi along the branch, and two derivatives."""
         state = self.torque.state(phi)
-        found, slope, curvature = (each / state.sigma for each in (state.tau, state.zeta, state.eta))
-        bent = 2 * found * slope * slope - slope - found * curvature
-        return found - ratio, 1 - found * slope, bent
+        quotient, slope, curvature = (each / state.sigma for each in (state.tau, state.zeta, state.eta))
+        bent = 2 * quotient * slope * slope - slope - quotient * curvature
+        return quotient - ratio, 1 - quotient * slope, bent
 
-    def _end(self, tau_e: FloatArray, scale: float) -> _End:
+    def _end(self, tau_e: FloatArray, scale: float) -> _EndAtTorque:
         below, above = self._limits
         torque = tau_e / scale
         under, over = torque < below.torque, torque > above.torque
@@ -163,16 +163,16 @@ class VariableRatio(Mechanism):
         sigma = np.where(under, below.stiffness, np.where(over, above.stiffness, state.sigma))
         factor = np.where(under | over, tau_e / state.tau, scale)
         critical = (under & below.critical) | (over & above.critical)
-        return _End(phi, factor * sigma, under | over, critical)
+        return _EndAtTorque(phi, factor * sigma, under | over, critical)
 
     @cached_property
-    def _limits(self) -> tuple[_Limit, _Limit]:
+    def _limits(self) -> tuple[_DeflectionLimit, _DeflectionLimit]:
         """Limits to the negative and to the positive side."""
         below, above = zip(self.torque.domain, self.torque.torque_range, strict=True)
-        return _limit(self.torque, *below), _limit(self.torque, *above)
+        return _deflection_limit(self.torque, *below), _deflection_limit(self.torque, *above)
 
 
-def _limit(law: SpringLaw | Sine, end: float, torque: float) -> _Limit:
+def _deflection_limit(law: SpringLaw | Sine, end: float, torque: float) -> _DeflectionLimit:
     """Return the limit of the deflection to one side, which ends there with a torque."""
 
     def falling(phi: FloatArray) -> FloatArray:
@@ -186,8 +186,10 @@ def _limit(law: SpringLaw | Sine, end: float, torque: float) -> _Limit:
     if not turned.size:
         with np.errstate(all="ignore"):
             stiffness = 0.0 if isinstance(law, Sine) else float(law.state(np.array([end])).sigma[0])
-        return _Limit(end, torque, critical=False, stiffness=stiffness)
+        return _DeflectionLimit(end, torque, critical=False, stiffness=stiffness)
     first = max(int(turned[0]), 1)
     turn = bracketed_root(falling, phi[first - 1 : first], phi[first : first + 1])
     state = law.state(turn)
-    return _Limit(float(turn[0]), float(state.tau[0]), critical=True, stiffness=float(state.sigma[0]))
+    return _DeflectionLimit(
+        float(turn[0]), float(state.tau[0]), critical=True, stiffness=float(state.sigma[0])
+    )

@@ -26,7 +26,7 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffness
 from vsacli.trajectory.curves.sinusoids import Sinusoids
-from vsacli.trajectory.devices import with_devices
+from vsacli.trajectory.devices import set_uncommanded_dampers
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import UniformTimes
@@ -192,7 +192,7 @@ class Design:
             profiles[STIFFNESS.key] = self._stiffness(stiffened, position, share)
         times = UniformTimes(self.duration, RATE)
         trajectory = Trajectory(times, position, profiles, name=f"{self.robot.name}-excitation")
-        return with_devices(trajectory, self.robot)
+        return set_uncommanded_dampers(trajectory, self.robot)
 
     @property
     def _takes_stiffness(self) -> list[bool]:
@@ -243,7 +243,7 @@ class Design:
 
     def _motion(self, position: Sinusoids) -> Motion:
         times = UniformTimes(self.duration, RATE)
-        return with_devices(Trajectory(times, position, {}, name=""), self.robot).at(self.grid)
+        return set_uncommanded_dampers(Trajectory(times, position, {}, name=""), self.robot).at(self.grid)
 
     def _raw(self, signal: Signal, numbers: FloatArray) -> Sinusoids:
         """Return the sums before scaling and offset, also for joints that do not have the signal."""
