@@ -17,11 +17,11 @@ from vsacli.analysis.minima import (
     KNOWN,
     ROUNDING,
     Brackets,
-    Known,
+    SampledFunctions,
     Sides,
     bounded_quantities,
-    brackets,
-    narrowed,
+    find_brackets,
+    narrow_brackets,
 )
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FlagArray, FloatArray, IndexArray
 from vsacli.base.variables import Block
@@ -81,7 +81,7 @@ class Minima(NamedTuple):
         return own.replaced(
             **{
                 name: np.broadcast_to(array, (len(array), index + 1, *array.shape[2:]))
-                for name, array in _of_joints(own).items()
+                for name, array in _joint_variables(own).items()
             }
         )
 
@@ -118,7 +118,7 @@ class Between:
         looking = not self.notes and bool(self.quantities)
         self._scans = looking and trajectory.samples < SCANNED
         self._looks = looking and not self._scans
-        self._known: Known | None = None
+        self._known: SampledFunctions | None = None
         self._seen = 0.0 if self._looks else math.inf
 
     def look(self, block: Block) -> None:
@@ -129,7 +129,9 @@ class Between:
         elif self._looks:
             steps = block.time, self._sides.values(block)
             before = self._known
-            self._known = Known(0, *steps).opened() if before is None else before.last(2).followed_by(*steps)
+            self._known = (
+                SampledFunctions(0, *steps).opened() if before is None else before.last(2).followed_by(*steps)
+            )
             ended = self._known.stop == self._trajectory.samples
             self._search(self._known.closed() if ended else self._known, self._known)
             self._seen = math.inf if ended else self._known.stop - 1
@@ -182,17 +184,19 @@ class Between:
         each = -(-SCANNED // (len(steps) - 1))
         time = np.append(steps[:-1, None] + np.diff(steps)[:, None] * np.arange(each) / each, steps[-1])
         values = [self._sides.values(block) for _, block in self._dynamics.blocks_at(time)]
-        known = Known(0, time, np.hstack(values))
-        self._search(known.opened().closed(), Known(0, steps, known.value[:, ::each]))
+        known = SampledFunctions(0, time, np.hstack(values))
+        self._search(known.opened().closed(), SampledFunctions(0, steps, known.value[:, ::each]))
 
-    def _search(self, known: Known, steps: Known) -> None:
+    def _search(self, known: SampledFunctions, steps: SampledFunctions) -> None:
         """Find the minima where values are known, and keep those lower than the samples around them.
 
         Of those that hardly differ from the samples, minima with a further flag that decides are kept.
         """
         self._least_at_steps = np.minimum(self._least_at_steps, steps.value.min(axis=1))
         sides = self._sides
-        found = narrowed(self._chosen(brackets(known), steps.time), self._evaluated, sides.critical)
+        found = narrow_brackets(
+            self._chosen(find_brackets(known), steps.time), self._evaluated, sides.critical
+        )
         side, time, value = found.function, found.time[:, 1], found.value[:, 1]
         after = np.clip(np.searchsorted(steps.time, time), 1, len(steps.time) - 1)
         at_steps = np.minimum(*(steps.value[side, place] for place in (after - 1, after)))
@@ -234,7 +238,7 @@ class Between:
             joint = self._joint[quantity]
             judged = block if self._uncertainty is None else self._uncertainty.judged(block)
             at_minima = np.arange(len(joint)), joint, np.newaxis
-            own = {name: array[at_minima] for name, array in _of_joints(judged).items()}
+            own = {name: array[at_minima] for name, array in _joint_variables(judged).items()}
             own["flags"] &= self._bits[quantity, None]
             rows = quantity, joint, clearance[part], steps[part]
             self._found.append(Minima(judged.replaced(**own), *rows))
@@ -249,6 +253,6 @@ class Between:
         return np.concatenate(parts).reshape(times.shape)
 
 
-def _of_joints(block: Block) -> dict[str, AnyArray]:
+def _joint_variables(block: Block) -> dict[str, AnyArray]:
     """Return the variables of joints, by name."""
     return {name: array for name, array in block.arrays().items() if "joint" in block.declared[name].dims}

@@ -1,8 +1,8 @@
 """Clearances, that is margins and distances to limits, and a search for minima between samples.
 
-`Sides` has the functions whose minima count. `brackets` finds three consecutive times around each local
-minimum; `narrowed` evaluates further times between them until the minimum is known. `between_samples` applies
-them to the blocks of a run.
+`Sides` has the functions whose minima count. `find_brackets` finds three consecutive times around each local
+minimum; `narrow_brackets` evaluates further times between them until the minimum is known. `between_samples`
+applies them to the blocks of a run.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ Evaluate = Callable[[IndexArray, FloatArray], FloatArray]
 """Function from indices of quantities, (n,), and times for each, (n, times), to values (n, times)."""
 
 
-class Known(NamedTuple):
+class SampledFunctions(NamedTuple):
     """Functions at consecutive times.
 
     Attributes:
@@ -206,20 +206,20 @@ class Known(NamedTuple):
         """Index of the time after the last one."""
         return self.first + len(self.time)
 
-    def last(self, count: int) -> Known:
+    def last(self, count: int) -> SampledFunctions:
         """Return the last `count` times."""
         dropped = max(0, len(self.time) - count)
-        return Known(self.first + dropped, self.time[dropped:], self.value[:, dropped:])
+        return SampledFunctions(self.first + dropped, self.time[dropped:], self.value[:, dropped:])
 
-    def followed_by(self, time: FloatArray, value: FloatArray) -> Known:
+    def followed_by(self, time: FloatArray, value: FloatArray) -> SampledFunctions:
         """Return these times followed by others."""
-        return Known(self.first, np.append(self.time, time), np.hstack((self.value, value)))
+        return SampledFunctions(self.first, np.append(self.time, time), np.hstack((self.value, value)))
 
-    def opened(self) -> Known:
+    def opened(self) -> SampledFunctions:
         """Return these with the first time twice, so that it has a neighbor on either side."""
-        return Known(self.first - 1, self.time[:1], self.value[:, :1]).followed_by(*self[1:])
+        return SampledFunctions(self.first - 1, self.time[:1], self.value[:, :1]).followed_by(*self[1:])
 
-    def closed(self) -> Known:
+    def closed(self) -> SampledFunctions:
         """Return these with the last time twice, slightly higher: the end of a fall is a minimum."""
         return self.followed_by(self.time[-1:], np.nextafter(self.value[:, -1:], np.inf))
 
@@ -283,7 +283,7 @@ class Brackets(NamedTuple):
         return Brackets(self.function[chosen], self.time[chosen], self.value[chosen])
 
 
-def brackets(known: Known) -> Brackets:
+def find_brackets(known: SampledFunctions) -> Brackets:
     """Return brackets of the local minima of functions; the first and the last time are neighbors only.
 
     Of equal adjacent values, the last is the middle.
@@ -295,7 +295,7 @@ def brackets(known: Known) -> Brackets:
     return Brackets(function, time[around], values[function[:, None], around])
 
 
-def narrowed(given: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brackets:
+def narrow_brackets(given: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brackets:
     """Return the brackets narrowed until each minimum is known; each round evaluates all of them together.
 
     The critical values decide on the number of rounds alone, see `Brackets.unknown`.
@@ -305,12 +305,14 @@ def narrowed(given: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brack
     for _ in range(ROUNDS):
         if not open_.size:
             break
-        _, time[open_], value[open_] = _round(given._replace(time=time, value=value).where(open_), evaluate)
+        _, time[open_], value[open_] = _narrow_once(
+            given._replace(time=time, value=value).where(open_), evaluate
+        )
         open_ = open_[Brackets(function, time, value).where(open_).unknown(critical)]
     return Brackets(function, time, value)
 
 
-def _round(given: Brackets, evaluate: Evaluate) -> Brackets:
+def _narrow_once(given: Brackets, evaluate: Evaluate) -> Brackets:
     """Return the lowest of the three times and of new ones between them, with its neighbors."""
     left, middle, right = np.hsplit(given.time, 3)
     close = given.lowest_of_parabola + CLOSE * (right - left)

@@ -14,8 +14,8 @@ from vsacli.analysis.report_text import energy_lines
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.analysis.trouble_text import (
     NOT_DETERMINED,
-    counts,
-    findings,
+    failing_joints_line,
+    finding_lines,
     little_effect,
     spread_lines,
     uncertainty_lines,
@@ -94,8 +94,8 @@ class Report(Stored):
         found = [
             *self._failed_check(),
             *warnings_and_notes(first, ()),
-            *findings(self.joints, self.samples),
-            *text.stops(self.joints, self.drifts),
+            *finding_lines(self.joints, self.samples),
+            *text.integration_stop_lines(self.joints, self.drifts),
             *self._recorded_infeasible(causes=bool(first)),
             *([hint] if hint else []),
             *uncertainty_lines(self.joints),
@@ -104,8 +104,8 @@ class Report(Stored):
             *warnings_and_notes((), self.notes),
         ]
         lines = [
-            *text.start(self.joints),
-            *text.end(self.joints),
+            *text.initial_motor_lines(self.joints),
+            *text.final_motor_lines(self.joints),
             *dry_friction_lines(
                 [(joint.name, joint.type, motor) for joint in self.joints for motor in joint.dry_friction]
             ),
@@ -144,7 +144,7 @@ class Report(Stored):
         """Return names, size, and how many joints fail which requirement."""
         length = counted(self.samples, "sample") + ("" if self.complete else ", stopped early")
         title = f"{self.robot}, {self.trajectory}: {length}, {self.duration:g} s"
-        return "; ".join([title, *filter(None, [counts(self.joints)])])
+        return "; ".join([title, *filter(None, [failing_joints_line(self.joints)])])
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:

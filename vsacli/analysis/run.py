@@ -30,7 +30,7 @@ from vsacli.base.variables import Block
 from vsacli.compute.engine import Engine, choose
 from vsacli.dynamics.balances import BALANCES
 from vsacli.dynamics.energy import JointEnergy, RunEnergy
-from vsacli.dynamics.inverse import fitted, usual_block
+from vsacli.dynamics.inverse import adapt_trajectory, usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -82,7 +82,7 @@ class Run:
         tell: Tell = unheard,
     ) -> None:
         check_min_margin(min_margin)
-        trajectory = fitted(robot, trajectory)
+        trajectory = adapt_trajectory(robot, trajectory)
         self.robot = robot
         self.trajectory = trajectory
         self._stop_on_infeasible = stop_on_infeasible
@@ -99,7 +99,7 @@ class Run:
         busy = int(self._ahead)  # one thread updates the summaries while the others compute
         self.choice = choose(engine, self._dynamics.kernel, trajectory.samples, threads, tell, busy=busy)
         self._dynamics.engine = self.choice.engine
-        self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
+        self._uncertainty = _prepare_uncertainty(robot, trajectory, asked, self.choice.engine)
         self._between = Between(self._dynamics, min_margin, self._uncertainty)
         self._passages = FrictionPassages(robot)
         self._check = RunCheck(self._dynamics)
@@ -283,10 +283,10 @@ def inverse_dynamics(
         deflection_solver=deflection_solver,
         engine=engine,
     )
-    return Result(**_joined(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
+    return Result(**_concatenate_blocks(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
 
 
-def _uncertainty(
+def _prepare_uncertainty(
     robot: Robot, trajectory: Trajectory, asked: Collection[str], engine: Engine
 ) -> RunUncertainty | None:
     """Return the uncertainty of the run; None if no signal was recorded."""
@@ -308,7 +308,7 @@ def _drift_summaries(robot: Robot, deflections: IntegratedDeflections | None) ->
     ]
 
 
-def _joined(blocks: list[Block]) -> dict[str, AnyArray]:
+def _concatenate_blocks(blocks: list[Block]) -> dict[str, AnyArray]:
     """Return the variables of consecutive blocks, concatenated, with the samples contiguous in memory."""
     rows = [{name: np.moveaxis(array, 0, -1) for name, array in block.arrays().items()} for block in blocks]
     return {

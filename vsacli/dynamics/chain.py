@@ -66,7 +66,7 @@ class TipLoad(NamedTuple):
     in_base: bool
 
 
-class Chain(NamedTuple):
+class RecursionInputs(NamedTuple):
     """A whole chain, base to tip.
 
     Attributes:

@@ -44,7 +44,7 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
     return [rate for rate, there in zip(dphi, joint.actuator.has(VARIABLES["phi"]), strict=True) if there]
 
 
-def motor_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
+def parallel_damper_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
     """Return the torque of a parallel damper on the motors of a joint, and its rate, each (2, samples)."""
     damping, d_damping, dphi, ddtheta = (
         of_joint.damping,
@@ -60,7 +60,7 @@ def motor_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, F
     return torque, rate
 
 
-class Passed(NamedTuple):
+class ParallelDamperTorques(NamedTuple):
     """Torques of parallel dampers on the links, (..., joints), and against sprung motors, (..., springs)."""
 
     links: Scalar
@@ -89,13 +89,15 @@ class Dampers:
         d, d_d, dd_d = (np.where(self._between_links, commanded[name], 0.0) for name in DAMPING.names)
         return damper_torque((d, d_d, dd_d), (dq, ddq, d3q))
 
-    def passed(self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray) -> Passed:
+    def passed(
+        self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray
+    ) -> ParallelDamperTorques:
         """Return the torques of dampers parallel to springs, from velocities of joints and sprung motors."""
         if not self._beside.any():
-            return Passed(0, 0)
+            return ParallelDamperTorques(0, 0)
         damping = np.where(self._beside, commanded[DAMPING.key][..., self._joint], 0.0)
         motors: FloatArray = damping * (dtheta - dq[..., self._joint])
-        return Passed(motors @ self._share, motors)
+        return ParallelDamperTorques(motors @ self._share, motors)
 
     def variables(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray

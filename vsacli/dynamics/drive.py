@@ -62,7 +62,7 @@ def drive(
     """
     driven = driven_by(joint, command, min_margin, deflections)
     exceeded = limit_flags(joint, driven.by_name(), np.zeros_like(driven.flags))
-    unexplained = not_finite_flags(_not_finite(joint, driven))
+    unexplained = not_finite_flags(_motors_not_finite(joint, driven))
     return driven._replace(flags=driven.flags | exceeded | unexplained)
 
 
@@ -80,7 +80,7 @@ def driven_by(
         moved = DampedSprings(actuator).transmit(command, deflections, min_margin)
     else:
         moved = actuator.transmit(command, min_margin, deflections)  # (61)-(72)
-    tau_motor = motor_torques(actuator, moved.dtheta, moved.ddtheta, moved.tau_transmission)
+    tau_motor = shaft_torques(actuator, moved.dtheta, moved.ddtheta, moved.tau_transmission)
     tau_damper, beside = _damper_torques(joint, command, moved.dphi)
     if beside is not None:
         tau_motor = tau_motor + beside
@@ -90,7 +90,7 @@ def driven_by(
     return driven if tau_damper is None else driven._replace(tau_damper=tau_damper)
 
 
-def motor_torques(
+def shaft_torques(
     actuator: Actuator, dtheta: FloatArray, ddtheta: FloatArray, tau_transmission: FloatArray
 ) -> FloatArray:
     """Compute motor torques from motion and spring torques, (73)-(74) with friction; all (2, samples)."""
@@ -123,7 +123,7 @@ def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
     return own + coupling * ddtheta[::-1] if coupling else own
 
 
-def _not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
+def _motors_not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
     """Return where a motor variable is not finite although the sample is neither infeasible nor singular.
 
     Samples with a demand that is not finite count, too.

@@ -49,7 +49,7 @@ class Response(NamedTuple):
     friction: FloatArray | None
 
 
-Balance = Callable[[FloatArray, BoolArray | None], tuple[FloatArray, FloatArray, FloatArray]]
+AccelerationLaw = Callable[[FloatArray, BoolArray | None], tuple[FloatArray, FloatArray, FloatArray]]
 """Function from the torques of all motors, (..., motors), and a mask of held motors (None if none can be
 held) to accelerations of joints and of sprung motors, and to holding torques, (..., motors), 0 for others."""
 
@@ -59,7 +59,7 @@ def response_with_friction(
     torque: FloatArray,
     velocity: FloatArray,
     slip: FloatArray | None,
-    balance: Balance,
+    balance: AccelerationLaw,
 ) -> Response:
     """Return the accelerations under motor torques and dry friction.
 

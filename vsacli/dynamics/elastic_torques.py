@@ -29,7 +29,7 @@ from vsacli.compute.vector import (
     exact,
     trigonometric,
 )
-from vsacli.dynamics.chain import Chain, JointState, LinkConstants, TipLoad, TorqueDerivatives
+from vsacli.dynamics.chain import JointState, LinkConstants, RecursionInputs, TipLoad, TorqueDerivatives
 from vsacli.dynamics.dampers import damper_torque
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.dynamics.recursion import recursion
@@ -113,20 +113,20 @@ class LinkTorques(RowKernel):
         torques = recursion(*self.chain(rows))
         return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
 
-    def chain(self, rows: Sequence[Scalar]) -> Chain:
+    def chain(self, rows: Sequence[Scalar]) -> RecursionInputs:
         """Return the inputs of the recursion from rows in the layout of `arguments`."""
         given, joints = self.arguments.unpack(rows), self.robot.joints
         none = [0] * len(joints)
         dampings = zip(*(given.get(name, none) for name in DAMPING.names), strict=True)
         states = [
-            call(q, _state_of(joint), q, (dq, ddq, d3q, d4q), damping)
+            call(q, _keyed_joint_state(joint), q, (dq, ddq, d3q, d4q), damping)
             for joint, damping, q, dq, ddq, d3q, d4q in zip(
                 joints, dampings, *(given[name] for name in POSITION.names), strict=True
             )
         ]
         wrench = [given[name] for name in WRENCH_NAMES if name in given]
         tip = None if self.frame is None else tip_load(self.robot, self.frame, wrench)
-        return Chain(self._links, states, self._gravity, tip)
+        return RecursionInputs(self._links, states, self._gravity, tip)
 
     @cached_property
     def _links(self) -> list[LinkConstants]:
@@ -194,12 +194,12 @@ def link_torques(
     check_robot(robot)
     if wrench is not None:
         check_wrench(wrench)
-    given = _given(robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True)))
+    given = _check_motion_arrays(robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True)))
     shape = given[0].shape
-    motion = list(map(_rows, given))
+    motion = list(map(_rows_over_samples, given))
     motion += [np.zeros_like(motion[0])] * (len(POSITION.names) - len(motion))
 
-    kernel = _kernel(robot, None if wrench is None else wrench.frame)
+    kernel = _recursion_kernel(robot, None if wrench is None else wrench.frame)
     damped = DAMPING.key in kernel.arguments.shapes
     dampings = _damping_rows(robot, shape, (damping, ddamping, dddamping)) if damped else ()
     every = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
@@ -211,11 +211,11 @@ def link_torques(
 
 
 @lru_cache(KEPT_PROGRAMS)
-def _kernel(robot: Robot, frame: str | None) -> LinkTorques:
+def _recursion_kernel(robot: Robot, frame: str | None) -> LinkTorques:
     return LinkTorques(robot, frame)
 
 
-def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
+def _check_motion_arrays(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
     """Return the given arrays, checked: of one shape, without a missing derivative before the last."""
     given = [
         checked_shape(name, array, len(robot.joints)) for name, array in motion.items() if array is not None
@@ -233,7 +233,7 @@ def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatAr
     return given
 
 
-def _rows(array: FloatArray) -> FloatArray:
+def _rows_over_samples(array: FloatArray) -> FloatArray:
     """Return the rows of an array of one sample, (n,), or over time, (samples, n)."""
     return array[:, None] if array.ndim == 1 else by_joint(array)
 
@@ -247,7 +247,7 @@ def _damping_rows(
         values = np.broadcast_to(default, shape) if array is None else np.asarray(array, dtype=np.float64)
         if values.shape != shape:
             raise InputError.one(f"{name} must have the shape {shape} of q, not {values.shape}")
-        yield _rows(values)
+        yield _rows_over_samples(values)
 
 
 def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[FloatArray]:
@@ -258,10 +258,10 @@ def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[Fl
         array, expected = getattr(wrench, name), (*samples, len(WRENCH_AXES))
         if (shape := np.shape(array)) != expected:
             raise InputError.one(f"{name} must have the shape {expected}, not {shape}")
-        yield _rows(np.asarray(array, dtype=np.float64))
+        yield _rows_over_samples(np.asarray(array, dtype=np.float64))
 
 
-def _state_of(joint: Joint) -> Keyed:
+def _keyed_joint_state(joint: Joint) -> Keyed:
     return Keyed((joint.type, joint.dh, joint.friction, joint.damper), partial(joint_state, joint))
 
 

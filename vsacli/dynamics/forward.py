@@ -19,7 +19,7 @@ from vsacli.compute.engine import KEPT_PROGRAMS
 from vsacli.compute.vector import add
 from vsacli.dynamics.dampers import Dampers
 from vsacli.dynamics.dry_friction import Response, response_with_friction
-from vsacli.dynamics.rigid_body import chain_of
+from vsacli.dynamics.rigid_body import link_dynamics
 from vsacli.robot.model import Robot, check_robot
 
 
@@ -60,7 +60,7 @@ def mass_matrix(robot: Robot, q: npt.ArrayLike) -> FloatArray:
         TypeError: Robot is of another type.
     """
     check_robot(robot)
-    return chain_of(robot).mass_matrix(checked_shape("q", q, len(robot.joints)))
+    return link_dynamics(robot).mass_matrix(checked_shape("q", q, len(robot.joints)))
 
 
 def state_derivative(
@@ -123,7 +123,7 @@ class Plant:
 
     def __init__(self, robot: Robot, frame: str | None = None) -> None:
         self.drivetrain = Drivetrain(robot.actuators)
-        self.chain = chain_of(robot, frame)
+        self.chain = link_dynamics(robot, frame)
         self.dampers = Dampers(robot, self.drivetrain)
         self._rigid_inertia = self.drivetrain.direct(self.drivetrain.inertia)
         self._rigid_matrix = np.diag(self._rigid_inertia)
@@ -196,7 +196,7 @@ class Plant:
     def _balanced(
         self, matrix: FloatArray, on_joints: FloatArray, on_motors: FloatArray, held: BoolArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the accelerations under torques on joints and on motors with springs; see `Balance`."""
+        """Return accelerations under torques on joints and on motors with springs; see `AccelerationLaw`."""
         rotors = self.drivetrain.rotors
         if held is None or not held.any():
             still = np.zeros((*on_motors.shape[:-1], len(self.drivetrain.joint)))

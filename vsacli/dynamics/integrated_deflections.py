@@ -21,7 +21,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.signals import STIFFNESS
-from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
+from vsacli.dynamics.inverse import DeflectionStop, command_of, link_torques_along
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -44,7 +44,7 @@ def integrable(joint: Joint) -> bool:
     return STIFFNESS.key in joint.actuator.commanded and joint.damper_at("transmission") is None
 
 
-class Task:
+class DeflectionEquation:
     """A robot and its commanded motion; deflections are (joints, 2, samples).
 
     Attributes:
@@ -63,7 +63,10 @@ class Task:
     def roots(self, joints: tuple[int, ...], time: FloatArray) -> FloatArray:
         """Return the roots of (14) of some joints."""
         return np.stack(
-            [_root(actuator, command).deflections for actuator, command in self._commands(joints, time)]
+            [
+                _deflection_root(actuator, command).deflections
+                for actuator, command in self._commands(joints, time)
+            ]
         )
 
     def rates(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> FloatArray:
@@ -87,12 +90,12 @@ class Task:
     def _commands(self, joints: tuple[int, ...], time: FloatArray) -> Iterator[tuple[Actuator, Command]]:
         """Yield the commands of some joints, from one pass of the recursion."""
         motion = self.trajectory.at(time)
-        commanded = {**motion.variables(), **elastic_torques(self._robot, motion)}
+        commanded = {**motion.variables(), **link_torques_along(self._robot, motion)}
         for joint in joints:
             yield self._actuators[joint], command_of(joint, commanded)
 
 
-def _root(actuator: Actuator, command: Command) -> PairSolution:
+def _deflection_root(actuator: Actuator, command: Command) -> PairSolution:
     return actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
 
 
@@ -103,7 +106,7 @@ def _rates_of_unknowns(actuator: Actuator, command: Command, phi: FloatArray) ->
 
 def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
     """Return indices into `REASONS`; also singular where det A has another sign than on the branch."""
-    solution = _root(actuator, command)
+    solution = _deflection_root(actuator, command)
     flags = reach_flags(command.commanded["stiffness"], solution)
     here, on_branch = (
         np.sign(actuator.springs(each, command.q).determinant) for each in (phi, solution.deflections)
@@ -162,7 +165,7 @@ class Integration:
     """
 
     def __init__(
-        self, task: Task, joints: tuple[int, ...], pieces: Pieces, start: float, phi: FloatArray
+        self, task: DeflectionEquation, joints: tuple[int, ...], pieces: Pieces, start: float, phi: FloatArray
     ) -> None:
         self.joints = joints
         self.times = [start]
@@ -181,7 +184,7 @@ class Integration:
         return OdeSolution(self.times, self._steps)
 
     def _rates(self, time: float, state: Any) -> Any:
-        return self._task.rates(self.joints, np.array([time]), by_joint(state[:, None])).ravel()
+        return self._task.rates(self.joints, np.array([time]), deflections_by_joint(state[:, None])).ravel()
 
     def _run(self, ends: list[float], state: FloatArray) -> None:
         from scipy.integrate import DOP853
@@ -217,7 +220,7 @@ class Integration:
         """Return the end of a step, or the first time in it at which a joint cannot be integrated."""
         while right - left > 4 * np.spacing(abs(right)):
             nodes = np.linspace(left, right, CHECKS + 1)
-            hindrances = self._task.hindrances(self.joints, nodes[1:], by_joint(step(nodes[1:])))
+            hindrances = self._task.hindrances(self.joints, nodes[1:], deflections_by_joint(step(nodes[1:])))
             hits = np.flatnonzero(hindrances.any(axis=0))
             if not hits.size:
                 break
@@ -233,7 +236,7 @@ class Integration:
         return self.joints[int(np.nan_to_num(speed, nan=np.inf).argmax()) // 2]
 
 
-def by_joint(state: FloatArray) -> FloatArray:
+def deflections_by_joint(state: FloatArray) -> FloatArray:
     """Return the integrator's state (2 joints, samples) as (joints, 2, samples)."""
     return state.reshape(-1, 2, state.shape[1])
 
@@ -242,7 +245,7 @@ TOLERANCE = 1e-12
 """Relative tolerance of the integrator; the drift is about as large."""
 
 
-class _Course(NamedTuple):
+class _IntegratedPart(NamedTuple):
     """Deflections of some joints over a part of the trajectory."""
 
     joints: list[int]
@@ -257,8 +260,8 @@ class IntegratedDeflections:
         stops: For each joint, the time at which its integration ends before the trajectory, or None.
     """
 
-    stops: tuple[Stop | None, ...]
-    _courses: tuple[_Course, ...] = field(repr=False)
+    stops: tuple[DeflectionStop | None, ...]
+    _courses: tuple[_IntegratedPart, ...] = field(repr=False)
     _start: float
 
     def at(self, time: FloatArray) -> FloatArray:
@@ -272,7 +275,7 @@ class IntegratedDeflections:
             here = (course.solution.t_min <= elapsed) & (elapsed <= course.solution.t_max)
             if here.any():
                 for joint, deflections in zip(
-                    course.joints, by_joint(course.solution(elapsed[here])), strict=True
+                    course.joints, deflections_by_joint(course.solution(elapsed[here])), strict=True
                 ):
                     phi[joint][:, here] = deflections
         for joint, stop in enumerate(self.stops):
@@ -296,7 +299,7 @@ def integrate_deflections(
         tolerance: Relative tolerance of the integrator, at least 1e-13.
     """
     first, trajectory = trajectory.start, trajectory.from_zero()
-    task = Task(robot, trajectory)
+    task = DeflectionEquation(robot, trajectory)
     if not task.joints:
         return IntegratedDeflections((None,) * trajectory.joints, (), first)
     time, end = trajectory.times.span
@@ -305,14 +308,16 @@ def integrate_deflections(
     phi[list(task.joints)] = task.roots(task.joints, np.array([time]))
     hindrances = task.hindrances(task.joints, np.array([time]), phi[list(task.joints)])[:, 0]
     found = zip(task.joints, hindrances.tolist(), strict=True)
-    stops = {joint: Stop(first + time, REASONS[reason]) for joint, reason in found if reason}
+    stops = {joint: DeflectionStop(first + time, REASONS[reason]) for joint, reason in found if reason}
     courses = []
     while time < end and len(stops) < len(task.joints):
         going = [joint for joint in task.joints if joint not in stops]
         integration = Integration(task, tuple(going), pieces, time, phi[going, :, 0])
         if integration.times[-1] > time:
             time = integration.times[-1]
-            courses.append(_Course(going, integration.solution()))
-            phi[going] = by_joint(courses[-1].solution(np.array([time])))
-        stops |= {joint: Stop(first + time, reason) for joint, reason in integration.stopped.items()}
+            courses.append(_IntegratedPart(going, integration.solution()))
+            phi[going] = deflections_by_joint(courses[-1].solution(np.array([time])))
+        stops |= {
+            joint: DeflectionStop(first + time, reason) for joint, reason in integration.stopped.items()
+        }
     return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(courses), first)

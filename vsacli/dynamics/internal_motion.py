@@ -22,7 +22,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING
 from vsacli.dynamics.integrated_deflections import Pieces
-from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
+from vsacli.dynamics.inverse import DeflectionStop, command_of, link_torques_along
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -146,7 +146,7 @@ class Marched(NamedTuple):
     reason: str | None
 
 
-class _Solution(NamedTuple):
+class _CellSolution(NamedTuple):
     """Solution in a cell, at its start and nodes, or at its nodes alone.
 
     Attributes:
@@ -223,14 +223,14 @@ class March:
             if unresolved and cell.halved < HALVINGS:
                 todo += cell.halves(share)[::-1]
             elif isinstance(found, str):
-                return Marched(*_joined(ended, solved), cell.left, found)
+                return Marched(*_concatenate_cells(ended, solved), cell.left, found)
             else:
                 phi = found.phi[:, -1:]
                 solved.append(fitted)
                 ended.append(cell.right)
-        return Marched(*_joined(ended, solved), ended[-1], None)
+        return Marched(*_concatenate_cells(ended, solved), ended[-1], None)
 
-    def _fitted(self, cell: _Cell, found: _Solution) -> tuple[FloatArray, FloatArray]:
+    def _fitted(self, cell: _Cell, found: _CellSolution) -> tuple[FloatArray, FloatArray]:
         """Return coefficients of deflections and rates; in fast cells, rates are derivatives of the fit."""
         from numpy.polynomial import chebyshev
 
@@ -242,7 +242,7 @@ class March:
         second = np.append(chebyshev.chebder(first) / half, 0.0)
         return phi, np.stack((first, second))
 
-    def _solved(self, cell: _Cell, start: FloatArray, peak: float) -> _Solution | str:
+    def _solved(self, cell: _Cell, start: FloatArray, peak: float) -> _CellSolution | str:
         """Return deflections in a cell from those at its start, by Newton's method, or a reason of failure.
 
         Args:
@@ -254,7 +254,7 @@ class March:
         slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
         before, side = springs.spread(start), np.sign(springs.springs_at(start, command.q[:1]).pivot)
         spread, phi = before + 0 * command.q, start + 0 * command.q
-        converged, rounding = False, POSITION_ROUNDING * _largest(command.q)
+        converged, rounding = False, POSITION_ROUNDING * _largest_size(command.q)
         for _ in range(NEWTON_STEPS):
             phi = springs.settled(spread, phi, command)
             if np.isnan(phi[0]).any() or not springs.within(phi).all():
@@ -264,14 +264,14 @@ class March:
                 return SINGULAR
             if converged:
                 fastest = np.max(np.abs(there.slope) / damping)
-                return _Solution(
+                return _CellSolution(
                     np.hstack((start, phi)),
                     np.stack(springs.driven(phi, command)),
                     float(np.max(np.abs(command.tau_e))),
                     float(np.max(damping)),
                     (cell.right - cell.left) * float(fastest),
                     rounding,
-                    _largest(there.slope),
+                    _largest_size(there.slope),
                 )
             rate = slopes[:, 0] * before + slopes[:, 1:] @ spread
             missing = command.tau_e - there.state.tau_e - damping * rate
@@ -279,8 +279,8 @@ class March:
             matrix = damping[:, None] * slopes[:, 1:] + np.diag(slope)
             step = np.asarray(np.linalg.solve(matrix, missing), dtype=np.float64)
             spread = spread + step
-            converged = _largest(step) <= max(
-                CONVERGED * _largest(spread), CONVERGED * peak / _largest(slope), rounding
+            converged = _largest_size(step) <= max(
+                CONVERGED * _largest_size(spread), CONVERGED * peak / _largest_size(slope), rounding
             )
         return LOST
 
@@ -302,35 +302,35 @@ class _Peaks:
 
     def __init__(self, springs: DampedSprings, demand: Command, start: FloatArray) -> None:
         self._springs = springs
-        self._slope = _largest(springs.slope(start, demand.q[:1]))
-        self.torque = _largest(demand.tau_e)
+        self._slope = _largest_size(springs.slope(start, demand.q[:1]))
+        self.torque = _largest_size(demand.tau_e)
         self._phi, self._spread = 0.0, LEAST_SPREAD
 
-    def share(self, phi: FloatArray, rates: FloatArray, found: _Solution) -> float:
+    def share(self, phi: FloatArray, rates: FloatArray, found: _CellSolution) -> float:
         """Return the last coefficients of deflections, spread and torque, relative to the peaks so far.
 
         Positions of many turns are rounded; no cell is short enough for coefficients below that.
         """
         spread = self._springs.spread(phi)
         self._phi = max(self._phi, float(np.nanmax(np.abs(phi))))
-        self._spread = max(self._spread, _largest(spread), LEAST_SHARE * self._phi)
+        self._spread = max(self._spread, _largest_size(spread), LEAST_SHARE * self._phi)
         self.torque = max(self.torque, found.torque, self._slope * self._spread)
         missing = (
             float(np.nanmax(np.abs(phi[:, -2:]))) - found.rounding,
-            _largest(spread[-2:]) - found.rounding,
+            _largest_size(spread[-2:]) - found.rounding,
         )
         share = max(0.0, missing[0] / max(self._phi, LEAST_SPREAD), missing[1] / self._spread)
         if found.constants > FAST:
             return share
-        of_torque = found.damping * _largest(rates[0, -2:]) - found.slope * found.rounding
+        of_torque = found.damping * _largest_size(rates[0, -2:]) - found.slope * found.rounding
         return max(share, of_torque / self.torque)
 
 
-def _largest(values: FloatArray) -> float:
+def _largest_size(values: FloatArray) -> float:
     return float(np.max(np.abs(values)))
 
 
-def _joined(
+def _concatenate_cells(
     ended: list[float], solved: list[tuple[FloatArray, FloatArray]]
 ) -> tuple[Piecewise | None, Piecewise | None]:
     """Return the deflections and rates over all cells."""
@@ -350,7 +350,7 @@ class InternalMotions:
     """
 
     joints: tuple[int, ...]
-    stops: Mapping[int, Stop]
+    stops: Mapping[int, DeflectionStop]
     _marched: Mapping[int, Marched] = field(repr=False)
 
     @property
@@ -380,7 +380,7 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
     """
     first, trajectory = trajectory.start, trajectory.from_zero()
     joints = damped_joints(robot, trajectory)
-    demand = _Demand(robot, trajectory)
+    demand = _JointCommands(robot, trajectory)
     evenly = np.linspace(0.0, trajectory.duration, FIRST_CELLS + 1)
     ends = np.union1d(evenly, Pieces.of(trajectory, 0.0).ends)
     springs = {index: DampedSprings(robot.joints[index].actuator) for index in joints}
@@ -392,7 +392,7 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
             started = not np.isnan(begin[0]).any()
             marched[index] = march.through(ends, begin) if started else Marched(None, None, 0.0, LOST)
     stops = {
-        index: Stop(first + each.end, each.reason)
+        index: DeflectionStop(first + each.end, each.reason)
         for index, each in marched.items()
         if each.reason is not None
     }
@@ -428,7 +428,7 @@ def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str)
         )
 
 
-class _Demand:
+class _JointCommands:
     """Commands of joints over time; joints share the recursion's pass at the times of a cell."""
 
     def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
@@ -439,5 +439,5 @@ class _Demand:
         key = time.tobytes()
         if key not in self._known:
             motion = self._trajectory.at(time)
-            self._known[key] = {**motion.variables(), **elastic_torques(self._robot, motion)}
+            self._known[key] = {**motion.variables(), **link_torques_along(self._robot, motion)}
         return command_of(joint, self._known[key])

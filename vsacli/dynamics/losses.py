@@ -112,15 +112,17 @@ def dissipated_power(joint: Joint, motion: JointVariables) -> FloatArray:
         joint: Joint with its actuator.
         motion: Velocities `dq` and `dtheta`, and for a joint with a damper `damping` and `dphi`.
     """
-    power: FloatArray = _taken(joint.damping, FrictionLaws.of([joint.friction]), motion.dq)
+    power: FloatArray = _friction_power(joint.damping, FrictionLaws.of([joint.friction]), motion.dq)
     for velocity in damper_velocities(joint, motion.dq, motion.dphi) if joint.damper else ():
         power = power + motion.damping * velocity * velocity
     for index, motor in enumerate(joint.actuator.motors):
-        power = power + _taken(motor.damping, FrictionLaws.of([motor.friction]), motion.dtheta[index])
+        power = power + _friction_power(
+            motor.damping, FrictionLaws.of([motor.friction]), motion.dtheta[index]
+        )
     return power
 
 
-def _taken(damping: float, friction: FrictionLaws | None, velocity: FloatArray) -> FloatArray:
+def _friction_power(damping: float, friction: FrictionLaws | None, velocity: FloatArray) -> FloatArray:
     torque = damping * velocity
     if friction is not None:
         torque = torque + friction.torque(velocity)
@@ -128,7 +130,7 @@ def _taken(damping: float, friction: FrictionLaws | None, velocity: FloatArray) 
     return power
 
 
-class Lost(NamedTuple):
+class LostEnergy(NamedTuple):
     """Energy lost in the intervals between samples, J.
 
     Attributes:
@@ -141,10 +143,10 @@ class Lost(NamedTuple):
     dissipated: FloatArray
     copper: FloatArray | None
 
-    def taken(self, intervals: slice) -> Lost:
+    def taken(self, intervals: slice) -> LostEnergy:
         """Return the losses in a slice of the intervals."""
         copper = None if self.copper is None else self.copper[..., intervals]
-        return Lost(self.motor_friction[..., intervals], self.dissipated[..., intervals], copper)
+        return LostEnergy(self.motor_friction[..., intervals], self.dissipated[..., intervals], copper)
 
 
 class LossMeter:
@@ -165,14 +167,14 @@ class LossMeter:
         self._names = (*MOTION, *(["copper_loss"] if heated else []), *(DAMPED if damped else []))
         self._last: dict[str, FloatArray] = {}
 
-    def add(self, block: Block) -> Lost:
+    def add(self, block: Block) -> LostEnergy:
         """Return the losses from the previous sample to each sample of a block; zero before the first."""
         rows = {name: by_joint(getattr(block, name)) for name in self._names}
-        before = self._last or _step(rows, 0)
-        self._last = _step(rows, -1)
+        before = self._last or _sample_rows(rows, 0)
+        self._last = _sample_rows(rows, -1)
         return self.between({name: np.concatenate((before[name], rows[name]), axis=-1) for name in rows})
 
-    def between(self, rows: Mapping[str, FloatArray]) -> Lost:
+    def between(self, rows: Mapping[str, FloatArray]) -> LostEnergy:
         """Return the losses from sample to sample, from variables by name with samples on the last axis."""
         intervals = np.diff(rows["time"])
         of_motors = [rows[name] for name in ("theta", "dtheta", "ddtheta")]
@@ -187,10 +189,10 @@ class LossMeter:
                 of_joint = {name: rows[name][index] for name in self._names if name != "time"}
                 dissipated[index] += _damper_work(joint, intervals, of_joint)
         heat = rows.get("copper_loss")
-        return Lost(motor_friction, dissipated, None if heat is None else trapezoids(intervals, heat))
+        return LostEnergy(motor_friction, dissipated, None if heat is None else trapezoids(intervals, heat))
 
 
-def _step(rows: Mapping[str, FloatArray], step: int) -> dict[str, FloatArray]:
+def _sample_rows(rows: Mapping[str, FloatArray], step: int) -> dict[str, FloatArray]:
     return {name: values[..., [step]] for name, values in rows.items()}
 
 

@@ -27,7 +27,7 @@ from vsacli.dynamics.inverse import (
     InverseDynamics,
     block_of,
     command_of,
-    elastic_torques,
+    link_torques_along,
     usual_block,
 )
 from vsacli.robot.model import Robot
@@ -77,7 +77,7 @@ class Uncertainty:
             elapsed = self._elapsed[start : start + batch]
             motion = trajectory.at(trajectory.start + elapsed)
             covariances = {signal: each.covariance(elapsed) for signal, each in estimates.items()}
-            parts.append(deviations(robot, motion, estimates, covariances, engine))
+            parts.append(propagate_deviations(robot, motion, estimates, covariances, engine))
         self._known, self.unstated = Deviations.joined(parts, axis=0)
 
     def at(self, time: FloatArray) -> dict[str, FloatArray]:
@@ -146,7 +146,7 @@ class _Shift(NamedTuple):
     size: FloatArray
 
 
-def deviations(
+def propagate_deviations(
     robot: Robot,
     motion: Motion,
     estimates: Mapping[Signal, SampledProfile],
@@ -173,8 +173,8 @@ def deviations(
         return {**{name: getattr(block, name) for name in _COMPUTED}, MARGIN: gap}
 
     components = {signal: range(len(covariance)) for signal, covariance in covariances.items()}
-    computed = _propagated(variables, motion, estimates, covariances, components)
-    given = _given(robot, estimates, covariances)
+    computed = _propagate(variables, motion, estimates, covariances, components)
+    given = _signal_deviations(robot, estimates, covariances)
     return Deviations(computed.deviations | given.deviations, computed.unstated | given.unstated)
 
 
@@ -192,15 +192,15 @@ def deviations_of_joint(
         index: Index of the joint.
         motion: Motion at some times.
         estimates: Signals that were recorded.
-        covariances: Their covariances, as in `deviations`.
+        covariances: Their covariances, as in `propagate_deviations`.
 
     Returns:
-        The values that `deviations` has for the joint, except that of `MARGIN`.
+        The values that `propagate_deviations` has for the joint, except that of `MARGIN`.
     """
     undamped = _without_inner_dampers(robot)
 
     def variables(shifted: Motion) -> dict[str, AnyArray]:
-        command = command_of(index, {**shifted.variables(), **elastic_torques(undamped, shifted)})
+        command = command_of(index, {**shifted.variables(), **link_torques_along(undamped, shifted)})
         driven = drive(undamped.joints[index], command)
         return {name: getattr(driven, name).T[:, None] for name in _COMPUTED}
 
@@ -208,9 +208,9 @@ def deviations_of_joint(
         signal: [index] if signal.key in COMMANDED else range(len(covariance))
         for signal, covariance in covariances.items()
     }
-    computed = _propagated(variables, motion, estimates, covariances, components)
+    computed = _propagate(variables, motion, estimates, covariances, components)
     of_joints = {signal: each for signal, each in covariances.items() if signal is not WRENCH}
-    given = _given(robot, estimates, of_joints)
+    given = _signal_deviations(robot, estimates, of_joints)
     return Deviations(
         {**of_joint(computed.deviations, 0), **of_joint(given.deviations, index)},
         {
@@ -224,7 +224,7 @@ _Variables = Callable[[Motion], Mapping[str, AnyArray]]
 """Function that computes variables along a motion, by name, each (times, joints[, 2])."""
 
 
-def _propagated(
+def _propagate(
     variables: _Variables,
     motion: Motion,
     estimates: Mapping[Signal, SampledProfile],
@@ -256,7 +256,7 @@ def _propagated(
     return Deviations(found, unstated)
 
 
-def _given(
+def _signal_deviations(
     robot: Robot, estimates: Mapping[Signal, SampledProfile], covariances: Mapping[Signal, FloatArray]
 ) -> Deviations:
     """Return the deviations of the recorded signals themselves, and of their derivatives."""
@@ -264,12 +264,12 @@ def _given(
     for signal, covariance in covariances.items():
         for name, rows in zip(signal.names, np.moveaxis(_spreads(covariance), 1, 0), strict=True):
             if name in estimates[signal].estimated:
-                rows[_ignored(robot, signal)] = np.nan
+                rows[_joints_without_signal(robot, signal)] = np.nan
                 found[name], unstated[name] = rows.T, ~estimates[signal].stated
     return Deviations(found, unstated)
 
 
-def _ignored(robot: Robot, signal: Signal) -> list[int]:
+def _joints_without_signal(robot: Robot, signal: Signal) -> list[int]:
     """Return the joints that ignore a signal, although it may have a column for them."""
     commanded = signal.key in COMMANDED
     return [

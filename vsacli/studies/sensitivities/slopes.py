@@ -18,10 +18,10 @@ from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.variables import Block
 from vsacli.compute.duals import tangents_of
 from vsacli.compute.vector import Scalar
-from vsacli.dynamics.chain import Chain
+from vsacli.dynamics.chain import RecursionInputs
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
-from vsacli.dynamics.inverse import command_of, compute_block, fitted
+from vsacli.dynamics.inverse import adapt_trajectory, command_of, compute_block
 from vsacli.dynamics.recursion import backward, base_frame, forward
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters, seeded
@@ -75,7 +75,7 @@ def _by_joint(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
     return places
 
 
-def _mixed(plain: Chain, carrying: Chain, joint: int | None) -> Chain:
+def _mixed(plain: RecursionInputs, carrying: RecursionInputs, joint: int | None) -> RecursionInputs:
     """Return the chain with derivatives by the parameters of one joint, or of the robot as a whole."""
     if joint is None:
         return plain._replace(gravity=carrying.gravity, tip=carrying.tip)
@@ -235,7 +235,7 @@ class SensitivityRun:
     slopes: ClassVar[Mapping[str, bool]] = {**dict.fromkeys(OF_MOTORS, True), MARGIN: False}
 
     def __init__(self, robot: Robot, trajectory: Trajectory, patterns: Sequence[str] = ()) -> None:
-        self.robot, self.trajectory = robot, fitted(robot, trajectory)
+        self.robot, self.trajectory = robot, adapt_trajectory(robot, trajectory)
         refuse_damped_transmissions(robot, self.trajectory, "sensitivities")
         self.parameters: tuple[Parameter, ...] = parameters(robot, patterns)
 
