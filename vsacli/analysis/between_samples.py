@@ -77,11 +77,11 @@ class Minima(NamedTuple):
 
     def of_joint(self, index: int) -> Block:
         """Return a joint's variables at its minima, in its column; the columns before are views of it."""
-        own = self.block.taken(self.joint == index)
-        return own.replaced(
+        at_minima = self.block.taken(self.joint == index)
+        return at_minima.replaced(
             **{
                 name: np.broadcast_to(array, (len(array), index + 1, *array.shape[2:]))
-                for name, array in _joint_variables(own).items()
+                for name, array in _joint_variables(at_minima).items()
             }
         )
 
@@ -113,12 +113,12 @@ class Between:
         self._lowest = [np.empty(0)] * len(self._sides.quantity)
         self._least_at_steps = np.full(len(self._sides.quantity), np.inf)
         self._least_between: dict[int, tuple[float, Finding]] = {}
-        self._found: list[Minima] = []
+        self._pending_minima: list[Minima] = []
         self._passed = 0
         looking = not self.notes and bool(self.quantities)
         self._scans = looking and trajectory.samples < SCANNED
         self._looks = looking and not self._scans
-        self._known: SampledFunctions | None = None
+        self._sides_over_time: SampledFunctions | None = None
         self._seen = 0.0 if self._looks else math.inf
 
     def look(self, block: Block) -> None:
@@ -128,13 +128,15 @@ class Between:
             self._scans = False
         elif self._looks:
             steps = block.time, self._sides.values(block)
-            before = self._known
-            self._known = (
+            before = self._sides_over_time
+            self._sides_over_time = (
                 SampledFunctions(0, *steps).opened() if before is None else before.last(2).followed_by(*steps)
             )
-            ended = self._known.stop == self._trajectory.samples
-            self._search(self._known.closed() if ended else self._known, self._known)
-            self._seen = math.inf if ended else self._known.stop - 1
+            ended = self._sides_over_time.stop == self._trajectory.samples
+            self._search(
+                self._sides_over_time.closed() if ended else self._sides_over_time, self._sides_over_time
+            )
+            self._seen = math.inf if ended else self._sides_over_time.stop - 1
 
     def knows(self, samples: int) -> bool:
         """Return whether minima around this many further samples are known.
@@ -146,24 +148,24 @@ class Between:
 
     def nearest(self, block: Block) -> list[Minima]:
         """Return the minima between samples that are nearest to those of the next block."""
-        stop, own, later = self._passed + len(block.time), [], []
-        for found in self._found:
-            inside = found.step < stop
+        stop, nearest, later = self._passed + len(block.time), [], []
+        for minima in self._pending_minima:
+            inside = minima.step < stop
             if inside.any():
-                own.append(found.where(inside)._replace(step=found.step[inside] - self._passed))
+                nearest.append(minima.where(inside)._replace(step=minima.step[inside] - self._passed))
             if not inside.all():
-                later.append(found.where(~inside))
-        self._found, self._passed = later, stop
-        return own
+                later.append(minima.where(~inside))
+        self._pending_minima, self._passed = later, stop
+        return nearest
 
     def add(self, minima: Minima) -> None:
         """Merge minima of samples that are part of the run into the report."""
         for number in set(minima.quantity.tolist()):
-            own, quantity = minima.where(minima.quantity == number), self.quantities[number]
-            least = int(own.clearance.argmin())
-            clearance = float(own.clearance[least])
+            of_quantity, quantity = minima.where(minima.quantity == number), self.quantities[number]
+            least = int(of_quantity.clearance.argmin())
+            clearance = float(of_quantity.clearance[least])
             if clearance < self._least_between.get(number, (math.inf,))[0]:
-                worst = quantity.at(own.of_joint(quantity.number), least, between=True)
+                worst = quantity.at(of_quantity.of_joint(quantity.number), least, between=True)
                 self._least_between[number] = clearance, worst
 
     def reports(self) -> list[dict[str, Finding]]:
@@ -181,23 +183,25 @@ class Between:
     def _scan(self) -> None:
         """Search a whole run of few samples, at the same number of times from each sample to the next."""
         steps = self._trajectory.times.block(0, self._trajectory.samples)
-        each = -(-SCANNED // (len(steps) - 1))
-        time = np.append(steps[:-1, None] + np.diff(steps)[:, None] * np.arange(each) / each, steps[-1])
+        per_interval = -(-SCANNED // (len(steps) - 1))
+        time = np.append(
+            steps[:-1, None] + np.diff(steps)[:, None] * np.arange(per_interval) / per_interval, steps[-1]
+        )
         values = [self._sides.values(block) for _, block in self._dynamics.blocks_at(time)]
-        known = SampledFunctions(0, time, np.hstack(values))
-        self._search(known.opened().closed(), SampledFunctions(0, steps, known.value[:, ::each]))
+        sides = SampledFunctions(0, time, np.hstack(values))
+        self._search(sides.opened().closed(), SampledFunctions(0, steps, sides.value[:, ::per_interval]))
 
-    def _search(self, known: SampledFunctions, steps: SampledFunctions) -> None:
+    def _search(self, sampled: SampledFunctions, steps: SampledFunctions) -> None:
         """Find the minima where values are known, and keep those lower than the samples around them.
 
         Of those that hardly differ from the samples, minima with a further flag that decides are kept.
         """
         self._least_at_steps = np.minimum(self._least_at_steps, steps.value.min(axis=1))
         sides = self._sides
-        found = narrow_brackets(
-            self._chosen(find_brackets(known), steps.time), self._evaluated, sides.critical
+        minima = narrow_brackets(
+            self._chosen(find_brackets(sampled), steps.time), self._evaluated, sides.critical
         )
-        side, time, value = found.function, found.time[:, 1], found.value[:, 1]
+        side, time, value = minima.function, minima.time[:, 1], minima.value[:, 1]
         after = np.clip(np.searchsorted(steps.time, time), 1, len(steps.time) - 1)
         at_steps = np.minimum(*(steps.value[side, place] for place in (after - 1, after)))
         noise = KNOWN * np.abs(value - sides.critical[side]) + ROUNDING * sides.size[side]
@@ -207,41 +211,41 @@ class Between:
         kept |= further[:, :DECISIVE].any(axis=1)
         if kept.any():
             nearest = after - (time - steps.time[after - 1] < steps.time[after] - time)
-            self._keep(found.where(kept), steps.first + nearest[kept])
+            self._keep(minima.where(kept), steps.first + nearest[kept])
 
-    def _chosen(self, given: Brackets, steps: FloatArray) -> Brackets:
+    def _chosen(self, candidates: Brackets, steps: FloatArray) -> Brackets:
         """Return the brackets that may have the lowest minima of each side so far, between samples.
 
         A minimum is kept if it may have more flags than the middle time, or if it may be the lowest.
         """
-        middle, side, sides = given.time[:, 1], given.function, self._sides
+        middle, side, sides = candidates.time[:, 1], candidates.function, self._sides
         at_step = steps[np.clip(np.searchsorted(steps, middle), 0, len(steps) - 1)] == middle
-        ahead = np.maximum(sides.next_flag(side, given.value[:, 1]), self._least_at_steps[side])
+        ahead = np.maximum(sides.next_flag(side, candidates.value[:, 1]), self._least_at_steps[side])
         with np.errstate(invalid="ignore"):  # inf - inf next to an infinite clearance
-            fall = given.fall
-            expected = given.value[:, 1] - np.where(np.isfinite(fall), fall, 0.0)
+            fall = candidates.fall
+            expected = candidates.value[:, 1] - np.where(np.isfinite(fall), fall, 0.0)
         near = ~(expected > ahead) & ~(sides.clearance(side, expected) > NEAR)
-        wanted = (given.unknown(sides.critical) | ~at_step) & near
-        given, expected = given.where(wanted), expected[wanted]
-        chosen = np.zeros(len(given.function), dtype=bool)
-        for number in set(given.function.tolist()):
-            own = given.function == number
-            self._lowest[number] = np.sort(np.append(self._lowest[number], expected[own]))[:MOST]
-            chosen[own] = expected[own] <= self._lowest[number][-1]
-        return given.where(chosen)
+        wanted = (candidates.unknown(sides.critical) | ~at_step) & near
+        candidates, expected = candidates.where(wanted), expected[wanted]
+        chosen = np.zeros(len(candidates.function), dtype=bool)
+        for number in set(candidates.function.tolist()):
+            of_side = candidates.function == number
+            self._lowest[number] = np.sort(np.append(self._lowest[number], expected[of_side]))[:MOST]
+            chosen[of_side] = expected[of_side] <= self._lowest[number][-1]
+        return candidates.where(chosen)
 
-    def _keep(self, found: Brackets, steps: IndexArray) -> None:
+    def _keep(self, minima: Brackets, steps: IndexArray) -> None:
         """Keep the variables at minima, with the flags of the minimal quantities, for the nearest sample."""
-        clearance = self._sides.clearance(found.function, found.value[:, 1])
-        for part, block in self._dynamics.blocks_at(found.time[:, 1]):
-            quantity = self._sides.quantity[found.function[part]]
+        clearance = self._sides.clearance(minima.function, minima.value[:, 1])
+        for part, block in self._dynamics.blocks_at(minima.time[:, 1]):
+            quantity = self._sides.quantity[minima.function[part]]
             joint = self._joint[quantity]
             judged = block if self._uncertainty is None else self._uncertainty.judged(block)
             at_minima = np.arange(len(joint)), joint, np.newaxis
-            own = {name: array[at_minima] for name, array in _joint_variables(judged).items()}
-            own["flags"] &= self._bits[quantity, None]
+            variables = {name: array[at_minima] for name, array in _joint_variables(judged).items()}
+            variables["flags"] &= self._bits[quantity, None]
             rows = quantity, joint, clearance[part], steps[part]
-            self._found.append(Minima(judged.replaced(**own), *rows))
+            self._pending_minima.append(Minima(judged.replaced(**variables), *rows))
 
     def _evaluated(self, side: IndexArray, times: FloatArray) -> FloatArray:
         """Return the values of sides (n,) at times of their own, (n, times)."""

@@ -283,47 +283,47 @@ class Brackets(NamedTuple):
         return Brackets(self.function[chosen], self.time[chosen], self.value[chosen])
 
 
-def find_brackets(known: SampledFunctions) -> Brackets:
+def find_brackets(functions: SampledFunctions) -> Brackets:
     """Return brackets of the local minima of functions; the first and the last time are neighbors only.
 
     Of equal adjacent values, the last is the middle.
     """
-    time, values = known.time, known.value
+    time, values = functions.time, functions.value
     falls = values[:, 1:] <= values[:, :-1]
     function, before = np.nonzero(falls[:, :-1] & ~falls[:, 1:])
     around = before[:, None] + np.arange(3)
     return Brackets(function, time[around], values[function[:, None], around])
 
 
-def narrow_brackets(given: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brackets:
+def narrow_brackets(wide: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brackets:
     """Return the brackets narrowed until each minimum is known; each round evaluates all of them together.
 
     The critical values decide on the number of rounds alone, see `Brackets.unknown`.
     """
-    function, time, value = given.function, given.time.copy(), given.value.copy()
-    open_ = np.flatnonzero(given.unknown(critical))
+    function, time, value = wide.function, wide.time.copy(), wide.value.copy()
+    open_ = np.flatnonzero(wide.unknown(critical))
     for _ in range(ROUNDS):
         if not open_.size:
             break
         _, time[open_], value[open_] = _narrow_once(
-            given._replace(time=time, value=value).where(open_), evaluate
+            wide._replace(time=time, value=value).where(open_), evaluate
         )
         open_ = open_[Brackets(function, time, value).where(open_).unknown(critical)]
     return Brackets(function, time, value)
 
 
-def _narrow_once(given: Brackets, evaluate: Evaluate) -> Brackets:
+def _narrow_once(wide: Brackets, evaluate: Evaluate) -> Brackets:
     """Return the lowest of the three times and of new ones between them, with its neighbors."""
-    left, middle, right = np.hsplit(given.time, 3)
-    close = given.lowest_of_parabola + CLOSE * (right - left)
+    left, middle, right = np.hsplit(wide.time, 3)
+    close = wide.lowest_of_parabola + CLOSE * (right - left)
     new = np.hstack(
         (left + SHARES * (middle - left), middle + SHARES * (right - middle), np.clip(close, left, right))
     )
-    times = np.hstack((given.time, new))
-    values = np.hstack((given.value, evaluate(given.function, new)))
-    each = np.arange(len(times))[:, None]
-    order = each, times.argsort(axis=1, kind="stable")
+    times = np.hstack((wide.time, new))
+    values = np.hstack((wide.value, evaluate(wide.function, new)))
+    row = np.arange(len(times))[:, None]
+    order = row, times.argsort(axis=1, kind="stable")
     times, values = times[order], values[order]
     lowest = np.clip(values.argmin(axis=1), 1, values.shape[1] - 2)[:, None]
-    around = each, lowest + np.arange(-1, 2)
-    return Brackets(given.function, times[around], values[around])
+    around = row, lowest + np.arange(-1, 2)
+    return Brackets(wide.function, times[around], values[around])

@@ -41,8 +41,8 @@ def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
         "friction and damping": [energy.dissipated for energy in energies],
         "motor windings": [energy.copper_loss for energy in energies],
     }
-    known = {words: [loss for loss in losses if loss is not None] for words, losses in lost.items()}
-    sums = [f"{words} {short_number(sum(losses))} J" for words, losses in known.items() if losses]
+    losses_by_cause = {words: [loss for loss in losses if loss is not None] for words, losses in lost.items()}
+    sums = [f"{words} {short_number(sum(losses))} J" for words, losses in losses_by_cause.items() if losses]
     if sums:
         yield "losses: " + ", ".join(sums)
 
@@ -176,13 +176,13 @@ def _motor_position_lines(
     if all(undefined):
         yield f"{which} motor positions: undefined, since the {sample} sample is infeasible at every joint"
         return
-    said = {
+    positions_text = {
         number: f"undefined ({sample} sample infeasible)"
         if undefined[number]
         else f"{_signed(of_joint[number])} {POSITION.unit(joint.type)}"
         for number, joint in enumerate(joints)
     }
-    yield list_by_joint(f"{which} motor positions: ", said, [joint.name for joint in joints])
+    yield list_by_joint(f"{which} motor positions: ", positions_text, [joint.name for joint in joints])
 
 
 def _motor_velocity_lines(
@@ -252,13 +252,13 @@ def wrap_joint_entries(label: str, entries: Sequence[str]) -> str:
     return label + (",\n" + " " * len(label)).join(lines)
 
 
-def list_by_joint(label: str, said: Mapping[int, str], names: Sequence[str]) -> str:
+def list_by_joint(label: str, texts: Mapping[int, str], names: Sequence[str]) -> str:
     """Return entries of joints by index; equal entries of many joints are combined."""
     equal: dict[str, list[int]] = {}
-    for number, words in said.items():
+    for number, words in texts.items():
         equal.setdefault(words, []).append(number)
-    if len(names) <= MOST_APART or len(equal) == len(said):
-        return wrap_joint_entries(label, [f"{names[number]} {words}" for number, words in said.items()])
+    if len(names) <= MOST_APART or len(equal) == len(texts):
+        return wrap_joint_entries(label, [f"{names[number]} {words}" for number, words in texts.items()])
     lines = [f"{together(numbers, names)} {words}" for words, numbers in equal.items()]
     return label + (";\n" + " " * len(label)).join(lines)
 

@@ -185,7 +185,7 @@ class Run:
         """Return the report on the blocks so far, with the self-check of the whole run."""
         complete = self._samples == self.trajectory.samples
         uncertainties = self._uncertainties()
-        found = zip(self._energy.report(), self._between.reports(), uncertainties, strict=True)
+        joint_parts = zip(self._energy.report(), self._between.reports(), uncertainties, strict=True)
         undetermined = any(each is not None and each.undetermined for each in uncertainties)
         return Report(
             robot=self.robot.name,
@@ -203,7 +203,7 @@ class Run:
             self_check=self._check.outcome(),
             joints=tuple(
                 summary.report(*of_joint, complete=complete)
-                for summary, of_joint in zip(self._summaries, found, strict=True)
+                for summary, of_joint in zip(self._summaries, joint_parts, strict=True)
             ),
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=self.trajectory.fits,

@@ -143,12 +143,12 @@ class RunCheck:
         """Return the largest scaled residual of springs and of shafts; NaN if a value is missing."""
         probed = {name: np.concatenate([part[name] for part in self._excerpts]) for name in self._excerpts[0]}
         of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(self._joints))]
-        apart = balance_errors(self._joints, of_joints)
-        error = np.max(apart["spring_error"], initial=self._error)
-        damped_error = np.max([self._damped_error, *np.transpose(apart["damped_error"])], axis=0)
+        recomputed = balance_errors(self._joints, of_joints)
+        error = np.max(recomputed["spring_error"], initial=self._error)
+        damped_error = np.max([self._damped_error, *np.transpose(recomputed["damped_error"])], axis=0)
         size = np.maximum(self._damped_size, np.finfo(float).tiny)
         springs = float(np.max(damped_error / size, initial=error))
-        return springs, float(np.max(apart["shaft_error"], initial=self._shaft_error))
+        return springs, float(np.max(recomputed["shaft_error"], initial=self._shaft_error))
 
 
 class Rung(NamedTuple):

@@ -185,8 +185,9 @@ class JointSummary:
     def _record_limits(self, flags: FlagArray, block: Block) -> None:
         values = block.of_joint(self._index)
         for check in self._limits:
-            own = flags & check.flags(values, check.allowance(values))  # the flag may be the other motor's
-            beyond, between = has(own, check.flag), self._between_samples
+            # The flag of a sample may be the other motor's.
+            exceeded = flags & check.flags(values, check.allowance(values))
+            beyond, between = has(exceeded, check.flag), self._between_samples
             worst = worst_excess(self._joint, check, values, block.time, beyond, between=between)
             if worst is not None:
                 first = self._first_time.get(worst.kind, worst.first)

@@ -62,8 +62,8 @@ def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
 
 def spread_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the standard deviations of motor torques of recorded motions."""
-    found = [(joint.name, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
-    torques = [(name, each.variables[JUDGED]) for name, each in found if JUDGED in each.variables]
+    uncertain = [(joint.name, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
+    torques = [(name, each.variables[JUDGED]) for name, each in uncertain if JUDGED in each.variables]
     if torques:
         yield wrap_joint_entries(
             "standard deviation of motor torque, random noise only: ",
@@ -86,8 +86,8 @@ def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[st
     yield from map(undetermined_text, uncertainty.undetermined)
     for kind, samples in uncertainty.samples.items():
         if samples:
-            found = counted(joint.samples[kind], "sample")
-            yield f"{samples} of {found} that are {kind} may not be: uncertainty decides"
+            of_samples = counted(joint.samples[kind], "sample")
+            yield f"{samples} of {of_samples} that are {kind} may not be: uncertainty decides"
     for worst in uncertainty.limits.values():
         yield f"{worst.text}, but by less than its uncertainty, so it does not count"
     if JUDGED in uncertainty.variables:
@@ -130,8 +130,8 @@ def of_all_joints(failing: Mapping[str, int], total: int) -> str:
     failed = [(words, number) for words, number in failing.items() if number]
     if total == 1 or not failed:
         return ""
-    (words, first), *others = failed
-    return ", ".join([f"{first} of {total} joints {words}", *(f"{each} {words}" for words, each in others)])
+    (words, first), *further = failed
+    return ", ".join([f"{first} of {total} joints {words}", *(f"{each} {words}" for words, each in further)])
 
 
 def finding_lines(joints: Sequence[JointReport], samples: int) -> Iterator[str]:
@@ -141,10 +141,12 @@ def finding_lines(joints: Sequence[JointReport], samples: int) -> Iterator[str]:
         joints: reports of the joints, base to tip.
         samples: number of samples of the run.
     """
-    found = [(number, worst) for number, joint in enumerate(joints) for worst in joint.worst.values()]
+    worst_findings = [
+        (number, worst) for number, joint in enumerate(joints) for worst in joint.worst.values()
+    ]
     names = [joint.name for joint in joints]
     yield from group_findings(
-        found, names, lambda index, worst: _finding_texts(joints[index], worst, samples)
+        worst_findings, names, lambda index, worst: _finding_texts(joints[index], worst, samples)
     )
 
 
@@ -153,7 +155,7 @@ Words = Callable[[int, Finding], tuple[str, str, int]]
 
 
 def group_findings(
-    found: Iterable[tuple[int, Finding]],
+    findings: Iterable[tuple[int, Finding]],
     names: Sequence[str],
     words: Words = lambda _, finding: (finding.text, finding.brief, 0),
 ) -> Iterator[str]:
@@ -163,39 +165,40 @@ def group_findings(
     joints that fail in every way stays on one page: it then has fewer sentences, and lists of names alone.
 
     Args:
-        found: findings of all joints, each with the index of its joint, in any order.
+        findings: findings of all joints, each with the index of its joint, in any order.
         names: names of the joints, base to tip.
         words: words for each of them; of equally bad ones, the finding at more samples comes first.
     """
     kinds: dict[str, list[tuple[int, Finding]]] = {}
-    for index, finding in found:
+    for index, finding in findings:
         kinds.setdefault(finding.kind, []).append((index, finding))
     in_full = {
-        kind: len(own) if len(own) <= MOST_IN_FULL + 1 else MOST_IN_FULL for kind, own in kinds.items()
+        kind: len(of_kind) if len(of_kind) <= MOST_IN_FULL + 1 else MOST_IN_FULL
+        for kind, of_kind in kinds.items()
     }
     if sum(in_full.values()) > MOST_SENTENCES:
         in_full = dict.fromkeys(kinds, 1)
     for kind in sorted(kinds, key=_rank):
-        own = [(finding.share, *words(index, finding), index, finding) for index, finding in kinds[kind]]
-        own.sort(key=lambda entry: (entry[0], entry[3]), reverse=True)
-        yield from (f"{names[index]}: {sentence}" for _, sentence, _, _, index, _ in own[: in_full[kind]])
-        others = {index: (brief, finding) for _, _, brief, _, index, finding in own[in_full[kind] :]}
-        if others and len(kinds) > MOST_LISTS:
-            yield f"also {_kind_text(kind)}: {', '.join(names[index] for index in sorted(others))}"
-        elif others:
-            yield _further_joints_line(kind, dict(sorted(others.items())), names)
+        of_kind = [(finding.share, *words(index, finding), index, finding) for index, finding in kinds[kind]]
+        of_kind.sort(key=lambda entry: (entry[0], entry[3]), reverse=True)
+        yield from (f"{names[index]}: {sentence}" for _, sentence, _, _, index, _ in of_kind[: in_full[kind]])
+        in_list = {index: (brief, finding) for _, _, brief, _, index, finding in of_kind[in_full[kind] :]}
+        if in_list and len(kinds) > MOST_LISTS:
+            yield f"also {_kind_text(kind)}: {', '.join(names[index] for index in sorted(in_list))}"
+        elif in_list:
+            yield _further_joints_line(kind, dict(sorted(in_list.items())), names)
 
 
-def _further_joints_line(kind: str, others: Mapping[int, tuple[str, Finding]], names: Sequence[str]) -> str:
+def _further_joints_line(kind: str, briefs: Mapping[int, tuple[str, Finding]], names: Sequence[str]) -> str:
     """Return findings of one kind in a list, with their unit once if it is the same."""
     values = kind.endswith("_limit") or kind == OFF_TARGET
-    units = {finding.unit if values else "" for _, finding in others.values()}
+    units = {finding.unit if values else "" for _, finding in briefs.values()}
     unit = "".join(f" ({unit})" for unit in units if unit) if len(units) == 1 else ""
-    said = {
+    texts = {
         index: brief if len(units) == 1 else f"{brief} {finding.unit}"
-        for index, (brief, finding) in others.items()
+        for index, (brief, finding) in briefs.items()
     }
-    return list_by_joint(f"also {_kind_text(kind)}{unit}: ", said, names)
+    return list_by_joint(f"also {_kind_text(kind)}{unit}: ", texts, names)
 
 
 def _finding_texts(joint: JointReport, worst: Finding, samples: int) -> tuple[str, str, int]:
@@ -221,11 +224,11 @@ def _kind_text(kind: str) -> str:
 
 def _occurrence_text(joint: JointReport, kind: str, samples: int) -> str:
     """Return in how many samples a joint has a kind of problem, and from when on."""
-    found = joint.samples[kind]
-    if found == samples:
+    affected = joint.samples[kind]
+    if affected == samples:
         return "all samples"
-    words = counted(found, "sample")
-    return words if found == 1 else f"{words}, from {time_text(joint.first_time[kind])}"
+    words = counted(affected, "sample")
+    return words if affected == 1 else f"{words}, from {time_text(joint.first_time[kind])}"
 
 
 def _infeasible_text(joint: JointReport, worst: Finding, samples: int) -> str:

@@ -51,8 +51,8 @@ def shaft_error(
         regular: Samples at which values must exist; the error is zero elsewhere.
     """
     errors = [
-        np.where(regular, np.abs(missing) / np.maximum(size, np.finfo(float).tiny), 0.0)
-        for missing, size in _shaft_residuals(joint, of_joint, tau_transmission)
+        np.where(regular, np.abs(residual) / np.maximum(size, np.finfo(float).tiny), 0.0)
+        for residual, size in _shaft_residuals(joint, of_joint, tau_transmission)
     ]
     return reduce(np.maximum, errors)
 
@@ -83,9 +83,9 @@ def _shaft_residuals(
         yield _balance_residual(of_joint.dissipated_power, *lost)
 
 
-def _balance_residual(given: FloatArray, *terms: FloatArray) -> Residual:
-    size = reduce(np.add, [np.abs(term) for term in terms], np.abs(given))
-    return given - reduce(np.add, terms, np.zeros_like(given)), size
+def _balance_residual(computed: FloatArray, *terms: FloatArray) -> Residual:
+    size = reduce(np.add, [np.abs(term) for term in terms], np.abs(computed))
+    return computed - reduce(np.add, terms, np.zeros_like(computed)), size
 
 
 def _torque_residual(
@@ -98,19 +98,19 @@ def _torque_residual(
     damped = _damper_velocity_by_motor(joint, of_joint).get(index)
     if damped is not None:
         terms.append(of_joint.damping * damped)
-    missing, size = _balance_residual(of_joint.tau_motor[index], *terms)
+    residual, size = _balance_residual(of_joint.tau_motor[index], *terms)
     if joint.actuator.sprung:
         positions = np.abs(of_joint.q) + np.abs(of_joint.theta[index])
         rounding = POSITION_ROUNDING * of_joint.stiffness * positions
-        missing = np.maximum(np.abs(missing) - rounding, 0.0)
-    return missing, size
+        residual = np.maximum(np.abs(residual) - rounding, 0.0)
+    return residual, size
 
 
 def _momentum_rates(joint: Joint, index: int, ddtheta: FloatArray) -> list[FloatArray]:
     """Return row `index` of B theta'', term by term."""
-    own = joint.actuator.motors[index].inertia * ddtheta[index]
+    of_rotor = joint.actuator.motors[index].inertia * ddtheta[index]
     coupling = joint.actuator.coupled_rotors
-    return [own, coupling * ddtheta[1 - index]] if coupling else [own]
+    return [of_rotor, coupling * ddtheta[1 - index]] if coupling else [of_rotor]
 
 
 def _winding_residuals(
@@ -190,8 +190,8 @@ def shaft_energy(joint: Joint, of_joint: JointVariables) -> FloatArray:
 def shaft_powers(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
     """Return the powers that change `shaft_energy`: motors, torque on the link, losses; W."""
     motors = len(joint.actuator.motors)
-    taken = [of_joint.tau_e * of_joint.dq, *shaft_losses(joint, of_joint)]
-    return [*of_joint.motor_power[:motors], *(-power for power in taken)]
+    outflows = [of_joint.tau_e * of_joint.dq, *shaft_losses(joint, of_joint)]
+    return [*of_joint.motor_power[:motors], *(-power for power in outflows)]
 
 
 BALANCES = {
@@ -321,15 +321,15 @@ def passed_power(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, Fl
     (2, samples), NaN where there is no motor.
     """
     dtheta, ddtheta = of_joint.dtheta, of_joint.ddtheta
-    motors = [motor.damping for motor in joint.actuator.motors]
-    damping = np.array([*motors, *[np.nan] * (SIDES - len(motors))])[:, None]
-    torque = damping * dtheta + of_joint.tau_transmission
-    rate = damping * ddtheta
+    dampings = [motor.damping for motor in joint.actuator.motors]
+    motor_damping = np.array([*dampings, *[np.nan] * (SIDES - len(dampings))])[:, None]
+    torque = motor_damping * dtheta + of_joint.tau_transmission
+    rate = motor_damping * ddtheta
     none = np.full_like(of_joint.q, np.nan)
     rate = rate + np.stack([*_transmission_rates(joint.actuator, of_joint), none][:SIDES])
     if joint.damper_at("transmission"):
-        against, its_rate = parallel_damper_torques(joint, of_joint)
-        torque, rate = torque + against, rate + its_rate
+        damper_torque, damper_rate = parallel_damper_torques(joint, of_joint)
+        torque, rate = torque + damper_torque, rate + damper_rate
     return torque * dtheta, rate * dtheta + torque * ddtheta
 
 
@@ -362,11 +362,11 @@ class _FrameVelocity(NamedTuple):
 def link_energy(robot: Robot, block: Block) -> FloatArray:
     """Return the kinetic and potential energy of all links, (samples,), J."""
     energy = np.zeros(len(block.time))
-    for joint, moving in zip(robot.joints, _frame_velocities(robot, block), strict=True):
+    for joint, frame in zip(robot.joints, _frame_velocities(robot, block), strict=True):
         link = link_constants(joint)
-        velocity = moving.velocity + cross(moving.omega, link.com)
-        turning = moving.omega.dot(link.inertia.times(moving.omega))
-        height = moving.gravity.dot(moving.origin + link.com)
+        velocity = frame.velocity + cross(frame.omega, link.com)
+        turning = frame.omega.dot(link.inertia.times(frame.omega))
+        height = frame.gravity.dot(frame.origin + link.com)
         energy = energy + turning / 2 + link.mass * (velocity.dot(velocity) / 2 - height)
     return energy
 
@@ -388,7 +388,7 @@ def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArra
 
 
 def _frame_velocities(robot: Robot, block: Block) -> Iterator[_FrameVelocity]:
-    moving = _FrameVelocity(ZERO, ZERO, ZERO, base_gravity(robot), ())
+    frame = _FrameVelocity(ZERO, ZERO, ZERO, base_gravity(robot), ())
     for joint, q, dq in zip(robot.joints, block.q.T, block.dq.T, strict=True):
         link = link_constants(joint)
         angle, offset = (
@@ -397,16 +397,16 @@ def _frame_velocities(robot: Robot, block: Block) -> Iterator[_FrameVelocity]:
         rotation = Rotation(np.cos(angle), np.sin(angle), link.cos_alpha, link.sin_alpha)
         axis = rotation.undo(Vector(0, 0, 1))
         step = Vector(link.a, 0, 0) + axis * offset
-        omega = rotation.undo(moving.omega) + (axis * dq if joint.is_revolute else ZERO)
+        omega = rotation.undo(frame.omega) + (axis * dq if joint.is_revolute else ZERO)
         slide = ZERO if joint.is_revolute else axis * dq
-        moving = _FrameVelocity(
-            origin=rotation.undo(moving.origin) + step,
-            velocity=rotation.undo(moving.velocity) + cross(omega, step) + slide,
+        frame = _FrameVelocity(
+            origin=rotation.undo(frame.origin) + step,
+            velocity=rotation.undo(frame.velocity) + cross(omega, step) + slide,
             omega=omega,
-            gravity=rotation.undo(moving.gravity),
-            rotations=(*moving.rotations, rotation),
+            gravity=rotation.undo(frame.gravity),
+            rotations=(*frame.rotations, rotation),
         )
-        yield moving
+        yield frame
 
 
 def _wrench_power(robot: Robot, block: Block, frame: str) -> FloatArray:

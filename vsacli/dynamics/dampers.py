@@ -46,17 +46,17 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
 
 def parallel_damper_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
     """Return the torque of a parallel damper on the motors of a joint, and its rate, each (2, samples)."""
-    damping, d_damping, dphi, ddtheta = (
+    damping, ddamping, dphi, ddtheta = (
         of_joint.damping,
         of_joint.ddamping,
         of_joint.dphi,
         of_joint.ddtheta,
     )
     torque, rate = np.zeros_like(dphi), np.zeros_like(dphi)
-    for motor, there in enumerate(joint.actuator.has(VARIABLES["phi"])):
-        if there:
+    for motor, has_spring in enumerate(joint.actuator.has(VARIABLES["phi"])):
+        if has_spring:
             torque[motor] = damping * dphi[motor]
-            rate[motor] = d_damping * dphi[motor] + damping * (ddtheta[motor] - of_joint.ddq)
+            rate[motor] = ddamping * dphi[motor] + damping * (ddtheta[motor] - of_joint.ddq)
     return torque, rate
 
 
@@ -73,10 +73,10 @@ class Dampers:
     def __init__(self, robot: Robot, drivetrain: Drivetrain) -> None:
         locations = [joint.damper and joint.damper.location for joint in robot.joints]
         self._between_links = np.array([location == "link" for location in locations])
-        beside = np.array([location == "transmission" for location in locations])
+        parallel = np.array([location == "transmission" for location in locations])
         behind_spring = drivetrain.of_motors(drivetrain.deflected)[drivetrain.sprung]
         self._joint = drivetrain.spring_joint
-        self._beside = behind_spring & beside[self._joint]
+        self._parallel = behind_spring & parallel[self._joint]
         self._absent = np.array([location is None for location in locations])
         self._share = np.equal.outer(self._joint, np.arange(len(locations))).astype(np.float64)
 
@@ -89,13 +89,13 @@ class Dampers:
         d, d_d, dd_d = (np.where(self._between_links, commanded[name], 0.0) for name in DAMPING.names)
         return damper_torque((d, d_d, dd_d), (dq, ddq, d3q))
 
-    def passed(
+    def parallel(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray
     ) -> ParallelDamperTorques:
         """Return the torques of dampers parallel to springs, from velocities of joints and sprung motors."""
-        if not self._beside.any():
+        if not self._parallel.any():
             return ParallelDamperTorques(0, 0)
-        damping = np.where(self._beside, commanded[DAMPING.key][..., self._joint], 0.0)
+        damping = np.where(self._parallel, commanded[DAMPING.key][..., self._joint], 0.0)
         motors: FloatArray = damping * (dtheta - dq[..., self._joint])
         return ParallelDamperTorques(motors @ self._share, motors)
 
@@ -106,5 +106,5 @@ class Dampers:
         if self._absent.all():
             return {}
         damping = commanded[DAMPING.key]
-        torque = add(self.of_links(commanded, dq).tau, self.passed(commanded, dq, dtheta).links)
+        torque = add(self.of_links(commanded, dq).tau, self.parallel(commanded, dq, dtheta).links)
         return {"damping": damping, "tau_damper": np.where(self._absent, np.nan, torque)}

@@ -110,21 +110,21 @@ class LinkTorques(RowKernel):
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(60)."""
-        torques = recursion(*self.chain(rows))
+        torques = recursion(*self.recursion_inputs(rows))
         return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
 
-    def chain(self, rows: Sequence[Scalar]) -> RecursionInputs:
+    def recursion_inputs(self, rows: Sequence[Scalar]) -> RecursionInputs:
         """Return the inputs of the recursion from rows in the layout of `arguments`."""
-        given, joints = self.arguments.unpack(rows), self.robot.joints
-        none = [0] * len(joints)
-        dampings = zip(*(given.get(name, none) for name in DAMPING.names), strict=True)
+        inputs, joints = self.arguments.unpack(rows), self.robot.joints
+        zeros = [0] * len(joints)
+        dampings = zip(*(inputs.get(name, zeros) for name in DAMPING.names), strict=True)
         states = [
             call(q, _keyed_joint_state(joint), q, (dq, ddq, d3q, d4q), damping)
             for joint, damping, q, dq, ddq, d3q, d4q in zip(
-                joints, dampings, *(given[name] for name in POSITION.names), strict=True
+                joints, dampings, *(inputs[name] for name in POSITION.names), strict=True
             )
         ]
-        wrench = [given[name] for name in WRENCH_NAMES if name in given]
+        wrench = [inputs[name] for name in WRENCH_NAMES if name in inputs]
         tip = None if self.frame is None else tip_load(self.robot, self.frame, wrench)
         return RecursionInputs(self._links, states, self._gravity, tip)
 
@@ -194,20 +194,24 @@ def link_torques(
     check_robot(robot)
     if wrench is not None:
         check_wrench(wrench)
-    given = _check_motion_arrays(robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True)))
-    shape = given[0].shape
-    motion = list(map(_rows_over_samples, given))
+    motion_arrays = _check_motion_arrays(
+        robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True))
+    )
+    shape = motion_arrays[0].shape
+    motion = list(map(_rows_over_samples, motion_arrays))
     motion += [np.zeros_like(motion[0])] * (len(POSITION.names) - len(motion))
 
     kernel = _recursion_kernel(robot, None if wrench is None else wrench.frame)
     damped = DAMPING.key in kernel.arguments.shapes
     dampings = _damping_rows(robot, shape, (damping, ddamping, dddamping)) if damped else ()
-    every = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
+    inputs = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
     chosen = engine_of_call(engine, kernel, motion[0].shape[1])
-    rows: Any = np.concatenate(every) if chosen is NUMBERS else [row for each in every for row in each]
+    rows: Any = np.concatenate(inputs) if chosen is NUMBERS else [row for each in inputs for row in each]
     computed = kernel.results.arrays(chosen.run(kernel, rows))
     tau_e, dtau_e, ddtau_e = (computed[name].T.reshape(shape) for name in TORQUES)
-    return ElasticTorques(tau_e, dtau_e if len(given) > 3 else None, ddtau_e if len(given) > 4 else None)
+    return ElasticTorques(
+        tau_e, dtau_e if len(motion_arrays) > 3 else None, ddtau_e if len(motion_arrays) > 4 else None
+    )
 
 
 @lru_cache(KEPT_PROGRAMS)
@@ -217,7 +221,7 @@ def _recursion_kernel(robot: Robot, frame: str | None) -> LinkTorques:
 
 def _check_motion_arrays(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
     """Return the given arrays, checked: of one shape, without a missing derivative before the last."""
-    given = [
+    arrays = [
         checked_shape(name, array, len(robot.joints)) for name, array in motion.items() if array is not None
     ]
     names = [name for name, array in motion.items() if array is not None]
@@ -227,10 +231,10 @@ def _check_motion_arrays(robot: Robot, motion: Mapping[str, ArrayLike | None]) -
             f"{names[-1]} is given without {' and '.join(missing)}; give q alone if the robot holds still, "
             "else q, dq and ddq, then d3q for dtau_e, then d4q for ddtau_e"
         )
-    if any(array.shape != given[0].shape for array in given):
-        shapes = ", ".join(str(array.shape) for array in given)
+    if any(array.shape != arrays[0].shape for array in arrays):
+        shapes = ", ".join(str(array.shape) for array in arrays)
         raise InputError.one(f"{', '.join(names)} must have one shape, not {shapes}")
-    return given
+    return arrays
 
 
 def _rows_over_samples(array: FloatArray) -> FloatArray:
@@ -239,11 +243,11 @@ def _rows_over_samples(array: FloatArray) -> FloatArray:
 
 
 def _damping_rows(
-    robot: Robot, shape: tuple[int, ...], given: Sequence[ArrayLike | None]
+    robot: Robot, shape: tuple[int, ...], dampings: Sequence[ArrayLike | None]
 ) -> Iterator[FloatArray]:
     """Yield the damping and its derivatives of a robot with dampers between the links."""
     least = np.array([joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints])
-    for name, array, default in zip(DAMPING.names, given, (least, 0 * least, 0 * least), strict=True):
+    for name, array, default in zip(DAMPING.names, dampings, (least, 0 * least, 0 * least), strict=True):
         values = np.broadcast_to(default, shape) if array is None else np.asarray(array, dtype=np.float64)
         if values.shape != shape:
             raise InputError.one(f"{name} must have the shape {shape} of q, not {values.shape}")

@@ -143,20 +143,20 @@ class EnergyMeter:
 
     def report(self, robot: Robot) -> list[JointEnergy]:
         """Return the energy of each joint of a robot; at least one flow must have been added."""
-        there = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
+        has_motor = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
         totals = self._layout.arrays(np.asarray(self._totals))
-        work, spent = (np.sum(total, axis=1, where=there) for total in (self._work, totals["spent"]))
+        work, spent = (np.sum(total, axis=1, where=has_motor) for total in (self._work, totals["spent"]))
         duration = float(totals["intervals"])
         shared = [joint.actuator.co_contracts for joint in robot.joints]
         efforts = [
             np.where(shared, _mean_root(totals[name], duration), np.nan)
             for name in ("co_contraction", "load")
         ]
-        found = np.array((self._peak, spent, spent - work, *efforts))
+        energies = np.array((self._peak, spent, spent - work, *efforts))
         lost = zip(_dissipated_energies(robot, totals), _copper_losses(robot, totals), strict=True)
         return [
             replace(JointEnergy(*each), dissipated=dissipated, copper_loss=copper_loss)
-            for each, (dissipated, copper_loss) in zip(found.T.tolist(), lost, strict=True)
+            for each, (dissipated, copper_loss) in zip(energies.T.tolist(), lost, strict=True)
         ]
 
 
@@ -219,15 +219,15 @@ class IntervalEnergy(RowKernel):
 
     def __call__(self, rows: Sequence[Any]) -> list[Any]:
         """Compute the energy joint by joint."""
-        given = self.arguments.unpack(rows)
-        (interval,) = given["interval"]
-        friction = _motor_pairs(given["friction"]) if self.rubbing else [None] * len(self.inertia)
-        every = [{name: _rows_at_end(given[name], end) for name in self.at_steps} for end in range(2)]
-        found = []
+        inputs = self.arguments.unpack(rows)
+        (interval,) = inputs["interval"]
+        friction = _motor_pairs(inputs["friction"]) if self.rubbing else [None] * len(self.inertia)
+        both_ends = [{name: _rows_at_end(inputs[name], end) for name in self.at_steps} for end in range(2)]
+        flows = []
         for joint, constants in enumerate(zip(self.inertia, self.coupling, strict=True)):
-            ends = [{name: of_joints[joint] for name, of_joints in end.items()} for end in every]
-            found.append(call(interval, _joint_flow, *constants, interval, ends, friction[joint]))
-        works, spent, of_springs = zip(*found, strict=True)
+            ends = [{name: of_joints[joint] for name, of_joints in end.items()} for end in both_ends]
+            flows.append(call(interval, _joint_flow, *constants, interval, ends, friction[joint]))
+        works, spent, of_springs = zip(*flows, strict=True)
         kinds = works, spent, zip(*of_springs, strict=True)
         return [row for kind in kinds for part in kind for row in part]
 
@@ -295,20 +295,20 @@ class RunEnergy:
         # Copies, since views would keep the whole block in memory.
         self._last = {name: [row[-1:].copy() for row in rows] for name, rows in steps.items()}
         self._meter.add_stored(np.moveaxis(block.elastic_energy, 0, -1))
-        works = [self._flown(before, first, lost and lost.taken(slice(1)))]
+        works = [self._add_flow(before, first, lost and lost.during(slice(1)))]
         if len(block.time) > 1:
             earlier, later = _select_samples(steps, slice(-1)), _select_samples(steps, slice(1, None))
-            works.append(self._flown(earlier, later, lost and lost.taken(slice(1, None))))
+            works.append(self._add_flow(earlier, later, lost and lost.during(slice(1, None))))
         return over_time(np.concatenate(works, axis=-1))
 
-    def _flown(self, before: _Steps, after: _Steps, lost: LostEnergy | None) -> FloatArray:
+    def _add_flow(self, before: _Steps, after: _Steps, lost: LostEnergy | None) -> FloatArray:
         """Add the flow from samples to the next ones; return the work of motors until these."""
         interval = after["time"][0] - before["time"][0]
         rows = {name: [*before[name], *after[name]] for name in self._kernel.at_steps}
         if lost is not None:
             rows["friction"] = contiguous_rows(over_time(lost.motor_friction))
-        given = self._kernel.arguments.pack({"interval": [interval], **rows})
-        flow = Flow(interval, **self._kernel.results.arrays(self._engine.run(self._kernel, given)))
+        inputs = self._kernel.arguments.pack({"interval": [interval], **rows})
+        flow = Flow(interval, **self._kernel.results.arrays(self._engine.run(self._kernel, inputs)))
         if lost is not None:
             flow = flow._replace(dissipated=lost.dissipated, copper=lost.copper)
         return self._meter.add(flow)

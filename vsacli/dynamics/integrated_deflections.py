@@ -108,10 +108,10 @@ def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.ND
     """Return indices into `REASONS`; also singular where det A has another sign than on the branch."""
     solution = _deflection_root(actuator, command)
     flags = reach_flags(command.commanded["stiffness"], solution)
-    here, on_branch = (
+    at_phi, on_branch = (
         np.sign(actuator.springs(each, command.q).determinant) for each in (phi, solution.deflections)
     )
-    singular = has(flags, Flag.SINGULAR) | (here != on_branch)
+    singular = has(flags, Flag.SINGULAR) | (at_phi != on_branch)
     return np.where(has(flags, Flag.INFEASIBLE), UNATTAINABLE, np.where(singular, SINGULAR, FOLLOWED))
 
 
@@ -170,7 +170,7 @@ class Integration:
         self.joints = joints
         self.times = [start]
         self.stopped: dict[int, str] = {}
-        self._task = task
+        self._equation = task
         self._steps: list[DenseOutput] = []
         self._tolerance = pieces.tolerance
         self._smallest = float(np.abs(phi).max(axis=1).min())
@@ -184,7 +184,9 @@ class Integration:
         return OdeSolution(self.times, self._steps)
 
     def _rates(self, time: float, state: Any) -> Any:
-        return self._task.rates(self.joints, np.array([time]), deflections_by_joint(state[:, None])).ravel()
+        return self._equation.rates(
+            self.joints, np.array([time]), deflections_by_joint(state[:, None])
+        ).ravel()
 
     def _run(self, ends: list[float], state: FloatArray) -> None:
         from scipy.integrate import DOP853
@@ -220,13 +222,15 @@ class Integration:
         """Return the end of a step, or the first time in it at which a joint cannot be integrated."""
         while right - left > 4 * np.spacing(abs(right)):
             nodes = np.linspace(left, right, CHECKS + 1)
-            hindrances = self._task.hindrances(self.joints, nodes[1:], deflections_by_joint(step(nodes[1:])))
+            hindrances = self._equation.hindrances(
+                self.joints, nodes[1:], deflections_by_joint(step(nodes[1:]))
+            )
             hits = np.flatnonzero(hindrances.any(axis=0))
             if not hits.size:
                 break
             left, right = float(nodes[hits[0]]), float(nodes[hits[0] + 1])
-            found = zip(self.joints, hindrances[:, hits[0]].tolist(), strict=True)
-            self.stopped = {joint: REASONS[reason] for joint, reason in found if reason}
+            reasons = zip(self.joints, hindrances[:, hits[0]].tolist(), strict=True)
+            self.stopped = {joint: REASONS[reason] for joint, reason in reasons if reason}
         return right
 
     def _fastest(self, integrator: DOP853[np.float64]) -> int:
@@ -261,7 +265,7 @@ class IntegratedDeflections:
     """
 
     stops: tuple[DeflectionStop | None, ...]
-    _courses: tuple[_IntegratedPart, ...] = field(repr=False)
+    _parts: tuple[_IntegratedPart, ...] = field(repr=False)
     _start: float
 
     def at(self, time: FloatArray) -> FloatArray:
@@ -271,13 +275,13 @@ class IntegratedDeflections:
         """
         phi = np.full((len(self.stops), 2, len(time)), np.nan)
         elapsed = time - self._start
-        for course in self._courses:
-            here = (course.solution.t_min <= elapsed) & (elapsed <= course.solution.t_max)
-            if here.any():
+        for part in self._parts:
+            inside = (part.solution.t_min <= elapsed) & (elapsed <= part.solution.t_max)
+            if inside.any():
                 for joint, deflections in zip(
-                    course.joints, deflections_by_joint(course.solution(elapsed[here])), strict=True
+                    part.joints, deflections_by_joint(part.solution(elapsed[inside])), strict=True
                 ):
-                    phi[joint][:, here] = deflections
+                    phi[joint][:, inside] = deflections
         for joint, stop in enumerate(self.stops):
             if stop is not None:
                 phi[joint, :, time >= stop.time] = np.nan
@@ -299,25 +303,25 @@ def integrate_deflections(
         tolerance: Relative tolerance of the integrator, at least 1e-13.
     """
     first, trajectory = trajectory.start, trajectory.from_zero()
-    task = DeflectionEquation(robot, trajectory)
-    if not task.joints:
+    equation = DeflectionEquation(robot, trajectory)
+    if not equation.joints:
         return IntegratedDeflections((None,) * trajectory.joints, (), first)
     time, end = trajectory.times.span
     pieces = Pieces.of(trajectory, tolerance)
     phi = np.full((trajectory.joints, SIDES, 1), np.nan)
-    phi[list(task.joints)] = task.roots(task.joints, np.array([time]))
-    hindrances = task.hindrances(task.joints, np.array([time]), phi[list(task.joints)])[:, 0]
-    found = zip(task.joints, hindrances.tolist(), strict=True)
-    stops = {joint: DeflectionStop(first + time, REASONS[reason]) for joint, reason in found if reason}
-    courses = []
-    while time < end and len(stops) < len(task.joints):
-        going = [joint for joint in task.joints if joint not in stops]
-        integration = Integration(task, tuple(going), pieces, time, phi[going, :, 0])
+    phi[list(equation.joints)] = equation.roots(equation.joints, np.array([time]))
+    hindrances = equation.hindrances(equation.joints, np.array([time]), phi[list(equation.joints)])[:, 0]
+    reasons = zip(equation.joints, hindrances.tolist(), strict=True)
+    stops = {joint: DeflectionStop(first + time, REASONS[reason]) for joint, reason in reasons if reason}
+    parts = []
+    while time < end and len(stops) < len(equation.joints):
+        going = [joint for joint in equation.joints if joint not in stops]
+        integration = Integration(equation, tuple(going), pieces, time, phi[going, :, 0])
         if integration.times[-1] > time:
             time = integration.times[-1]
-            courses.append(_IntegratedPart(going, integration.solution()))
-            phi[going] = deflections_by_joint(courses[-1].solution(np.array([time])))
+            parts.append(_IntegratedPart(going, integration.solution()))
+            phi[going] = deflections_by_joint(parts[-1].solution(np.array([time])))
         stops |= {
             joint: DeflectionStop(first + time, reason) for joint, reason in integration.stopped.items()
         }
-    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(courses), first)
+    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(parts), first)

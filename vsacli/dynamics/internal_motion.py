@@ -211,38 +211,38 @@ class March:
         todo = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
         while todo:
             cell = todo.pop()
-            found = self._solved(cell, phi, peaks.torque)
-            if isinstance(found, str):
+            outcome = self._solve_cell(cell, phi, peaks.torque)
+            if isinstance(outcome, str):
                 share, unresolved = np.inf, True
             else:
-                fitted = self._fitted(cell, found)
-                share = peaks.share(*fitted, found)
-                settling = cell.new and found.constants > LAYER
+                fitted = self._fit_cell(cell, outcome)
+                share = peaks.share(*fitted, outcome)
+                settling = cell.new and outcome.constants > LAYER
                 falling = share < cell.shares[0] / GAIN
                 unresolved = share > RESOLVED and (share > TOLERATED or falling or settling)
             if unresolved and cell.halved < HALVINGS:
                 todo += cell.halves(share)[::-1]
-            elif isinstance(found, str):
-                return Marched(*_concatenate_cells(ended, solved), cell.left, found)
+            elif isinstance(outcome, str):
+                return Marched(*_concatenate_cells(ended, solved), cell.left, outcome)
             else:
-                phi = found.phi[:, -1:]
+                phi = outcome.phi[:, -1:]
                 solved.append(fitted)
                 ended.append(cell.right)
         return Marched(*_concatenate_cells(ended, solved), ended[-1], None)
 
-    def _fitted(self, cell: _Cell, found: _CellSolution) -> tuple[FloatArray, FloatArray]:
+    def _fit_cell(self, cell: _Cell, solution: _CellSolution) -> tuple[FloatArray, FloatArray]:
         """Return coefficients of deflections and rates; in fast cells, rates are derivatives of the fit."""
         from numpy.polynomial import chebyshev
 
-        phi = self._rule.coefficients(found.phi)
-        if found.constants <= FAST:
-            return phi, self._rule.coefficients_of_rates(found.rates)
+        phi = self._rule.coefficients(solution.phi)
+        if solution.constants <= FAST:
+            return phi, self._rule.coefficients_of_rates(solution.rates)
         half = (cell.right - cell.left) / 2
         first = chebyshev.chebder(self._springs.spread(phi)) / half
         second = np.append(chebyshev.chebder(first) / half, 0.0)
         return phi, np.stack((first, second))
 
-    def _solved(self, cell: _Cell, start: FloatArray, peak: float) -> _CellSolution | str:
+    def _solve_cell(self, cell: _Cell, start: FloatArray, peak: float) -> _CellSolution | str:
         """Return deflections in a cell from those at its start, by Newton's method, or a reason of failure.
 
         Args:
@@ -252,18 +252,18 @@ class March:
         """
         springs, command = self._springs, self._demand(self._rule.times(cell.left, cell.right))
         slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
-        before, side = springs.spread(start), np.sign(springs.springs_at(start, command.q[:1]).pivot)
-        spread, phi = before + 0 * command.q, start + 0 * command.q
+        initial_spread, side = springs.spread(start), np.sign(springs.springs_at(start, command.q[:1]).pivot)
+        spread, phi = initial_spread + 0 * command.q, start + 0 * command.q
         converged, rounding = False, POSITION_ROUNDING * _largest_size(command.q)
         for _ in range(NEWTON_STEPS):
             phi = springs.settled(spread, phi, command)
             if np.isnan(phi[0]).any() or not springs.within(phi).all():
                 return LOST
-            there = springs.springs_at(phi, command.q)
-            if (np.sign(there.pivot) != side).any():
+            springs_at_phi = springs.springs_at(phi, command.q)
+            if (np.sign(springs_at_phi.pivot) != side).any():
                 return SINGULAR
             if converged:
-                fastest = np.max(np.abs(there.slope) / damping)
+                fastest = np.max(np.abs(springs_at_phi.slope) / damping)
                 return _CellSolution(
                     np.hstack((start, phi)),
                     np.stack(springs.driven(phi, command)),
@@ -271,13 +271,13 @@ class March:
                     float(np.max(damping)),
                     (cell.right - cell.left) * float(fastest),
                     rounding,
-                    _largest_size(there.slope),
+                    _largest_size(springs_at_phi.slope),
                 )
-            rate = slopes[:, 0] * before + slopes[:, 1:] @ spread
-            missing = command.tau_e - there.state.tau_e - damping * rate
-            slope = there.slope
+            rate = slopes[:, 0] * initial_spread + slopes[:, 1:] @ spread
+            torque_error = command.tau_e - springs_at_phi.state.tau_e - damping * rate
+            slope = springs_at_phi.slope
             matrix = damping[:, None] * slopes[:, 1:] + np.diag(slope)
-            step = np.asarray(np.linalg.solve(matrix, missing), dtype=np.float64)
+            step = np.asarray(np.linalg.solve(matrix, torque_error), dtype=np.float64)
             spread = spread + step
             converged = _largest_size(step) <= max(
                 CONVERGED * _largest_size(spread), CONVERGED * peak / _largest_size(slope), rounding
@@ -306,7 +306,7 @@ class _Peaks:
         self.torque = _largest_size(demand.tau_e)
         self._phi, self._spread = 0.0, LEAST_SPREAD
 
-    def share(self, phi: FloatArray, rates: FloatArray, found: _CellSolution) -> float:
+    def share(self, phi: FloatArray, rates: FloatArray, solution: _CellSolution) -> float:
         """Return the last coefficients of deflections, spread and torque, relative to the peaks so far.
 
         Positions of many turns are rounded; no cell is short enough for coefficients below that.
@@ -314,15 +314,15 @@ class _Peaks:
         spread = self._springs.spread(phi)
         self._phi = max(self._phi, float(np.nanmax(np.abs(phi))))
         self._spread = max(self._spread, _largest_size(spread), LEAST_SHARE * self._phi)
-        self.torque = max(self.torque, found.torque, self._slope * self._spread)
+        self.torque = max(self.torque, solution.torque, self._slope * self._spread)
         missing = (
-            float(np.nanmax(np.abs(phi[:, -2:]))) - found.rounding,
-            _largest_size(spread[-2:]) - found.rounding,
+            float(np.nanmax(np.abs(phi[:, -2:]))) - solution.rounding,
+            _largest_size(spread[-2:]) - solution.rounding,
         )
         share = max(0.0, missing[0] / max(self._phi, LEAST_SPREAD), missing[1] / self._spread)
-        if found.constants > FAST:
+        if solution.constants > FAST:
             return share
-        of_torque = found.damping * _largest_size(rates[0, -2:]) - found.slope * found.rounding
+        of_torque = solution.damping * _largest_size(rates[0, -2:]) - solution.slope * solution.rounding
         return max(share, of_torque / self.torque)
 
 
@@ -433,11 +433,11 @@ class _JointCommands:
 
     def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
         self._robot, self._trajectory = robot, trajectory
-        self._known: dict[bytes, Mapping[str, FloatArray]] = {}
+        self._commands: dict[bytes, Mapping[str, FloatArray]] = {}
 
     def of(self, joint: int, time: FloatArray) -> Command:
         key = time.tobytes()
-        if key not in self._known:
+        if key not in self._commands:
             motion = self._trajectory.at(time)
-            self._known[key] = {**motion.variables(), **link_torques_along(self._robot, motion)}
-        return command_of(joint, self._known[key])
+            self._commands[key] = {**motion.variables(), **link_torques_along(self._robot, motion)}
+        return command_of(joint, self._commands[key])

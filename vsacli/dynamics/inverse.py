@@ -264,9 +264,9 @@ def _check_motion(robot: Robot, motion: Motion) -> None:
     Raises:
         InputError: with the names of the arrays.
     """
-    given, shape = motion.variables(), np.shape(motion.q)
+    arrays, shape = motion.variables(), np.shape(motion.q)
     required = (name for signal in (POSITION, *robot.signals) for name in signal.names)
-    if lacking := [name for name in required if name not in given]:
+    if lacking := [name for name in required if name not in arrays]:
         raise InputError.one(f"the motion lacks {', '.join(lacking)}, which {robot.name} requires")
     checked_shape("q", motion.q, len(robot.joints))
     for name, array in motion.of_joints.items():
@@ -309,12 +309,12 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
     from vsacli.actuators.damped_springs import DampedSprings
 
     commanded = {**motion.variables(), **link_torques_along(robot, motion)}
-    found = {}
+    motions = {}
     for index, joint in damped.items():
         springs, command = DampedSprings(joint.actuator), command_of(index, commanded)
         phi = springs.equilibrium(command, joint.damper_start)
-        found[index] = InternalMotion(phi, *springs.driven(phi, command))
-    return found
+        motions[index] = InternalMotion(phi, *springs.driven(phi, command))
+    return motions
 
 
 def rows_of_joints(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:

@@ -158,8 +158,8 @@ def _solve_positive_definite(matrix: Any, right: Any, smallest_pivot: float) -> 
         forward.append(_subtracted(right[row], [lower[row, inner] * forward[inner] for inner in range(row)]))
     solution: dict[int, Any] = {}
     for row in reversed(range(size)):
-        known = [lower[below, row] * solution[below] for below in range(row + 1, size)]
-        solution[row] = _subtracted(forward[row] / pivots[row], known)
+        terms = [lower[below, row] * solution[below] for below in range(row + 1, size)]
+        solution[row] = _subtracted(forward[row] / pivots[row], terms)
     return np.stack([solution[row] for row in range(size)])
 
 

@@ -56,7 +56,9 @@ def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> 
     frame, given = None if motion.wrench is None else motion.wrench.frame, motion.variables()
     arguments = LinkTorques(robot, frame).arguments
     rows = arguments.pack({name: by_joint(given[name]) for name in arguments.shapes})
-    plain, carrying = (LinkTorques(each, frame).chain(rows) for each in (robot, seeded(robot, chosen)))
+    plain, carrying = (
+        LinkTorques(each, frame).recursion_inputs(rows) for each in (robot, seeded(robot, chosen))
+    )
     bodies = forward(plain.links, plain.states, base_frame(plain.gravity))
     for joint, places in _by_joint(chosen).items():
         links, states, gravity, tip = _mixed(plain, carrying, joint)
