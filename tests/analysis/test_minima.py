@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vsacli.analysis.minima import (
-    KNOWN,
+    MINIMUM_ACCURACY,
     ROUNDING,
     ROUNDS,
     Brackets,
@@ -45,7 +45,9 @@ def test_minima_between_three_samples(shape: str) -> None:
     found = narrow_brackets(given, evaluate, np.zeros(len(PLACES)))
     beside = 3 * (shape == "jump")  # whose lower side may show at the next sample
     assert len(found.function) == len(PLACES) - beside
-    np.testing.assert_allclose(found.value[:, 1], least, rtol=0, atol=KNOWN * abs(least) + ROUNDING)
+    np.testing.assert_allclose(
+        found.value[:, 1], least, rtol=0, atol=MINIMUM_ACCURACY * abs(least) + ROUNDING
+    )
     assert len(calls) <= ROUNDS
     assert calls[-1] <= calls[0]
 
@@ -64,4 +66,4 @@ def test_local_minima_of_rows() -> None:
     assert list(zip(found.function.tolist(), found.time[:, 1].tolist(), strict=True)) == [
         (0, 2.0), (0, 4.0), (2, 1.0), (2, 3.0),
     ]  # fmt: skip
-    assert not found.unknown(np.zeros(3))[2], "nothing is known of its neighbors"
+    assert not found.unresolved(np.zeros(3))[2], "nothing is known of its neighbors"

@@ -14,7 +14,7 @@ import numpy as np
 
 from vsacli.analysis.minima import (
     DECISIVE,
-    KNOWN,
+    MINIMUM_ACCURACY,
     ROUNDING,
     Brackets,
     SampledFunctions,
@@ -49,7 +49,7 @@ class Minima(NamedTuple):
 
     Attributes:
         block: Variables of the minimum's own joint at each minimum, as of a robot with one joint; a row each.
-        quantity: Quantity that has the minimum, by index in `Between.quantities`.
+        quantity: Quantity that has the minimum, by index in `MinimaSearch.quantities`.
         joint: Joint of the quantity, by index.
         clearance: Clearance at the minimum.
         step: Nearest sample, by index in the block.
@@ -86,7 +86,7 @@ class Minima(NamedTuple):
         )
 
 
-class Between:
+class MinimaSearch:
     """A search for minima between the samples of a run, while its blocks pass.
 
     Args:
@@ -107,26 +107,26 @@ class Between:
         self.notes = () if trajectory.known_between else (SAMPLES_ONLY,)
         self._dynamics, self._trajectory, self._uncertainty = dynamics, trajectory, uncertainty
         self._joints = len(dynamics.robot.joints)
-        self._joint = np.array([quantity.number for quantity in self.quantities], dtype=np.intp)
+        self._joint = np.array([quantity.joint_index for quantity in self.quantities], dtype=np.intp)
         self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=FLAG_TYPE)
         self._sides = Sides(self.quantities, min_margin)
         self._lowest = [np.empty(0)] * len(self._sides.quantity)
         self._least_at_steps = np.full(len(self._sides.quantity), np.inf)
         self._least_between: dict[int, tuple[float, Finding]] = {}
         self._pending_minima: list[Minima] = []
-        self._passed = 0
+        self._released = 0
         looking = not self.notes and bool(self.quantities)
         self._scans = looking and trajectory.samples < SCANNED
-        self._looks = looking and not self._scans
+        self._searches = looking and not self._scans
         self._sides_over_time: SampledFunctions | None = None
-        self._seen = 0.0 if self._looks else math.inf
+        self._searched_until = 0.0 if self._searches else math.inf
 
-    def look(self, block: Block) -> None:
+    def search_around(self, block: Block) -> None:
         """Look around each sample of the next block as computed, as far as the next sample is known."""
         if self._scans:
             self._scan()
             self._scans = False
-        elif self._looks:
+        elif self._searches:
             steps = block.time, self._sides.values(block)
             before = self._sides_over_time
             self._sides_over_time = (
@@ -136,26 +136,26 @@ class Between:
             self._search(
                 self._sides_over_time.closed() if ended else self._sides_over_time, self._sides_over_time
             )
-            self._seen = math.inf if ended else self._sides_over_time.stop - 1
+            self._searched_until = math.inf if ended else self._sides_over_time.stop - 1
 
-    def knows(self, samples: int) -> bool:
+    def is_complete_for(self, samples: int) -> bool:
         """Return whether minima around this many further samples are known.
 
         The two samples after them must have been seen, since a minimum around the first of these two may be
         nearest to the last of the block.
         """
-        return self._passed + samples < self._seen
+        return self._released + samples < self._searched_until
 
     def nearest(self, block: Block) -> list[Minima]:
         """Return the minima between samples that are nearest to those of the next block."""
-        stop, nearest, later = self._passed + len(block.time), [], []
+        stop, nearest, later = self._released + len(block.time), [], []
         for minima in self._pending_minima:
             inside = minima.step < stop
             if inside.any():
-                nearest.append(minima.where(inside)._replace(step=minima.step[inside] - self._passed))
+                nearest.append(minima.where(inside)._replace(step=minima.step[inside] - self._released))
             if not inside.all():
                 later.append(minima.where(~inside))
-        self._pending_minima, self._passed = later, stop
+        self._pending_minima, self._released = later, stop
         return nearest
 
     def add(self, minima: Minima) -> None:
@@ -165,7 +165,7 @@ class Between:
             least = int(of_quantity.clearance.argmin())
             clearance = float(of_quantity.clearance[least])
             if clearance < self._least_between.get(number, (math.inf,))[0]:
-                worst = quantity.at(of_quantity.of_joint(quantity.number), least, between=True)
+                worst = quantity.at(of_quantity.of_joint(quantity.joint_index), least, between=True)
                 self._least_between[number] = clearance, worst
 
     def reports(self) -> list[dict[str, Finding]]:
@@ -199,33 +199,33 @@ class Between:
         self._least_at_steps = np.minimum(self._least_at_steps, steps.value.min(axis=1))
         sides = self._sides
         minima = narrow_brackets(
-            self._chosen(find_brackets(sampled), steps.time), self._evaluated, sides.critical
+            self._select_candidates(find_brackets(sampled), steps.time), self._evaluate, sides.critical
         )
         side, time, value = minima.function, minima.time[:, 1], minima.value[:, 1]
         after = np.clip(np.searchsorted(steps.time, time), 1, len(steps.time) - 1)
         at_steps = np.minimum(*(steps.value[side, place] for place in (after - 1, after)))
-        noise = KNOWN * np.abs(value - sides.critical[side]) + ROUNDING * sides.size[side]
+        noise = MINIMUM_ACCURACY * np.abs(value - sides.critical[side]) + ROUNDING * sides.size[side]
         lower = value < at_steps - np.where(np.isfinite(value), noise, 0.0)
         kept = lower & (sides.clearance(side, value) <= NEAR)
         further = sides.beyond(side, value) & ~sides.beyond(side, at_steps)
         kept |= further[:, :DECISIVE].any(axis=1)
         if kept.any():
             nearest = after - (time - steps.time[after - 1] < steps.time[after] - time)
-            self._keep(minima.where(kept), steps.first + nearest[kept])
+            self._add_minima(minima.where(kept), steps.first + nearest[kept])
 
-    def _chosen(self, candidates: Brackets, steps: FloatArray) -> Brackets:
+    def _select_candidates(self, candidates: Brackets, steps: FloatArray) -> Brackets:
         """Return the brackets that may have the lowest minima of each side so far, between samples.
 
         A minimum is kept if it may have more flags than the middle time, or if it may be the lowest.
         """
         middle, side, sides = candidates.time[:, 1], candidates.function, self._sides
         at_step = steps[np.clip(np.searchsorted(steps, middle), 0, len(steps) - 1)] == middle
-        ahead = np.maximum(sides.next_flag(side, candidates.value[:, 1]), self._least_at_steps[side])
+        ahead = np.maximum(sides.next_flag_values(side, candidates.value[:, 1]), self._least_at_steps[side])
         with np.errstate(invalid="ignore"):  # inf - inf next to an infinite clearance
-            fall = candidates.fall
+            fall = candidates.fall_bound
             expected = candidates.value[:, 1] - np.where(np.isfinite(fall), fall, 0.0)
         near = ~(expected > ahead) & ~(sides.clearance(side, expected) > NEAR)
-        wanted = (candidates.unknown(sides.critical) | ~at_step) & near
+        wanted = (candidates.unresolved(sides.critical) | ~at_step) & near
         candidates, expected = candidates.where(wanted), expected[wanted]
         chosen = np.zeros(len(candidates.function), dtype=bool)
         for number in set(candidates.function.tolist()):
@@ -234,7 +234,7 @@ class Between:
             chosen[of_side] = expected[of_side] <= self._lowest[number][-1]
         return candidates.where(chosen)
 
-    def _keep(self, minima: Brackets, steps: IndexArray) -> None:
+    def _add_minima(self, minima: Brackets, steps: IndexArray) -> None:
         """Keep the variables at minima, with the flags of the minimal quantities, for the nearest sample."""
         clearance = self._sides.clearance(minima.function, minima.value[:, 1])
         for part, block in self._dynamics.blocks_at(minima.time[:, 1]):
@@ -247,7 +247,7 @@ class Between:
             rows = quantity, joint, clearance[part], steps[part]
             self._pending_minima.append(Minima(judged.replaced(**variables), *rows))
 
-    def _evaluated(self, side: IndexArray, times: FloatArray) -> FloatArray:
+    def _evaluate(self, side: IndexArray, times: FloatArray) -> FloatArray:
         """Return the values of sides (n,) at times of their own, (n, times)."""
         wanted = np.repeat(side, times.shape[1])
         parts = [

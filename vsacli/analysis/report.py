@@ -90,8 +90,8 @@ class Report(Stored):
             hint: a line below the findings, such as the command that lists fixes; none if empty.
         """
         first = [warning for warning in self.warnings if self._is_cause(warning)]
-        others = [warning for warning in self.warnings if not self._is_cause(warning)]
-        found = [
+        further = [warning for warning in self.warnings if not self._is_cause(warning)]
+        entries = [
             *self._failed_check(),
             *warnings_and_notes(first, ()),
             *finding_lines(self.joints, self.samples),
@@ -99,8 +99,8 @@ class Report(Stored):
             *self._recorded_infeasible(causes=bool(first)),
             *([hint] if hint else []),
             *uncertainty_lines(self.joints),
-            *warnings_and_notes(others, ()),
-            *(little_effect(self.joints) if any(NOT_DETERMINED in each for each in others) else []),
+            *warnings_and_notes(further, ()),
+            *(little_effect(self.joints) if any(NOT_DETERMINED in each for each in further) else []),
             *warnings_and_notes((), self.notes),
         ]
         lines = [
@@ -114,7 +114,9 @@ class Report(Stored):
             *text.drift_lines(self.drifts),
             *([text.self_check_line(self.self_check)] if self.self_check.passed else []),
         ]
-        return ReportText(headline(self.verdict, self._title()), found, [text.joint_rows(self.joints)], lines)
+        return ReportText(
+            headline(self.verdict, self._title()), entries, [text.joint_rows(self.joints)], lines
+        )
 
     def __str__(self) -> str:
         """Return the lines that the commands print, without a final newline."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.analysis.between_samples import Between, Minima
+from vsacli.analysis.between_samples import Minima, MinimaSearch
 from vsacli.analysis.dry_friction import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.report import Report
@@ -100,7 +100,7 @@ class Run:
         self.choice = choose(engine, self._dynamics.kernel, trajectory.samples, threads, tell, busy=busy)
         self._dynamics.engine = self.choice.engine
         self._uncertainty = _prepare_uncertainty(robot, trajectory, asked, self.choice.engine)
-        self._between = Between(self._dynamics, min_margin, self._uncertainty)
+        self._minima_search = MinimaSearch(self._dynamics, min_margin, self._uncertainty)
         self._passages = FrictionPassages(robot)
         self._check = RunCheck(self._dynamics)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
@@ -114,10 +114,10 @@ class Run:
         waiting: deque[Block] = deque()
         # Blocks wait until the samples after them are known: a minimum between two blocks may set a flag.
         for block in self._computed():
-            self._between.look(block)
+            self._minima_search.search_around(block)
             waiting.append(block)
             del block  # else this name would keep the block alive while the next is computed
-            while waiting and self._between.knows(len(waiting[0].time)) and not self._stopped:
+            while waiting and self._minima_search.is_complete_for(len(waiting[0].time)) and not self._stopped:
                 yield self._finish(waiting.popleft())
             if self._stopped:
                 return
@@ -134,7 +134,7 @@ class Run:
 
     def _finish(self, block: Block) -> Block:
         """Take the next block through the stages after the search between samples; return what is stored."""
-        between = self._between.nearest(block)
+        between = self._minima_search.nearest(block)
         _mark_minima(between, block)
         if self._stop_on_infeasible:
             block, between = self._until_infeasible(block, between)
@@ -156,7 +156,7 @@ class Run:
         """Merge a block and the minima between its samples into the report."""
         self._samples += len(block.time)
         for minima in between:
-            self._between.add(minima)
+            self._minima_search.add(minima)
             for index in set(minima.joint.tolist()):
                 self._summaries[index].add_bounded(minima.of_joint(index), between=True)
         self._passages.add(block)
@@ -185,7 +185,7 @@ class Run:
         """Return the report on the blocks so far, with the self-check of the whole run."""
         complete = self._samples == self.trajectory.samples
         uncertainties = self._uncertainties()
-        joint_parts = zip(self._energy.report(), self._between.reports(), uncertainties, strict=True)
+        joint_parts = zip(self._energy.report(), self._minima_search.reports(), uncertainties, strict=True)
         undetermined = any(each is not None and each.undetermined for each in uncertainties)
         return Report(
             robot=self.robot.name,
@@ -196,7 +196,7 @@ class Run:
             warnings=(*self.robot.warnings, *self._of_recording(undetermined=undetermined)),
             notes=(
                 *self.trajectory.notes,
-                *self._between.notes,
+                *self._minima_search.notes,
                 *self._internal_stops(),
                 *self._passages.notes(self._dynamics),
             ),

@@ -26,12 +26,12 @@ from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import (
     balance_errors,
-    joints_with_parallel_damper,
     link_energy,
     link_powers,
     shaft_energy,
     shaft_powers,
 )
+from vsacli.dynamics.dampers import joints_with_parallel_damper
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory

@@ -25,7 +25,7 @@ from vsacli.base.flags import Flag, has
 from vsacli.base.variables import VARIABLES, Block, Variable
 from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
-from vsacli.dynamics.dampers import parallel_damper_torques
+from vsacli.dynamics.dampers import joints_with_parallel_damper, parallel_damper_torques
 from vsacli.dynamics.elastic_torques import link_constants
 from vsacli.dynamics.inverse import BlockKernel, InverseDynamics, call_at_joints, rows_of_joints
 from vsacli.robot.joint import Joint
@@ -251,11 +251,6 @@ class BalancedDynamics(BlockKernel):
         by_motor = {"passed_power": rows_of_joints(powers), "passed_rate": rows_of_joints(rates)}
         computed = self.dynamics.rows_of(rows, of_joints)
         return self.results.pack({**computed, **by_motor, **balance_errors(joints, of_joints)})
-
-
-def joints_with_parallel_damper(joints: Sequence[Joint]) -> list[int]:
-    """Return the joints with a damper parallel to their springs, by index."""
-    return [index for index, joint in enumerate(joints) if joint.damper_at("transmission")]
 
 
 def balance_errors(

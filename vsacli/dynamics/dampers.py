@@ -22,6 +22,11 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
 
+def joints_with_parallel_damper(joints: Sequence[Joint]) -> list[int]:
+    """Return the joints with a damper parallel to their springs, by index."""
+    return [index for index, joint in enumerate(joints) if joint.damper_at("transmission")]
+
+
 def damper_torque(damping: Sequence[Scalar], rates: Sequence[Scalar]) -> TorqueDerivatives:
     """Return the torque d v of a damper and its first two derivatives.
 

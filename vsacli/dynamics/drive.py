@@ -60,7 +60,7 @@ def drive(
         samples all motor variables are NaN; at singular samples those that need the inverse of the decoupling
         matrix. A motor that the actuator does not have is NaN throughout.
     """
-    driven = driven_by(joint, command, min_margin, deflections)
+    driven = driven_by(joint, command, min_margin, deflections)  # (61)-(74)
     exceeded = limit_flags(joint, driven.by_name(), np.zeros_like(driven.flags))
     unexplained = not_finite_flags(_motors_not_finite(joint, driven))
     return driven._replace(flags=driven.flags | exceeded | unexplained)
@@ -97,9 +97,12 @@ def driven_by(
 def shaft_torques(
     actuator: Actuator, dtheta: FloatArray, ddtheta: FloatArray, tau_transmission: FloatArray
 ) -> FloatArray:
-    """Compute motor torques from motion and spring torques, (73)-(74) with friction; all (2, samples)."""
+    """Compute motor torques from motion and spring torques, (73)-(74) with friction; all (2, samples).
+
+    The paper's B_k is `motor.inertia`, D_mk `motor.damping`, tau_ek `tau_transmission`, tau_k the result.
+    """
     motor_damping = _by_motor([motor.damping for motor in actuator.motors])
-    torques = _rotor_torques(actuator, ddtheta) + motor_damping * dtheta + tau_transmission
+    torques = _rotor_torques(actuator, ddtheta) + motor_damping * dtheta + tau_transmission  # (73)-(74)
     friction = FrictionLaws.of([side.friction if side else None for side in actuator.sides])
     if friction is not None:
         torques = torques + friction.with_axis_behind().torque(dtheta)

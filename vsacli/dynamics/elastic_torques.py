@@ -57,7 +57,7 @@ def link_constants(joint: Joint) -> LinkConstants:
         inertia=SymmetricTensor(
             *map(exact, (inertia.xx, inertia.yy, inertia.zz, inertia.xy, inertia.xz, inertia.yz))
         ),
-        damping=exact(joint.damping),
+        viscous_damping=exact(joint.damping),
     )
 
 
@@ -110,7 +110,7 @@ class LinkTorques(RowKernel):
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(60)."""
-        torques = recursion(*self.recursion_inputs(rows))
+        torques = recursion(*self.recursion_inputs(rows))  # (36)-(60)
         return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
 
     def recursion_inputs(self, rows: Sequence[Scalar]) -> RecursionInputs:
@@ -273,7 +273,7 @@ def joint_state(
     joint: Joint,
     q: Scalar,
     rates: tuple[Scalar, Scalar, Scalar, Scalar],
-    damping: tuple[Scalar, Scalar, Scalar] = (0, 0, 0),
+    damper_damping: tuple[Scalar, Scalar, Scalar] = (0, 0, 0),
 ) -> JointState:
     """Return the pose and motion of a joint for the recursion.
 
@@ -281,10 +281,10 @@ def joint_state(
         joint: Joint.
         q: Position of the joint.
         rates: First to fourth derivative of q.
-        damping: Damping of a damper between the links, with two derivatives; ignored otherwise.
+        damper_damping: Damping of a damper between the links, with two derivatives; ignored otherwise.
     """
     dh = joint.dh
-    resistance = link_resistance(joint, rates, damping)
+    resistance = link_resistance(joint, rates, damper_damping)
     if joint.is_revolute:
         angle = q + dh.theta
         return JointState(np.cos(angle), np.sin(angle), exact(dh.d), rates, resistance)
@@ -292,12 +292,14 @@ def joint_state(
     return JointState(cos, sin, q + dh.d, rates, resistance)
 
 
-def link_resistance(joint: Joint, rates: Sequence[Scalar], damping: Sequence[Scalar]) -> TorqueDerivatives:
+def link_resistance(
+    joint: Joint, rates: Sequence[Scalar], damper_damping: Sequence[Scalar]
+) -> TorqueDerivatives:
     """Return the torque of dry friction and of a damper between the links; arguments as for `joint_state`."""
     friction = joint_friction(joint.friction, rates)
     if not joint.damper_at("link"):
         return friction
-    return TorqueDerivatives(*map(add, damper_torque(damping, rates[:3]), friction))
+    return TorqueDerivatives(*map(add, damper_torque(damper_damping, rates[:3]), friction))
 
 
 def link_damped(robot: Robot) -> bool:

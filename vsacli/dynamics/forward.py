@@ -128,7 +128,7 @@ class Plant:
         self._rigid_inertia = self.drivetrain.direct(self.drivetrain.inertia)
         self._rigid_matrix = np.diag(self._rigid_inertia)
         self._rigid_damping = self.drivetrain.direct(self.drivetrain.damping)
-        self._damping = self.drivetrain.damping[self.drivetrain.sprung]
+        self._sprung_damping = self.drivetrain.damping[self.drivetrain.sprung]
 
     def unpacked(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return q, q' of the joints and theta, theta' of the motors with springs.
@@ -185,9 +185,9 @@ class Plant:
             torque: FloatArray, held: BoolArray | None
         ) -> tuple[FloatArray, FloatArray, FloatArray]:
             drive = add(tau_e, damper.links) + self.drivetrain.direct(torque)
-            on_joints = drive - resistance - self._rigid_damping * dq
-            left = torque[..., self.drivetrain.sprung] - self._damping * dtheta
-            on_motors = left - add(spring, damper.motors)
+            on_joints = drive - resistance - self._rigid_damping * dq  # (5a)
+            left = torque[..., self.drivetrain.sprung] - self._sprung_damping * dtheta
+            on_motors = left - add(spring, damper.motors)  # (5b), (5c)
             return self._solve_accelerations(matrix, on_joints, on_motors, held)
 
         if laws is None:

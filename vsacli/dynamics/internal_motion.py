@@ -21,6 +21,7 @@ from vsacli.actuators.transmission import Command, InternalMotion
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING
+from vsacli.dynamics.dampers import joints_with_parallel_damper
 from vsacli.dynamics.integrated_deflections import Pieces
 from vsacli.dynamics.inverse import DeflectionStop, command_of, link_torques_along
 from vsacli.robot.model import Robot
@@ -401,12 +402,12 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
 
 def damped_joints(robot: Robot, trajectory: Trajectory) -> tuple[int, ...]:
     """Return the joints with a damper parallel to their springs whose damping is not always zero."""
-    chosen = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
-    if not chosen:
+    joints = joints_with_parallel_damper(robot.joints)
+    if not joints:
         return ()
     # The first sample decides: `with_devices` refuses a damping that is zero only somewhere.
     damping = trajectory.block(0, 1).commanded[DAMPING.key][0]
-    return tuple(index for index in chosen if damping[index])
+    return tuple(index for index in joints if damping[index])
 
 
 def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str) -> None:

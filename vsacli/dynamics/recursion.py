@@ -296,11 +296,11 @@ def _project(
     x, dx, ddx = reaction.n if link.revolute else reaction.f
     x_w = cross(x, w)
     q1, q2, q3, _ = state.rates
-    tau = add(x.dot(z), mul(link.damping, q1))  # (58)
-    dtau = add((dx + x_w).dot(z), mul(link.damping, q2))  # (59)
+    tau = add(x.dot(z), mul(link.viscous_damping, q1))  # (58)
+    dtau = add((dx + x_w).dot(z), mul(link.viscous_damping, q2))  # (59)
     # `along=z` drops the components of the products that the inner product with z does not need.
     ddx_turned = ddx + cross(dx, w, along=z) * 2 + cross(x, g, along=z) + cross(x_w, w, along=z)
-    ddtau = add(ddx_turned.dot(z), mul(link.damping, q3))  # (60)
+    ddtau = add(ddx_turned.dot(z), mul(link.viscous_damping, q3))  # (60)
     return TorqueDerivatives(*map(add, (tau, dtau, ddtau), state.resistance))
 
 

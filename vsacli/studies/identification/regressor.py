@@ -158,7 +158,7 @@ class Regressor(RowKernel):
         """Return the torques of all joints for one link alone; joints beyond it carry nothing."""
         joints = self.robot.joints
         *before, last = [
-            link_constants(joint)._replace(mass=0, com=ZERO, inertia=_NO_INERTIA, damping=0)
+            link_constants(joint)._replace(mass=0, com=ZERO, inertia=_NO_INERTIA, viscous_damping=0)
             for joint in joints[: moving + 1]
         ]
         links = [*before, last._replace(mass=mass, com=com, inertia=inertia)]
