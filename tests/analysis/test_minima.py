@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vsacli.analysis.minima import KNOWN, ROUNDING, ROUNDS, Brackets, Known, brackets, narrowed
+from vsacli.analysis.minima import (
+    MINIMUM_ACCURACY,
+    ROUNDING,
+    ROUNDS,
+    Brackets,
+    SampledFunctions,
+    find_brackets,
+    narrow_brackets,
+)
 from vsacli.base.arrays import FloatArray, IndexArray
 
 PLACES = np.linspace(-0.49, 0.49, 23)
@@ -33,11 +41,13 @@ def test_minima_between_three_samples(shape: str) -> None:
         return function(times - PLACES[which][:, None])
 
     time = np.array([-1.0, 0.0, 1.0])
-    given = brackets(Known(0, time, function(time - PLACES[:, None])))
-    found = narrowed(given, evaluate, np.zeros(len(PLACES)))
+    given = find_brackets(SampledFunctions(0, time, function(time - PLACES[:, None])))
+    found = narrow_brackets(given, evaluate, np.zeros(len(PLACES)))
     beside = 3 * (shape == "jump")  # whose lower side may show at the next sample
     assert len(found.function) == len(PLACES) - beside
-    np.testing.assert_allclose(found.value[:, 1], least, rtol=0, atol=KNOWN * abs(least) + ROUNDING)
+    np.testing.assert_allclose(
+        found.value[:, 1], least, rtol=0, atol=MINIMUM_ACCURACY * abs(least) + ROUNDING
+    )
     assert len(calls) <= ROUNDS
     assert calls[-1] <= calls[0]
 
@@ -47,13 +57,13 @@ def test_what_is_known_is_not_computed() -> None:
         raise AssertionError
 
     given = Brackets(np.array([0]), np.array([[0.0, 1.0, 2.0]]), np.array([[1.0005, 1.0, 1.0009]]))
-    assert np.array_equal(narrowed(given, evaluate, np.zeros(1)).time, given.time)
+    assert np.array_equal(narrow_brackets(given, evaluate, np.zeros(1)).time, given.time)
 
 
 def test_local_minima_of_rows() -> None:
     values = np.array([[3, 2, 2, 4, 1, 5], [0, 1, 2, 1, 1, 1], [np.inf, 1, np.inf, 4, 5, np.inf]])
-    found = brackets(Known(0, np.arange(6.0), values))
+    found = find_brackets(SampledFunctions(0, np.arange(6.0), values))
     assert list(zip(found.function.tolist(), found.time[:, 1].tolist(), strict=True)) == [
         (0, 2.0), (0, 4.0), (2, 1.0), (2, 3.0),
     ]  # fmt: skip
-    assert not found.unknown(np.zeros(3))[2], "nothing is known of its neighbors"
+    assert not found.unresolved(np.zeros(3))[2], "nothing is known of its neighbors"

@@ -12,7 +12,7 @@ import pytest
 from vsacli.analysis.joint_report import COUNTED, JointReport
 from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import SelfCheck
-from vsacli.analysis.trouble_text import counts, findings
+from vsacli.analysis.trouble_text import failing_joints_line, finding_lines
 from vsacli.base.fitted_text import fitted
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.limits import Finding
@@ -82,7 +82,7 @@ def too_soft(value: float, bound: float, **changes: object) -> JointReport:
 
 
 def sentence(joint: JointReport) -> str:
-    (only,) = findings([joint], 4001)
+    (only,) = finding_lines([joint], 4001)
     return only
 
 
@@ -154,9 +154,9 @@ def test_the_first_line_counts_the_joints_that_fail():
 
 
 def test_nothing_is_counted_without_failures_or_of_one_joint():
-    assert counts([QUIET, QUIET]) == ""
-    assert counts([too_soft(790, 803.1)]) == ""
-    assert counts([too_soft(790, 803.1)] * 2) == "2 of 2 joints infeasible"
+    assert failing_joints_line([QUIET, QUIET]) == ""
+    assert failing_joints_line([too_soft(790, 803.1)]) == ""
+    assert failing_joints_line([too_soft(790, 803.1)] * 2) == "2 of 2 joints infeasible"
 
 
 @pytest.mark.parametrize(
@@ -183,13 +183,13 @@ def test_the_most_critical_finding_comes_first():
         too_soft(700, 803.1),
         replace(QUIET, worst={}),
     ]
-    found = list(findings([replace(joint, name=f"j{at}") for at, joint in enumerate(joints)], 4001))
+    found = list(finding_lines([replace(joint, name=f"j{at}") for at, joint in enumerate(joints)], 4001))
     assert [line.partition(":")[0] for line in found] == ["j5", "j4", "j3", "j1", "j2", "j0"]
 
 
 def test_joints_beyond_the_first_few_follow_in_one_line():
     joints = [replace(too_soft(700 + at, 803.1), name=f"j{at}") for at in range(6)]
-    *full, others = findings(joints, 412)
+    *full, others = finding_lines(joints, 412)
     assert [line.partition(":")[0] for line in full] == ["j0", "j1", "j2"]
     assert others == "also infeasible: j3 (all samples), j4 (all samples), j5 (all samples)"
 
@@ -386,7 +386,7 @@ def test_a_problem_of_the_motors_is_listed_with_its_samples():
     joints = [troubled(worst, samples=7) for _ in range(5)]
     counted = [replace(each, samples={**each.samples, "infeasible": 7}) for each in joints]
     dated = [replace(each, name=f"j{at}", first_time={"infeasible": 1.0}) for at, each in enumerate(counted)]
-    *_, rest = findings(dated, 4001)
+    *_, rest = finding_lines(dated, 4001)
     assert rest == "also not finite: j3 (7 samples, from 1.000 s), j4 (7 samples, from 1.000 s)"
 
 
@@ -418,13 +418,13 @@ def many(worst: Finding, samples: list[int]) -> list[JointReport]:
 
 
 def test_four_joints_with_a_problem_have_a_sentence_each():
-    found = list(findings(many(Finding("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [4, 3, 2, 1]), 4001))
+    found = list(finding_lines(many(Finding("infeasible", 4.0, 790.0, 803.1, "N m/rad"), [4, 3, 2, 1]), 4001))
     assert [sentence.partition(":")[0] for sentence in found] == ["j0", "j1", "j2", "j3"]
 
 
 def test_of_many_joints_those_with_most_samples_come_first_and_none_is_left_out():
     worst = Finding("infeasible", 4.0, 790.0, 803.1, "N m/rad")
-    *full, rest = findings(many(worst, [1, 7, 2, 9, 8, 6, 3]), 4001)
+    *full, rest = finding_lines(many(worst, [1, 7, 2, 9, 8, 6, 3]), 4001)
     assert [sentence.partition(":")[0] for sentence in full] == ["j3", "j4", "j1"]
     assert rest == (
         "also infeasible: j0 (1 sample), j2 (2 samples, from 3.588 s), j5 (6 samples, from 3.588 s),\n"
@@ -437,14 +437,14 @@ def test_of_many_limits_those_farthest_exceeded_come_first():
         replace(troubled(Finding("velocity_limit", 1.0, 3.0 + k, 3.0, "rad/s")), name=f"j{k}")
         for k in range(1, 6)
     ]
-    *full, rest = findings(joints, 4001)
+    *full, rest = finding_lines(joints, 4001)
     assert [sentence.partition(":")[0] for sentence in full] == ["j5", "j4", "j3"]
     assert rest == "also beyond the velocity limit (rad/s): j1 4 > 3, j2 5 > 3"
 
 
 def test_of_many_joints_equal_ones_are_named_together():
     samples = [2, 2, 2, 9, 8, 7, 1, 2, 2]
-    *_, rest = findings(many(Finding("infeasible", 4.0, 790.0, 803.1, "N m/rad"), samples), 4001)
+    *_, rest = finding_lines(many(Finding("infeasible", 4.0, 790.0, 803.1, "N m/rad"), samples), 4001)
     assert rest.splitlines() == [
         "also infeasible: j0 to j2, j7, j8 (2 samples, from 3.588 s);",
         "                 j6 (1 sample)",
@@ -459,15 +459,17 @@ def test_where_sentences_are_many_only_the_worst_joint_of_each_kind_has_one():
     }
     three = [replace(joint, worst={**joint.worst, **limits}) for joint in joints[:3]]
     dated = [replace(joint, first_time={**joint.first_time, **dict.fromkeys(limits, 0.5)}) for joint in three]
-    assert len(list(findings([*dated, joints[3]], 4001))) == 4 + 3 * 3 - 5  # 13 would be too many
+    assert len(list(finding_lines([*dated, joints[3]], 4001))) == 4 + 3 * 3 - 5  # 13 would be too many
     few = [*dated[:2], replace(dated[2], worst=joints[2].worst), joints[3]]
-    assert len(list(findings(few, 4001))) == 4 + 3 * 2
+    assert len(list(finding_lines(few, 4001))) == 4 + 3 * 2
 
 
 def test_limits_of_both_types_of_joints_keep_their_units():
     units = ("m/s", "rad/s", "m/s", "rad/s", "rad/s")
     excesses = [Finding("velocity_limit", 1.0, 4.0 + at, 3.0, unit) for at, unit in enumerate(units)]
-    *_, rest = findings([replace(troubled(each), name=f"j{at}") for at, each in enumerate(excesses)], 4001)
+    *_, rest = finding_lines(
+        [replace(troubled(each), name=f"j{at}") for at, each in enumerate(excesses)], 4001
+    )
     assert rest == "also beyond the velocity limit: j0 4 > 3 m/s, j1 5 > 3 rad/s"
 
 

@@ -12,7 +12,7 @@ from samples.command_line import ROBOT, SEVEN_JOINTS, contents, seven_joint_moti
 from samples.figures import rest_to_rest
 
 from vsacli.dynamics.integrated_deflections import IntegratedDeflections, integrate_deflections
-from vsacli.dynamics.inverse import Stop
+from vsacli.dynamics.inverse import DeflectionStop
 from vsacli.results.charts.figures import FEASIBILITY_VARIABLES, feasibility
 from vsacli.results.charts.stored import StoredCharts
 from vsacli.results.plots import drawn as drawn_sheet
@@ -87,7 +87,8 @@ def test_ways_that_end_are_shaded(vsacli, motion, figures, monkeypatch):
     def short(robot, trajectory) -> IntegratedDeflections:
         """As if the shoulder could be followed for 1 s only."""
         return replace(
-            integrate_deflections(robot, trajectory, 1e-8), stops=(None, Stop(1.0, "it is told to"), None)
+            integrate_deflections(robot, trajectory, 1e-8),
+            stops=(None, DeflectionStop(1.0, "it is told to"), None),
         )
 
     monkeypatch.setattr("vsacli.dynamics.integrated_deflections.integrate_deflections", short)

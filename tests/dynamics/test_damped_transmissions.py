@@ -27,7 +27,7 @@ from vsacli.analysis.run import Run
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
-from vsacli.dynamics.internal_motion import March, _Peaks, _Solution, internal_motions
+from vsacli.dynamics.internal_motion import March, _CellSolution, _Peaks, internal_motions
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
@@ -353,7 +353,7 @@ class _Springs:
 def test_last_coefficients_count_relative_to_the_largest_deflection():
     demand = Command(*np.ones((6, 1)), commanded={})
     peaks = _Peaks(_Springs(), demand, np.ones((2, 1)))
-    found = _Solution(
+    found = _CellSolution(
         np.ones((2, 1)), np.zeros((2, 1)), torque=1.0, damping=0.0, constants=1.0, rounding=0.0, slope=1.0
     )
     phi = np.array([[1e-3, 1e-4, 1e-7, 1e-8], [1e-3, 0, 0, 0]])

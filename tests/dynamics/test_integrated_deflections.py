@@ -29,7 +29,7 @@ from vsacli.actuators.laws.tendons import Exponential
 from vsacli.actuators.motor import Motor
 from vsacli.analysis.run import Run
 from vsacli.base.errors import InputError
-from vsacli.dynamics.integrated_deflections import Task, integrate_deflections
+from vsacli.dynamics.integrated_deflections import DeflectionEquation, integrate_deflections
 from vsacli.robot.model import Robot
 
 TORQUE_AGREEMENT = 1e-9
@@ -109,8 +109,8 @@ def test_result_does_not_depend_on_the_blocks():
 
 def test_cost_does_not_grow_with_the_samples(monkeypatch):
     calls = []
-    rates = Task.rates
-    monkeypatch.setattr(Task, "rates", lambda *arguments: calls.append(0) or rates(*arguments))
+    rates = DeflectionEquation.rates
+    monkeypatch.setattr(DeflectionEquation, "rates", lambda *arguments: calls.append(0) or rates(*arguments))
     counts = []
     for rate in (100, 10_000):
         calls.clear()

@@ -25,7 +25,7 @@ from vsacli.dynamics.integrated_deflections import (
     SINGULAR,
     STALLED,
     UNATTAINABLE,
-    Task,
+    DeflectionEquation,
     integrate_deflections,
 )
 
@@ -109,7 +109,7 @@ def test_end_of_a_spring_is_not_singular():
 
 
 def test_another_sign_of_the_determinant_is_beyond_the_singular_set():
-    task, joints, time = Task(ARM, motion()), (0, 1), np.linspace(0, 2, 5)
+    task, joints, time = DeflectionEquation(ARM, motion()), (0, 1), np.linspace(0, 2, 5)
     roots = task.roots(joints, time)
     assert not task.hindrances(joints, time, roots).any()
     assert (task.hindrances(joints, time, roots[:, ::-1]) == SINGULAR).all()
@@ -120,7 +120,9 @@ def test_integration_that_stalls_ends_at_the_joint_to_blame(monkeypatch):
     trajectory = softening()
     expected = softened().stops[1]
     monkeypatch.setattr(
-        Task, "hindrances", lambda _task, joints, time, _phi: np.zeros((len(joints), time.size), int)
+        DeflectionEquation,
+        "hindrances",
+        lambda _task, joints, time, _phi: np.zeros((len(joints), time.size), int),
     )
     base, shoulder = integrate_deflections(ARM, trajectory, COARSE).stops
     assert base is None

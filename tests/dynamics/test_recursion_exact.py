@@ -53,7 +53,7 @@ def link_constants(link: Link) -> LinkConstants:
         mass=link.mass,
         com=Vector(*link.com),
         inertia=SymmetricTensor(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz),
-        damping=link.damping,
+        viscous_damping=link.damping,
     )
 
 

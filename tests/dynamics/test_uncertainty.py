@@ -99,7 +99,7 @@ def test_the_deviations_of_one_joint_are_those_that_all_joints_have():
     trajectory = blurred(len(robot.joints), exerted=True)
     motion, estimates = trajectory.at(TIMES), trajectory.estimates
     covariances = {signal: each.covariance(TIMES) for signal, each in estimates.items()}
-    of_all = uncertainty.deviations(robot, motion, estimates, covariances)
+    of_all = uncertainty.propagate_deviations(robot, motion, estimates, covariances)
     for index in range(len(robot.joints)):
         found = uncertainty.deviations_of_joint(robot, index, motion, estimates, covariances)
         assert set(of_all.deviations) - set(found.deviations) == {MARGIN, *WRENCH_NAMES}

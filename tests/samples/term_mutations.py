@@ -73,7 +73,7 @@ def _users_of(name: str, function: Any) -> list[Any]:
 
 PAIR, MATRIX = "actuators.pairs.pair_springs:PairSprings", "actuators.elasticity:MotorMatrix"
 BETA = f"{PAIR}.motor_accelerations"
-DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:motor_torques"
+DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:shaft_torques"
 FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.motor:Windings.variables"
 RATIO, STATE = (
     "actuators.mechanisms.ratios.ratio:ratio_partials",
@@ -139,12 +139,24 @@ MUTATIONS = (
         "for motor in actuator.motors]) * ddtheta",
         "for motor in actuator.motors]) * (1.01 * ddtheta)",
     ),
-    Mutation("D_m,k theta_k' (73)-(74)", "pair", TORQUES, "damping * dtheta", "1.01 * damping * dtheta"),
+    Mutation(
+        "D_m,k theta_k' (73)-(74)", "pair", TORQUES, "motor_damping * dtheta", "1.01 * motor_damping * dtheta"
+    ),
     Mutation("tau_k (73)-(74)", "pair", TORQUES, "+ tau_transmission", "+ 1.01 * tau_transmission"),
     Mutation(
-        "B_12 theta_k''", "serial", "dynamics.drive:_rotor_torques", "own + coupling", "own + 1.01 * coupling"
+        "B_12 theta_k''",
+        "serial",
+        "dynamics.drive:_rotor_torques",
+        "uncoupled + coupling",
+        "uncoupled + 1.01 * coupling",
     ),
-    Mutation("B_12 theta_k'', sign", "serial", "dynamics.drive:_rotor_torques", "own + coup", "own - coup"),
+    Mutation(
+        "B_12 theta_k'', sign",
+        "serial",
+        "dynamics.drive:_rotor_torques",
+        "uncoupled + coup",
+        "uncoupled - coup",
+    ),
     Mutation(
         "spring between the motors",
         "pair",
@@ -170,9 +182,27 @@ MUTATIONS = (
     ),
     Mutation("voltage, of the velocity", "pair", WINDINGS, "* velocity", "* (1.01 * velocity)"),
     Mutation("copper loss", "pair", WINDINGS, "current * current", "current * (1.01 * current)"),
-    Mutation("motor power", "pair", DRIVE, "tau_motor * dtheta", "1.01 * tau_motor * dtheta"),
-    Mutation("dissipated power, joint", "pair", LOSS, "_taken(joint.damping", "_taken(1.01 * joint.damping"),
-    Mutation("dissipated power, motors", "pair", LOSS, "_taken(motor.damping", "_taken(1.01 * motor.damping"),
+    Mutation(
+        "motor power",
+        "pair",
+        DRIVE,
+        "tau_motor * transmitted.dtheta",
+        "1.01 * tau_motor * transmitted.dtheta",
+    ),
+    Mutation(
+        "dissipated power, joint",
+        "pair",
+        LOSS,
+        "_lost_power(joint.damping",
+        "_taken(1.01 * joint.damping",
+    ),
+    Mutation(
+        "dissipated power, motors",
+        "pair",
+        LOSS,
+        "_lost_power(motor.damping",
+        "_taken(1.01 * motor.damping",
+    ),
     Mutation(
         "friction between links",
         "pair",
@@ -190,9 +220,7 @@ MUTATIONS = (
     Mutation(
         "tau_damper between links", "pair", DAMPER, "damping * command.dq", "1.01 * damping * command.dq"
     ),
-    Mutation(
-        "damper parallel to springs", "damped", DAMPER, "[damping * rate if", "[1.01 * damping * rate if"
-    ),
+    Mutation("damper parallel to springs", "damped", DAMPER, "damping * rate if", "1.01 * damping * rate if"),
     Mutation(
         "damper parallel to springs, velocity",
         "damped",

@@ -14,14 +14,14 @@ import numpy as np
 
 from vsacli.analysis.minima import (
     DECISIVE,
-    KNOWN,
+    MINIMUM_ACCURACY,
     ROUNDING,
     Brackets,
-    Known,
+    SampledFunctions,
     Sides,
     bounded_quantities,
-    brackets,
-    narrowed,
+    find_brackets,
+    narrow_brackets,
 )
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FlagArray, FloatArray, IndexArray
 from vsacli.base.variables import Block
@@ -49,7 +49,7 @@ class Minima(NamedTuple):
 
     Attributes:
         block: Variables of the minimum's own joint at each minimum, as of a robot with one joint; a row each.
-        quantity: Quantity that has the minimum, by index in `Between.quantities`.
+        quantity: Quantity that has the minimum, by index in `MinimaSearch.quantities`.
         joint: Joint of the quantity, by index.
         clearance: Clearance at the minimum.
         step: Nearest sample, by index in the block.
@@ -77,16 +77,16 @@ class Minima(NamedTuple):
 
     def of_joint(self, index: int) -> Block:
         """Return a joint's variables at its minima, in its column; the columns before are views of it."""
-        own = self.block.taken(self.joint == index)
-        return own.replaced(
+        at_minima = self.block.taken(self.joint == index)
+        return at_minima.replaced(
             **{
                 name: np.broadcast_to(array, (len(array), index + 1, *array.shape[2:]))
-                for name, array in _of_joints(own).items()
+                for name, array in _joint_variables(at_minima).items()
             }
         )
 
 
-class Between:
+class MinimaSearch:
     """A search for minima between the samples of a run, while its blocks pass.
 
     Args:
@@ -107,61 +107,65 @@ class Between:
         self.notes = () if trajectory.known_between else (SAMPLES_ONLY,)
         self._dynamics, self._trajectory, self._uncertainty = dynamics, trajectory, uncertainty
         self._joints = len(dynamics.robot.joints)
-        self._joint = np.array([quantity.number for quantity in self.quantities], dtype=np.intp)
+        self._joint = np.array([quantity.joint_index for quantity in self.quantities], dtype=np.intp)
         self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=FLAG_TYPE)
         self._sides = Sides(self.quantities, min_margin)
         self._lowest = [np.empty(0)] * len(self._sides.quantity)
         self._least_at_steps = np.full(len(self._sides.quantity), np.inf)
         self._least_between: dict[int, tuple[float, Finding]] = {}
-        self._found: list[Minima] = []
-        self._passed = 0
+        self._pending_minima: list[Minima] = []
+        self._released = 0
         looking = not self.notes and bool(self.quantities)
         self._scans = looking and trajectory.samples < SCANNED
-        self._looks = looking and not self._scans
-        self._known: Known | None = None
-        self._seen = 0.0 if self._looks else math.inf
+        self._searches = looking and not self._scans
+        self._sides_over_time: SampledFunctions | None = None
+        self._searched_until = 0.0 if self._searches else math.inf
 
-    def look(self, block: Block) -> None:
+    def search_around(self, block: Block) -> None:
         """Look around each sample of the next block as computed, as far as the next sample is known."""
         if self._scans:
             self._scan()
             self._scans = False
-        elif self._looks:
+        elif self._searches:
             steps = block.time, self._sides.values(block)
-            before = self._known
-            self._known = Known(0, *steps).opened() if before is None else before.last(2).followed_by(*steps)
-            ended = self._known.stop == self._trajectory.samples
-            self._search(self._known.closed() if ended else self._known, self._known)
-            self._seen = math.inf if ended else self._known.stop - 1
+            before = self._sides_over_time
+            self._sides_over_time = (
+                SampledFunctions(0, *steps).opened() if before is None else before.last(2).followed_by(*steps)
+            )
+            ended = self._sides_over_time.stop == self._trajectory.samples
+            self._search(
+                self._sides_over_time.closed() if ended else self._sides_over_time, self._sides_over_time
+            )
+            self._searched_until = math.inf if ended else self._sides_over_time.stop - 1
 
-    def knows(self, samples: int) -> bool:
+    def is_complete_for(self, samples: int) -> bool:
         """Return whether minima around this many further samples are known.
 
         The two samples after them must have been seen, since a minimum around the first of these two may be
         nearest to the last of the block.
         """
-        return self._passed + samples < self._seen
+        return self._released + samples < self._searched_until
 
     def nearest(self, block: Block) -> list[Minima]:
         """Return the minima between samples that are nearest to those of the next block."""
-        stop, own, later = self._passed + len(block.time), [], []
-        for found in self._found:
-            inside = found.step < stop
+        stop, nearest, later = self._released + len(block.time), [], []
+        for minima in self._pending_minima:
+            inside = minima.step < stop
             if inside.any():
-                own.append(found.where(inside)._replace(step=found.step[inside] - self._passed))
+                nearest.append(minima.where(inside)._replace(step=minima.step[inside] - self._released))
             if not inside.all():
-                later.append(found.where(~inside))
-        self._found, self._passed = later, stop
-        return own
+                later.append(minima.where(~inside))
+        self._pending_minima, self._released = later, stop
+        return nearest
 
     def add(self, minima: Minima) -> None:
         """Merge minima of samples that are part of the run into the report."""
         for number in set(minima.quantity.tolist()):
-            own, quantity = minima.where(minima.quantity == number), self.quantities[number]
-            least = int(own.clearance.argmin())
-            clearance = float(own.clearance[least])
+            of_quantity, quantity = minima.where(minima.quantity == number), self.quantities[number]
+            least = int(of_quantity.clearance.argmin())
+            clearance = float(of_quantity.clearance[least])
             if clearance < self._least_between.get(number, (math.inf,))[0]:
-                worst = quantity.at(own.of_joint(quantity.number), least, between=True)
+                worst = quantity.at(of_quantity.of_joint(quantity.joint_index), least, between=True)
                 self._least_between[number] = clearance, worst
 
     def reports(self) -> list[dict[str, Finding]]:
@@ -179,67 +183,71 @@ class Between:
     def _scan(self) -> None:
         """Search a whole run of few samples, at the same number of times from each sample to the next."""
         steps = self._trajectory.times.block(0, self._trajectory.samples)
-        each = -(-SCANNED // (len(steps) - 1))
-        time = np.append(steps[:-1, None] + np.diff(steps)[:, None] * np.arange(each) / each, steps[-1])
+        per_interval = -(-SCANNED // (len(steps) - 1))
+        time = np.append(
+            steps[:-1, None] + np.diff(steps)[:, None] * np.arange(per_interval) / per_interval, steps[-1]
+        )
         values = [self._sides.values(block) for _, block in self._dynamics.blocks_at(time)]
-        known = Known(0, time, np.hstack(values))
-        self._search(known.opened().closed(), Known(0, steps, known.value[:, ::each]))
+        sides = SampledFunctions(0, time, np.hstack(values))
+        self._search(sides.opened().closed(), SampledFunctions(0, steps, sides.value[:, ::per_interval]))
 
-    def _search(self, known: Known, steps: Known) -> None:
+    def _search(self, sampled: SampledFunctions, steps: SampledFunctions) -> None:
         """Find the minima where values are known, and keep those lower than the samples around them.
 
         Of those that hardly differ from the samples, minima with a further flag that decides are kept.
         """
         self._least_at_steps = np.minimum(self._least_at_steps, steps.value.min(axis=1))
         sides = self._sides
-        found = narrowed(self._chosen(brackets(known), steps.time), self._evaluated, sides.critical)
-        side, time, value = found.function, found.time[:, 1], found.value[:, 1]
+        minima = narrow_brackets(
+            self._select_candidates(find_brackets(sampled), steps.time), self._evaluate, sides.critical
+        )
+        side, time, value = minima.function, minima.time[:, 1], minima.value[:, 1]
         after = np.clip(np.searchsorted(steps.time, time), 1, len(steps.time) - 1)
         at_steps = np.minimum(*(steps.value[side, place] for place in (after - 1, after)))
-        noise = KNOWN * np.abs(value - sides.critical[side]) + ROUNDING * sides.size[side]
+        noise = MINIMUM_ACCURACY * np.abs(value - sides.critical[side]) + ROUNDING * sides.size[side]
         lower = value < at_steps - np.where(np.isfinite(value), noise, 0.0)
         kept = lower & (sides.clearance(side, value) <= NEAR)
         further = sides.beyond(side, value) & ~sides.beyond(side, at_steps)
         kept |= further[:, :DECISIVE].any(axis=1)
         if kept.any():
             nearest = after - (time - steps.time[after - 1] < steps.time[after] - time)
-            self._keep(found.where(kept), steps.first + nearest[kept])
+            self._add_minima(minima.where(kept), steps.first + nearest[kept])
 
-    def _chosen(self, given: Brackets, steps: FloatArray) -> Brackets:
+    def _select_candidates(self, candidates: Brackets, steps: FloatArray) -> Brackets:
         """Return the brackets that may have the lowest minima of each side so far, between samples.
 
         A minimum is kept if it may have more flags than the middle time, or if it may be the lowest.
         """
-        middle, side, sides = given.time[:, 1], given.function, self._sides
+        middle, side, sides = candidates.time[:, 1], candidates.function, self._sides
         at_step = steps[np.clip(np.searchsorted(steps, middle), 0, len(steps) - 1)] == middle
-        ahead = np.maximum(sides.next_flag(side, given.value[:, 1]), self._least_at_steps[side])
+        ahead = np.maximum(sides.next_flag_values(side, candidates.value[:, 1]), self._least_at_steps[side])
         with np.errstate(invalid="ignore"):  # inf - inf next to an infinite clearance
-            fall = given.fall
-            expected = given.value[:, 1] - np.where(np.isfinite(fall), fall, 0.0)
+            fall = candidates.fall_bound
+            expected = candidates.value[:, 1] - np.where(np.isfinite(fall), fall, 0.0)
         near = ~(expected > ahead) & ~(sides.clearance(side, expected) > NEAR)
-        wanted = (given.unknown(sides.critical) | ~at_step) & near
-        given, expected = given.where(wanted), expected[wanted]
-        chosen = np.zeros(len(given.function), dtype=bool)
-        for number in set(given.function.tolist()):
-            own = given.function == number
-            self._lowest[number] = np.sort(np.append(self._lowest[number], expected[own]))[:MOST]
-            chosen[own] = expected[own] <= self._lowest[number][-1]
-        return given.where(chosen)
+        wanted = (candidates.unresolved(sides.critical) | ~at_step) & near
+        candidates, expected = candidates.where(wanted), expected[wanted]
+        chosen = np.zeros(len(candidates.function), dtype=bool)
+        for number in set(candidates.function.tolist()):
+            of_side = candidates.function == number
+            self._lowest[number] = np.sort(np.append(self._lowest[number], expected[of_side]))[:MOST]
+            chosen[of_side] = expected[of_side] <= self._lowest[number][-1]
+        return candidates.where(chosen)
 
-    def _keep(self, found: Brackets, steps: IndexArray) -> None:
+    def _add_minima(self, minima: Brackets, steps: IndexArray) -> None:
         """Keep the variables at minima, with the flags of the minimal quantities, for the nearest sample."""
-        clearance = self._sides.clearance(found.function, found.value[:, 1])
-        for part, block in self._dynamics.blocks_at(found.time[:, 1]):
-            quantity = self._sides.quantity[found.function[part]]
+        clearance = self._sides.clearance(minima.function, minima.value[:, 1])
+        for part, block in self._dynamics.blocks_at(minima.time[:, 1]):
+            quantity = self._sides.quantity[minima.function[part]]
             joint = self._joint[quantity]
             judged = block if self._uncertainty is None else self._uncertainty.judged(block)
             at_minima = np.arange(len(joint)), joint, np.newaxis
-            own = {name: array[at_minima] for name, array in _of_joints(judged).items()}
-            own["flags"] &= self._bits[quantity, None]
+            variables = {name: array[at_minima] for name, array in _joint_variables(judged).items()}
+            variables["flags"] &= self._bits[quantity, None]
             rows = quantity, joint, clearance[part], steps[part]
-            self._found.append(Minima(judged.replaced(**own), *rows))
+            self._pending_minima.append(Minima(judged.replaced(**variables), *rows))
 
-    def _evaluated(self, side: IndexArray, times: FloatArray) -> FloatArray:
+    def _evaluate(self, side: IndexArray, times: FloatArray) -> FloatArray:
         """Return the values of sides (n,) at times of their own, (n, times)."""
         wanted = np.repeat(side, times.shape[1])
         parts = [
@@ -249,6 +257,6 @@ class Between:
         return np.concatenate(parts).reshape(times.shape)
 
 
-def _of_joints(block: Block) -> dict[str, AnyArray]:
+def _joint_variables(block: Block) -> dict[str, AnyArray]:
     """Return the variables of joints, by name."""
     return {name: array for name, array in block.arrays().items() if "joint" in block.declared[name].dims}

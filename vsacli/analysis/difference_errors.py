@@ -48,7 +48,7 @@ class DifferenceErrors:
         self._steps, self._bound, self._noise_gain = steps, bound, noise_gain
         self._open: tuple[AnyArray, ...] = ()  # of the times not judged yet, and of the neighbors before them
         self._judged = 0  # number of times judged
-        self._found: list[tuple[FloatArray, ...]] = []
+        self._errors_and_bounds: list[tuple[FloatArray, ...]] = []
         self._peak: FloatArray | float = 0.0
 
     def add(
@@ -76,16 +76,22 @@ class DifferenceErrors:
                 (SIXTH_DIFFERENCE, derivatives),
             )
         )
-        there = np.broadcast_to(compared[..., None], difference.shape)
-        of_value, of_derivative = (np.where(there, np.abs(each), 0.0) for each in noise)
+        is_compared = np.broadcast_to(compared[..., None], difference.shape)
+        of_value, of_derivative = (np.where(is_compared, np.abs(each), 0.0) for each in noise)
         middle = derivatives[:, MIDDLE]
-        found: tuple[AnyArray, ...] = difference, middle, np.maximum(of_value, grain), of_derivative, there
+        terms: tuple[AnyArray, ...] = (
+            difference,
+            middle,
+            np.maximum(of_value, grain),
+            of_derivative,
+            is_compared,
+        )
         if self._open:
-            found = tuple(np.concatenate(pair, axis=1) for pair in zip(self._open, found, strict=True))
-        self._open = found
-        valid: BoolArray = np.any(there, axis=0)
+            terms = tuple(np.concatenate(pair, axis=1) for pair in zip(self._open, terms, strict=True))
+        self._open = terms
+        valid: BoolArray = np.any(is_compared, axis=0)
         self._peak = np.maximum(self._peak, np.max(size, axis=0, where=valid, initial=0.0))
-        self._judge(self._first_open + found[0].shape[1] - NEIGHBORS)
+        self._judge(self._first_open + terms[0].shape[1] - NEIGHBORS)
 
     @property
     def _first_open(self) -> int:
@@ -102,22 +108,22 @@ class DifferenceErrors:
             return
         begin = self._first_open
         now = slice(self._judged - begin, end - begin)
-        difference, derivative, *noise, there = self._open
+        difference, derivative, *noise, is_compared = self._open
         steps = self._steps[:, self._judged : end, None, None]
         of_value, of_derivative = (_largest_near(each)[:, now] for each in noise)
         admitted = self._noise_gain * (of_value / steps + of_derivative)
         error = np.abs(difference[:, now] / steps - derivative[:, now])
-        best = np.argmin(np.where(there[:, now], error + admitted, np.inf), axis=0)[None]
-        valid = there[:, now].any(axis=0)
+        best = np.argmin(np.where(is_compared[:, now], error + admitted, np.inf), axis=0)[None]
+        valid = is_compared[:, now].any(axis=0)
         at_best = (np.take_along_axis(each, best, axis=0)[0] for each in (error, admitted))
-        self._found.append(tuple(np.where(valid, each, 0.0) for each in at_best))
+        self._errors_and_bounds.append(tuple(np.where(valid, each, 0.0) for each in at_best))
         self._judged = end
         self._open = tuple(each[:, self._first_open - begin :].copy() for each in self._open)
 
     def relative(self) -> tuple[FloatArray, FloatArray]:
         """Return the error nearest to its bound of any joint at each time, and that bound, (times,) each."""
         self._judge(self._steps.shape[1])
-        error, admitted = map(np.concatenate, zip(*self._found, strict=True))
+        error, admitted = map(np.concatenate, zip(*self._errors_and_bounds, strict=True))
         scale = np.maximum(self._peak, SMALL_JOINT * np.max(self._peak))
         error, bound = (
             np.divide(each, scale, out=np.zeros_like(each), where=scale != 0).reshape(len(each), -1)

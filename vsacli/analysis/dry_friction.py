@@ -62,10 +62,12 @@ class FrictionPassages:
             before, after = dq[:-1, index], dq[1:, index]
             near = (np.minimum(abs(before), abs(after)) < REACH * width) | (before * after < 0)
             passed = near & (np.abs(after - before) > COARSE * width)
-            found = np.stack([time[:-1], time[1:], before, after], axis=1)[passed]
-            every = np.concatenate([self._passages[number], found])
-            fastest = np.sort(np.argsort(-np.abs(every[:, 3] - every[:, 2]), kind="stable")[:MOST])
-            self._passages[number] = every[fastest]
+            passages = np.stack([time[:-1], time[1:], before, after], axis=1)[passed]
+            all_passages = np.concatenate([self._passages[number], passages])
+            fastest = np.sort(
+                np.argsort(-np.abs(all_passages[:, 3] - all_passages[:, 2]), kind="stable")[:MOST]
+            )
+            self._passages[number] = all_passages[fastest]
 
     def notes(self, dynamics: RunDynamics) -> Iterator[str]:
         """Yield a sentence for each joint on friction that the samples do not show."""
@@ -81,7 +83,7 @@ class FrictionPassages:
             if not trajectory.known_between:
                 yield f"{what}; what the motors do meanwhile is not known: {advice}"
                 continue
-            passing = dynamics.at(_times(trajectory, passages, index, width))
+            passing = dynamics.at(_passage_times(trajectory, passages, index, width))
             torques = np.abs(passing.tau_motor[:, index])
             most = float(np.max(torques, where=np.isfinite(torques), initial=0.0))
             if most > MORE * peak:
@@ -89,7 +91,7 @@ class FrictionPassages:
                 yield f"{what}: motor torques reach {sizes}; {advice}"
 
 
-def _times(trajectory: Trajectory, passages: FloatArray, index: int, width: float) -> FloatArray:
+def _passage_times(trajectory: Trajectory, passages: FloatArray, index: int, width: float) -> FloatArray:
     """Return when the velocity of a joint is at levels between -3 and 3 widths, by bisection."""
     early, late, before, after = np.repeat(passages, LEVELS, axis=0).T
     level = np.tile(width * np.linspace(-REACH, REACH, LEVELS), len(passages))
@@ -192,16 +194,16 @@ def dry_frictions(motors: Sequence[JointMotor]) -> list[DryFrictionSummary]:
     ]
 
 
-def dry_friction_lines(found: Sequence[tuple[str, str, DryFriction]]) -> Iterator[str]:
+def dry_friction_lines(motors: Sequence[tuple[str, str, DryFriction]]) -> Iterator[str]:
     """Yield a line on rest and one on reversals, from (joint name, joint type, motor) entries."""
-    resting = [entry for entry in found if entry[2].start + entry[2].between + entry[2].end]
+    resting = [entry for entry in motors if entry[2].start + entry[2].between + entry[2].end]
     if resting:
         name, joint_type, most = max(resting, key=lambda entry: entry[2].jump)
-        when = ", ".join(filter(None, _rests([each for _, _, each in resting])))
+        when = ", ".join(filter(None, _resting_texts([each for _, _, each in resting])))
         more, less, unit = f"{most.highest:.3g}", f"{-most.lowest:.3g}", TORQUE.unit(joint_type)
         width = f"{more} {unit} more or less" if more == less else f"{more} {unit} more or {less} less"
         yield f"dry friction: motors that rest ({when}) would do so with up to {width} ({name})"
-    turning = [entry for entry in found if entry[2].reversals]
+    turning = [entry for entry in motors if entry[2].reversals]
     if turning:
         name, _, first = min(turning, key=lambda entry: entry[2].first_reversal)
         whose, joint_type, most = max(turning, key=lambda entry: entry[2].jump)
@@ -212,7 +214,7 @@ def dry_friction_lines(found: Sequence[tuple[str, str, DryFriction]]) -> Iterato
         yield f"where they do, their torques jump by up to {jump}"
 
 
-def _rests(motors: Sequence[DryFriction]) -> Iterator[str]:
+def _resting_texts(motors: Sequence[DryFriction]) -> Iterator[str]:
     """Yield when motors rest."""
     yield "at the start" if any(each.start for each in motors) else ""
     between = max(each.between for each in motors)

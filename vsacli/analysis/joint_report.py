@@ -10,7 +10,7 @@ from vsacli.analysis.dry_friction import DryFriction
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.dynamics.energy import JointEnergy
-from vsacli.dynamics.inverse import Stop
+from vsacli.dynamics.inverse import DeflectionStop
 from vsacli.dynamics.limits import Finding
 
 COUNTED = {
@@ -203,6 +203,6 @@ class JointDrift(Stored):
     largest: float
     time: float
     unit: str
-    stop: Stop | None = None
+    stop: DeflectionStop | None = None
 
     shape: ClassVar = {"joint": "joint", "drift": "largest", **named("time", "unit"), "stopped": "stop"}

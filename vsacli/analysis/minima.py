@@ -1,8 +1,8 @@
 """Clearances, that is margins and distances to limits, and a search for minima between samples.
 
-`Sides` has the functions whose minima count. `brackets` finds three consecutive times around each local
-minimum; `narrowed` evaluates further times between them until the minimum is known. `between_samples` applies
-them to the blocks of a run.
+`Sides` has the functions whose minima count. `find_brackets` finds three consecutive times around each local
+minimum; `narrow_brackets` evaluates further times between them until the minimum is known. `between_samples`
+applies them to the blocks of a run.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ class Bounded(NamedTuple):
 
     Attributes:
         joint: Joint of the quantity.
-        number: Index of the joint.
+        joint_index: Index of the joint.
         limit: Limit that bounds it; None for the stiffness in its attainable range.
     """
 
     joint: Joint
-    number: int
+    joint_index: int
     limit: LimitCheck | None
 
     @property
@@ -66,7 +66,7 @@ class Bounded(NamedTuple):
             if math.isfinite(bound):
                 yield sign, sign * bound, size, tolerance, math.inf, math.inf
 
-    def side(self, of_joint: OfJoint, sign: float) -> FloatArray:
+    def signed_values(self, of_joint: OfJoint, sign: float) -> FloatArray:
         """Return the values with a sign, (samples,), with missing ones replaced as in `clearance`."""
         if self.limit is None:
             return self.clearance(of_joint)
@@ -74,7 +74,7 @@ class Bounded(NamedTuple):
 
     def at(self, block: Block, step: int, *, between: bool = False) -> Finding:
         """Return the value and the nearer bound at a sample of a block, or at an instant between samples."""
-        of_joint, limit = block.of_joint(self.number), self.limit
+        of_joint, limit = block.of_joint(self.joint_index), self.limit
         if limit is None:
             kind, motor, unit = MARGIN, None, units.STIFFNESS.unit(self.joint.type)
             values = of_joint["stiffness"]
@@ -122,10 +122,10 @@ class Sides:
 
     def values(self, block: Block) -> FloatArray:
         """Return the values of all sides, (sides, samples)."""
-        of_joints = {each.number: block.of_joint(each.number) for each in self._quantities}
+        of_joints = {each.joint_index: block.of_joint(each.joint_index) for each in self._quantities}
         quantities = (self._quantities[number] for number in self.quantity)
         signed = zip(quantities, self._sign.tolist(), strict=True)
-        rows = [quantity.side(of_joints[quantity.number], sign) for quantity, sign in signed]
+        rows = [quantity.signed_values(of_joints[quantity.joint_index], sign) for quantity, sign in signed]
         return np.array(rows).reshape(-1, len(block.time))
 
     def clearance(self, side: IndexArray, value: FloatArray) -> FloatArray:
@@ -138,7 +138,7 @@ class Sides:
         beyond: BoolArray = (self._bound[side] - value)[:, None] > self._tolerances[side]
         return beyond
 
-    def next_flag(self, side: IndexArray, value: FloatArray) -> FloatArray:
+    def next_flag_values(self, side: IndexArray, value: FloatArray) -> FloatArray:
         """Return the values, (n,), below which sides get another flag; -inf if they have all."""
         ahead = np.where(self.beyond(side, value), np.inf, self._tolerances[side])
         following: FloatArray = self._bound[side] - ahead.min(axis=1)
@@ -156,12 +156,12 @@ def bounded_quantities(robot: Robot) -> list[Bounded]:
 
 def clearances(quantities: list[Bounded], block: Block) -> FloatArray:
     """Return the clearances of all quantities, (quantities, samples)."""
-    of_joints = {number: block.of_joint(number) for number in {quantity.number for quantity in quantities}}
-    rows = [quantity.clearance(of_joints[quantity.number]) for quantity in quantities]
+    of_joints = {index: block.of_joint(index) for index in {quantity.joint_index for quantity in quantities}}
+    rows = [quantity.clearance(of_joints[quantity.joint_index]) for quantity in quantities]
     return np.array(rows).reshape(-1, len(block.time))
 
 
-KNOWN = 1e-3
+MINIMUM_ACCURACY = 1e-3
 """Accuracy to which a minimum is determined, relative to its distance from the value that sets a flag."""
 
 PRECISION = 1e-13
@@ -188,7 +188,7 @@ Evaluate = Callable[[IndexArray, FloatArray], FloatArray]
 """Function from indices of quantities, (n,), and times for each, (n, times), to values (n, times)."""
 
 
-class Known(NamedTuple):
+class SampledFunctions(NamedTuple):
     """Functions at consecutive times.
 
     Attributes:
@@ -206,20 +206,20 @@ class Known(NamedTuple):
         """Index of the time after the last one."""
         return self.first + len(self.time)
 
-    def last(self, count: int) -> Known:
+    def last(self, count: int) -> SampledFunctions:
         """Return the last `count` times."""
         dropped = max(0, len(self.time) - count)
-        return Known(self.first + dropped, self.time[dropped:], self.value[:, dropped:])
+        return SampledFunctions(self.first + dropped, self.time[dropped:], self.value[:, dropped:])
 
-    def followed_by(self, time: FloatArray, value: FloatArray) -> Known:
+    def followed_by(self, time: FloatArray, value: FloatArray) -> SampledFunctions:
         """Return these times followed by others."""
-        return Known(self.first, np.append(self.time, time), np.hstack((self.value, value)))
+        return SampledFunctions(self.first, np.append(self.time, time), np.hstack((self.value, value)))
 
-    def opened(self) -> Known:
+    def opened(self) -> SampledFunctions:
         """Return these with the first time twice, so that it has a neighbor on either side."""
-        return Known(self.first - 1, self.time[:1], self.value[:, :1]).followed_by(*self[1:])
+        return SampledFunctions(self.first - 1, self.time[:1], self.value[:, :1]).followed_by(*self[1:])
 
-    def closed(self) -> Known:
+    def closed(self) -> SampledFunctions:
         """Return these with the last time twice, slightly higher: the end of a fall is a minimum."""
         return self.followed_by(self.time[-1:], np.nextafter(self.value[:, -1:], np.inf))
 
@@ -238,7 +238,7 @@ class Brackets(NamedTuple):
     value: FloatArray
 
     @property
-    def fall(self) -> FloatArray:
+    def fall_bound(self) -> FloatArray:
         """Bound on the fall of a minimum below the middle, (n,).
 
         A convex function lies above the lines through the middle and either end. An end at the time of the
@@ -253,7 +253,7 @@ class Brackets(NamedTuple):
             )
         return fall
 
-    def unknown(self, critical: FloatArray) -> BoolArray:
+    def unresolved(self, critical: FloatArray) -> BoolArray:
         """Return whether each minimum may be below the middle by more than is ignored; not at missing values.
 
         The answer for a minimum above its critical value holds for lower critical values as well: a looser
@@ -263,9 +263,9 @@ class Brackets(NamedTuple):
             critical: Value of each function at which a flag is set, (functions,).
         """
         with np.errstate(invalid="ignore"):
-            ignored = KNOWN * np.abs(self.value[:, 1] - critical[self.function])
-            unknown: BoolArray = self.fall > ignored + PRECISION * np.abs(self.value).max(axis=1)
-        return unknown & np.isfinite(self.value).all(axis=1)
+            ignored = MINIMUM_ACCURACY * np.abs(self.value[:, 1] - critical[self.function])
+            unresolved: BoolArray = self.fall_bound > ignored + PRECISION * np.abs(self.value).max(axis=1)
+        return unresolved & np.isfinite(self.value).all(axis=1)
 
     @property
     def lowest_of_parabola(self) -> FloatArray:
@@ -283,45 +283,47 @@ class Brackets(NamedTuple):
         return Brackets(self.function[chosen], self.time[chosen], self.value[chosen])
 
 
-def brackets(known: Known) -> Brackets:
+def find_brackets(functions: SampledFunctions) -> Brackets:
     """Return brackets of the local minima of functions; the first and the last time are neighbors only.
 
     Of equal adjacent values, the last is the middle.
     """
-    time, values = known.time, known.value
+    time, values = functions.time, functions.value
     falls = values[:, 1:] <= values[:, :-1]
     function, before = np.nonzero(falls[:, :-1] & ~falls[:, 1:])
     around = before[:, None] + np.arange(3)
     return Brackets(function, time[around], values[function[:, None], around])
 
 
-def narrowed(given: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brackets:
+def narrow_brackets(wide: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brackets:
     """Return the brackets narrowed until each minimum is known; each round evaluates all of them together.
 
-    The critical values decide on the number of rounds alone, see `Brackets.unknown`.
+    The critical values decide on the number of rounds alone, see `Brackets.unresolved`.
     """
-    function, time, value = given.function, given.time.copy(), given.value.copy()
-    open_ = np.flatnonzero(given.unknown(critical))
+    function, time, value = wide.function, wide.time.copy(), wide.value.copy()
+    open_ = np.flatnonzero(wide.unresolved(critical))
     for _ in range(ROUNDS):
         if not open_.size:
             break
-        _, time[open_], value[open_] = _round(given._replace(time=time, value=value).where(open_), evaluate)
-        open_ = open_[Brackets(function, time, value).where(open_).unknown(critical)]
+        _, time[open_], value[open_] = _narrow_once(
+            wide._replace(time=time, value=value).where(open_), evaluate
+        )
+        open_ = open_[Brackets(function, time, value).where(open_).unresolved(critical)]
     return Brackets(function, time, value)
 
 
-def _round(given: Brackets, evaluate: Evaluate) -> Brackets:
+def _narrow_once(wide: Brackets, evaluate: Evaluate) -> Brackets:
     """Return the lowest of the three times and of new ones between them, with its neighbors."""
-    left, middle, right = np.hsplit(given.time, 3)
-    close = given.lowest_of_parabola + CLOSE * (right - left)
+    left, middle, right = np.hsplit(wide.time, 3)
+    close = wide.lowest_of_parabola + CLOSE * (right - left)
     new = np.hstack(
         (left + SHARES * (middle - left), middle + SHARES * (right - middle), np.clip(close, left, right))
     )
-    times = np.hstack((given.time, new))
-    values = np.hstack((given.value, evaluate(given.function, new)))
-    each = np.arange(len(times))[:, None]
-    order = each, times.argsort(axis=1, kind="stable")
+    times = np.hstack((wide.time, new))
+    values = np.hstack((wide.value, evaluate(wide.function, new)))
+    row = np.arange(len(times))[:, None]
+    order = row, times.argsort(axis=1, kind="stable")
     times, values = times[order], values[order]
     lowest = np.clip(values.argmin(axis=1), 1, values.shape[1] - 2)[:, None]
-    around = each, lowest + np.arange(-1, 2)
-    return Brackets(given.function, times[around], values[around])
+    around = row, lowest + np.arange(-1, 2)
+    return Brackets(wide.function, times[around], values[around])

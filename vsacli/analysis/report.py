@@ -14,8 +14,8 @@ from vsacli.analysis.report_text import energy_lines
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
 from vsacli.analysis.trouble_text import (
     NOT_DETERMINED,
-    counts,
-    findings,
+    failing_joints_line,
+    finding_lines,
     little_effect,
     spread_lines,
     uncertainty_lines,
@@ -90,22 +90,22 @@ class Report(Stored):
             hint: a line below the findings, such as the command that lists fixes; none if empty.
         """
         first = [warning for warning in self.warnings if self._is_cause(warning)]
-        others = [warning for warning in self.warnings if not self._is_cause(warning)]
-        found = [
+        further = [warning for warning in self.warnings if not self._is_cause(warning)]
+        entries = [
             *self._failed_check(),
             *warnings_and_notes(first, ()),
-            *findings(self.joints, self.samples),
-            *text.stops(self.joints, self.drifts),
+            *finding_lines(self.joints, self.samples),
+            *text.integration_stop_lines(self.joints, self.drifts),
             *self._recorded_infeasible(causes=bool(first)),
             *([hint] if hint else []),
             *uncertainty_lines(self.joints),
-            *warnings_and_notes(others, ()),
-            *(little_effect(self.joints) if any(NOT_DETERMINED in each for each in others) else []),
+            *warnings_and_notes(further, ()),
+            *(little_effect(self.joints) if any(NOT_DETERMINED in each for each in further) else []),
             *warnings_and_notes((), self.notes),
         ]
         lines = [
-            *text.start(self.joints),
-            *text.end(self.joints),
+            *text.initial_motor_lines(self.joints),
+            *text.final_motor_lines(self.joints),
             *dry_friction_lines(
                 [(joint.name, joint.type, motor) for joint in self.joints for motor in joint.dry_friction]
             ),
@@ -114,7 +114,9 @@ class Report(Stored):
             *text.drift_lines(self.drifts),
             *([text.self_check_line(self.self_check)] if self.self_check.passed else []),
         ]
-        return ReportText(headline(self.verdict, self._title()), found, [text.joint_rows(self.joints)], lines)
+        return ReportText(
+            headline(self.verdict, self._title()), entries, [text.joint_rows(self.joints)], lines
+        )
 
     def __str__(self) -> str:
         """Return the lines that the commands print, without a final newline."""
@@ -144,7 +146,7 @@ class Report(Stored):
         """Return names, size, and how many joints fail which requirement."""
         length = counted(self.samples, "sample") + ("" if self.complete else ", stopped early")
         title = f"{self.robot}, {self.trajectory}: {length}, {self.duration:g} s"
-        return "; ".join([title, *filter(None, [counts(self.joints)])])
+        return "; ".join([title, *filter(None, [failing_joints_line(self.joints)])])
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:

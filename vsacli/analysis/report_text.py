@@ -19,17 +19,19 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
     energies = [energy for _, _, energy in joints]
     if not any(math.isnan(energy.spent) for energy in energies):
         spent, recovered = (
-            number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
+            short_number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
         )
         name, _, most = max(joints, key=lambda joint: joint[2].elastic_peak)
-        stored = f"; springs store up to {number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
+        stored = (
+            f"; springs store up to {short_number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
+        )
         yield f"energy: motors deliver {spent} J and recover {recovered} J{stored}"
         yield from _losses(energies)
     paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
     if paired:
         name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
         unit = TORQUE.unit(joint_type)
-        effort, load = f"{number(most.co_contraction)} {unit}", f"{number(most.load)} {unit}"
+        effort, load = f"{short_number(most.co_contraction)} {unit}", f"{short_number(most.load)} {unit}"
         yield f"co-contraction: up to {effort} rms per motor ({name}); its load requires {load}"
 
 
@@ -39,8 +41,8 @@ def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
         "friction and damping": [energy.dissipated for energy in energies],
         "motor windings": [energy.copper_loss for energy in energies],
     }
-    known = {words: [loss for loss in losses if loss is not None] for words, losses in lost.items()}
-    sums = [f"{words} {number(sum(losses))} J" for words, losses in known.items() if losses]
+    losses_by_cause = {words: [loss for loss in losses if loss is not None] for words, losses in lost.items()}
+    sums = [f"{words} {short_number(sum(losses))} J" for words, losses in losses_by_cause.items() if losses]
     if sums:
         yield "losses: " + ", ".join(sums)
 
@@ -78,48 +80,48 @@ def joint_rows(joints: Sequence[JointReport]) -> list[tuple[str, ...]]:
         lambda joint: joint.attainable,
     )
     huge = [any(EXPONENT <= value < math.inf for joint in joints for value in of(joint)) for of in columns]
-    return [header, *(_row(joint, *huge) for joint in joints)]
+    return [header, *(_joint_row(joint, *huge) for joint in joints)]
 
 
-def _row(joint: JointReport, huge: bool, huge_range: bool) -> tuple[str, ...]:
+def _joint_row(joint: JointReport, huge: bool, huge_range: bool) -> tuple[str, ...]:
     return (
         joint.name,
-        number(joint.peak_tau_e, huge=huge),
-        " / ".join(number(peak, huge=huge) for peak in of_motors(joint, joint.peak_tau_motor)),
-        _span(joint.commanded_min, joint.commanded_max),
+        short_number(joint.peak_tau_e, huge=huge),
+        " / ".join(short_number(peak, huge=huge) for peak in values_of_motors(joint, joint.peak_tau_motor)),
+        _stiffness_range(joint.commanded_min, joint.commanded_max),
         *(
-            (_attainable(*joint.attainable, huge_range), percent(joint.margin).removesuffix(" %"))
-            if "stiffness" in kind_of(joint).commanded
+            (_attainable_range(*joint.attainable, huge_range), short_percent(joint.margin).removesuffix(" %"))
+            if "stiffness" in actuator_kind(joint).commanded
             else ("-", "-")
         ),
     )
 
 
-def kind_of(joint: JointReport) -> type[Actuator]:
+def actuator_kind(joint: JointReport) -> type[Actuator]:
     """Return the kind of the actuator."""
     kind: type[Actuator] = ACTUATORS[joint.actuator]
     return kind
 
 
-def of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
+def values_of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
     """Return the values of a pair for the motors that the joint has."""
-    return pair[: kind_of(joint).motor_count]
+    return pair[: actuator_kind(joint).motor_count]
 
 
-def _attainable(lower: float, upper: float, huge: bool) -> str:
+def _attainable_range(lower: float, upper: float, huge: bool) -> str:
     if math.isnan(lower):
         return "none"
-    least = number(lower, huge=huge)
-    return f"from {least}" if math.isinf(upper) else f"{least}-{number(upper, huge=huge)}"
+    least = short_number(lower, huge=huge)
+    return f"from {least}" if math.isinf(upper) else f"{least}-{short_number(upper, huge=huge)}"
 
 
-def _span(low: float, high: float) -> str:
+def _stiffness_range(low: float, high: float) -> str:
     if math.isnan(low):
         return "-"
     return "-".join(dict.fromkeys(significant(value) for value in (low, high)))
 
 
-def number(value: float, *, huge: bool = False) -> str:
+def short_number(value: float, *, huge: bool = False) -> str:
     """Return a number with three or four digits, or all those before the point.
 
     Args:
@@ -133,7 +135,7 @@ def number(value: float, *, huge: bool = False) -> str:
     return f"{value:.1f}" if abs(value) < WHOLE else f"{value:.0f}"
 
 
-def percent(share: float) -> str:
+def short_percent(share: float) -> str:
     """Return a share in percent with two decimals; with none if it is large, with one digit if tiny."""
     if math.isnan(share):
         return "none"
@@ -142,12 +144,12 @@ def percent(share: float) -> str:
     return f"{100 * share:.2f} %" if abs(share) >= 1e-4 or share == 0 else f"{100 * share:.1g} %"
 
 
-def start(joints: Sequence[JointReport]) -> Iterator[str]:
+def initial_motor_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the initial motor positions, which motors move, and the largest torque discontinuity."""
-    yield from _positions("initial", joints, [joint.start_theta for joint in joints], "first")
+    yield from _motor_position_lines("initial", joints, [joint.start_theta for joint in joints], "first")
     deviations = [None if (each := joint.uncertainty) is None else each.start_dtheta for joint in joints]
-    yield from _moving("initial", joints, [joint.start_dtheta for joint in joints], deviations)
-    jumps = [(max(of_motors(joint, joint.torque_discontinuity)), joint) for joint in joints]
+    yield from _motor_velocity_lines("initial", joints, [joint.start_dtheta for joint in joints], deviations)
+    jumps = [(max(values_of_motors(joint, joint.torque_discontinuity)), joint) for joint in joints]
     defined = [entry for entry in jumps if not math.isnan(entry[0])]
     if defined:
         jump, joint = max(defined, key=lambda entry: entry[0])
@@ -156,34 +158,34 @@ def start(joints: Sequence[JointReport]) -> Iterator[str]:
             yield f"initial torque discontinuity: {jump:.3g} {TORQUE.unit(joint.type)} ({joint.name})"
 
 
-def end(joints: Sequence[JointReport]) -> Iterator[str]:
+def final_motor_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the final motor positions, and the motors that still move; nothing if not computed."""
     if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
         return
-    yield from _positions("final", joints, [joint.end_theta for joint in joints], "last")
+    yield from _motor_position_lines("final", joints, [joint.end_theta for joint in joints], "last")
     deviations = [None if (each := joint.uncertainty) is None else each.end_dtheta for joint in joints]
-    yield from _moving("final", joints, [joint.end_dtheta for joint in joints], deviations)
+    yield from _motor_velocity_lines("final", joints, [joint.end_dtheta for joint in joints], deviations)
 
 
-def _positions(
+def _motor_position_lines(
     which: str, joints: Sequence[JointReport], positions: Sequence[tuple[float, float]], sample: str
 ) -> Iterator[str]:
     """Yield the motor positions at one end of a motion; once that there are none, if no joint has any."""
-    of_joint = [of_motors(joint, theta) for joint, theta in zip(joints, positions, strict=True)]
+    of_joint = [values_of_motors(joint, theta) for joint, theta in zip(joints, positions, strict=True)]
     undefined = [any(map(math.isnan, theta)) for theta in of_joint]
     if all(undefined):
         yield f"{which} motor positions: undefined, since the {sample} sample is infeasible at every joint"
         return
-    said = {
+    positions_text = {
         number: f"undefined ({sample} sample infeasible)"
         if undefined[number]
         else f"{_signed(of_joint[number])} {POSITION.unit(joint.type)}"
         for number, joint in enumerate(joints)
     }
-    yield of_joints(f"{which} motor positions: ", said, [joint.name for joint in joints])
+    yield list_by_joint(f"{which} motor positions: ", positions_text, [joint.name for joint in joints])
 
 
-def _moving(
+def _motor_velocity_lines(
     which: str,
     joints: Sequence[JointReport],
     velocities: Sequence[tuple[float, float]],
@@ -195,7 +197,8 @@ def _moving(
     """
     fastest = max((peak for joint in joints for peak in joint.peak_dtheta if peak > 0), default=0.0)
     moving = {
-        number: f"{_signed(of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}{_doubt(dtheta, spread)}"
+        number: f"{_signed(values_of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
+        f"{_deviation_text(dtheta, spread)}"
         for number, (joint, dtheta, spread) in enumerate(zip(joints, velocities, deviations, strict=True))
         if any(
             abs(speed) > max(RESTING_SHARE * peak, ROUNDING_SHARE * fastest)
@@ -203,10 +206,10 @@ def _moving(
         )
     }
     if moving:
-        yield of_joints(f"{which} motor velocities: ", moving, [joint.name for joint in joints])
+        yield list_by_joint(f"{which} motor velocities: ", moving, [joint.name for joint in joints])
 
 
-def _doubt(velocities: Sequence[float], spread: float | None) -> str:
+def _deviation_text(velocities: Sequence[float], spread: float | None) -> str:
     """Return the standard deviation of velocities if twice of it exceeds what is `DETERMINED`."""
     largest = max(abs(velocity) for velocity in velocities if not math.isnan(velocity))
     if spread is None or 2 * spread <= DETERMINED * largest:
@@ -218,7 +221,7 @@ def _signed(values: Iterable[float]) -> str:
     return " ".join(f"{value:+.4g}" for value in values)
 
 
-def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterator[str]:
+def integration_stop_lines(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterator[str]:
     """Yield from when on deflections could not be integrated."""
     infeasible = {joint.name: joint.samples["infeasible"] for joint in joints}
     for drift in drifts:
@@ -231,7 +234,7 @@ def stops(joints: Iterable[JointReport], drifts: Iterable[JointDrift]) -> Iterat
 def drift_lines(drifts: Sequence[JointDrift]) -> Iterator[str]:
     """Yield the drift of integrated deflections, if there are any."""
     if drifts:
-        yield by_joint("integration drift: ", [_drift_of(drift) for drift in drifts])
+        yield wrap_joint_entries("integration drift: ", [_drift_of(drift) for drift in drifts])
 
 
 def _drift_of(drift: JointDrift) -> str:
@@ -240,7 +243,7 @@ def _drift_of(drift: JointDrift) -> str:
     return f"{drift.joint} {drift.largest:.1e} {drift.unit} at {time_text(drift.time)}"
 
 
-def by_joint(label: str, entries: Sequence[str]) -> str:
+def wrap_joint_entries(label: str, entries: Sequence[str]) -> str:
     """Return the entries of the joints, several to a line."""
     lines = [
         ", ".join(entries[first : first + JOINTS_PER_LINE])
@@ -249,13 +252,13 @@ def by_joint(label: str, entries: Sequence[str]) -> str:
     return label + (",\n" + " " * len(label)).join(lines)
 
 
-def of_joints(label: str, said: Mapping[int, str], names: Sequence[str]) -> str:
+def list_by_joint(label: str, texts: Mapping[int, str], names: Sequence[str]) -> str:
     """Return entries of joints by index; equal entries of many joints are combined."""
     equal: dict[str, list[int]] = {}
-    for number, words in said.items():
+    for number, words in texts.items():
         equal.setdefault(words, []).append(number)
-    if len(names) <= MOST_APART or len(equal) == len(said):
-        return by_joint(label, [f"{names[number]} {words}" for number, words in said.items()])
+    if len(names) <= MOST_APART or len(equal) == len(texts):
+        return wrap_joint_entries(label, [f"{names[number]} {words}" for number, words in texts.items()])
     lines = [f"{together(numbers, names)} {words}" for words, numbers in equal.items()]
     return label + (";\n" + " " * len(label)).join(lines)
 

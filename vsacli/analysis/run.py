@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vsacli.analysis.between_samples import Between, Minima
+from vsacli.analysis.between_samples import Minima, MinimaSearch
 from vsacli.analysis.dry_friction import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.report import Report
@@ -30,7 +30,7 @@ from vsacli.base.variables import Block
 from vsacli.compute.engine import Engine, choose
 from vsacli.dynamics.balances import BALANCES
 from vsacli.dynamics.energy import JointEnergy, RunEnergy
-from vsacli.dynamics.inverse import fitted, usual_block
+from vsacli.dynamics.inverse import adapt_trajectory, usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -82,7 +82,7 @@ class Run:
         tell: Tell = unheard,
     ) -> None:
         check_min_margin(min_margin)
-        trajectory = fitted(robot, trajectory)
+        trajectory = adapt_trajectory(robot, trajectory)
         self.robot = robot
         self.trajectory = trajectory
         self._stop_on_infeasible = stop_on_infeasible
@@ -99,8 +99,8 @@ class Run:
         busy = int(self._ahead)  # one thread updates the summaries while the others compute
         self.choice = choose(engine, self._dynamics.kernel, trajectory.samples, threads, tell, busy=busy)
         self._dynamics.engine = self.choice.engine
-        self._uncertainty = _uncertainty(robot, trajectory, asked, self.choice.engine)
-        self._between = Between(self._dynamics, min_margin, self._uncertainty)
+        self._uncertainty = _prepare_uncertainty(robot, trajectory, asked, self.choice.engine)
+        self._minima_search = MinimaSearch(self._dynamics, min_margin, self._uncertainty)
         self._passages = FrictionPassages(robot)
         self._check = RunCheck(self._dynamics)
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
@@ -114,10 +114,10 @@ class Run:
         waiting: deque[Block] = deque()
         # Blocks wait until the samples after them are known: a minimum between two blocks may set a flag.
         for block in self._computed():
-            self._between.look(block)
+            self._minima_search.search_around(block)
             waiting.append(block)
             del block  # else this name would keep the block alive while the next is computed
-            while waiting and self._between.knows(len(waiting[0].time)) and not self._stopped:
+            while waiting and self._minima_search.is_complete_for(len(waiting[0].time)) and not self._stopped:
                 yield self._finish(waiting.popleft())
             if self._stopped:
                 return
@@ -134,7 +134,7 @@ class Run:
 
     def _finish(self, block: Block) -> Block:
         """Take the next block through the stages after the search between samples; return what is stored."""
-        between = self._between.nearest(block)
+        between = self._minima_search.nearest(block)
         _mark_minima(between, block)
         if self._stop_on_infeasible:
             block, between = self._until_infeasible(block, between)
@@ -156,7 +156,7 @@ class Run:
         """Merge a block and the minima between its samples into the report."""
         self._samples += len(block.time)
         for minima in between:
-            self._between.add(minima)
+            self._minima_search.add(minima)
             for index in set(minima.joint.tolist()):
                 self._summaries[index].add_bounded(minima.of_joint(index), between=True)
         self._passages.add(block)
@@ -185,7 +185,7 @@ class Run:
         """Return the report on the blocks so far, with the self-check of the whole run."""
         complete = self._samples == self.trajectory.samples
         uncertainties = self._uncertainties()
-        found = zip(self._energy.report(), self._between.reports(), uncertainties, strict=True)
+        joint_parts = zip(self._energy.report(), self._minima_search.reports(), uncertainties, strict=True)
         undetermined = any(each is not None and each.undetermined for each in uncertainties)
         return Report(
             robot=self.robot.name,
@@ -196,14 +196,14 @@ class Run:
             warnings=(*self.robot.warnings, *self._of_recording(undetermined=undetermined)),
             notes=(
                 *self.trajectory.notes,
-                *self._between.notes,
+                *self._minima_search.notes,
                 *self._internal_stops(),
                 *self._passages.notes(self._dynamics),
             ),
             self_check=self._check.outcome(),
             joints=tuple(
                 summary.report(*of_joint, complete=complete)
-                for summary, of_joint in zip(self._summaries, found, strict=True)
+                for summary, of_joint in zip(self._summaries, joint_parts, strict=True)
             ),
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=self.trajectory.fits,
@@ -283,10 +283,10 @@ def inverse_dynamics(
         deflection_solver=deflection_solver,
         engine=engine,
     )
-    return Result(**_joined(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
+    return Result(**_concatenate_blocks(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
 
 
-def _uncertainty(
+def _prepare_uncertainty(
     robot: Robot, trajectory: Trajectory, asked: Collection[str], engine: Engine
 ) -> RunUncertainty | None:
     """Return the uncertainty of the run; None if no signal was recorded."""
@@ -308,7 +308,7 @@ def _drift_summaries(robot: Robot, deflections: IntegratedDeflections | None) ->
     ]
 
 
-def _joined(blocks: list[Block]) -> dict[str, AnyArray]:
+def _concatenate_blocks(blocks: list[Block]) -> dict[str, AnyArray]:
     """Return the variables of consecutive blocks, concatenated, with the samples contiguous in memory."""
     rows = [{name: np.moveaxis(array, 0, -1) for name, array in block.arrays().items()} for block in blocks]
     return {

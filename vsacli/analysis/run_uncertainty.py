@@ -112,18 +112,18 @@ class RunUncertainty:
         gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
         near = np.abs(gap) <= ALLOWED_DEVIATIONS * deviations
         for kind, bit in WITHIN.items():
-            for steps, found in zip(self._steps, (has(block.flags, bit) & near).T, strict=True):
-                steps[kind] += int(np.count_nonzero(found))
+            for steps, undecided in zip(self._steps, (has(block.flags, bit) & near).T, strict=True):
+                steps[kind] += int(np.count_nonzero(undecided))
 
     def _judge_limits(self, block: Block, index: int, *, between: bool) -> None:
         """Clear the bits of limits where the excess is within the uncertainty."""
         joint, values = self._robot.joints[index], block.of_joint(index)
         seen, exceeded = np.zeros((2, len(block.time)), dtype=FLAG_TYPE)
         for check in limit_checks(joint):
-            seeming, known = check.flags(values), check.flags(values, check.allowance(values))
+            seeming, certain = check.flags(values), check.flags(values, check.allowance(values))
             seen |= seeming
-            exceeded |= known
-            within = (seeming & ~known) != 0
+            exceeded |= certain
+            within = (seeming & ~certain) != 0
             worst = worst_excess(joint, check, values, block.time, within, between=between)
             keep_worse(self._limits[index], worst)
         block.flags[:, index] &= ~(seen & ~exceeded)  # other bits are of minima between the samples
@@ -178,8 +178,8 @@ class _Powers:
         with np.errstate(invalid="ignore"):
             size, rms = np.sqrt([self._values / self._count, self._deviations / self._count])
         for index, joint_type in enumerate(types):
-            there = self._count[index] > 0
-            if not there.any():
+            has_values = self._count[index] > 0
+            if not has_values.any():
                 continue
             least = SMALLEST_SHARE * np.nanmax(size[types == joint_type])
             scale = np.maximum(size[index], least)
@@ -187,5 +187,5 @@ class _Powers:
             stated = {"rms": rms[index], "max": self._largest[index], "share": share}
             stated = {key: np.where(self._unstated[index], np.nan, each) for key, each in stated.items()}
             every = {**stated, "bound": ALLOWED_DEVIATIONS * share, "peak": self._peak[index]}
-            worst = {key: float(np.max(each, where=there, initial=0.0)) for key, each in every.items()}
+            worst = {key: float(np.max(each, where=has_values, initial=0.0)) for key, each in every.items()}
             yield index, Spread(name=name, unit=VARIABLES[name].quantity.unit(joint_type), **worst)

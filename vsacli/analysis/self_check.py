@@ -25,13 +25,13 @@ from vsacli.base.signals import COMMANDED
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import (
-    balances,
-    damped_joints,
+    balance_errors,
     link_energy,
     link_powers,
     shaft_energy,
     shaft_powers,
 )
+from vsacli.dynamics.dampers import joints_with_parallel_damper
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -116,7 +116,7 @@ class RunCheck:
         self._excerpts: list[dict[str, AnyArray]] = []
         self._samples = 0
         self._error, self._shaft_error = 0.0, 0.0
-        self._damped_error, self._damped_size = np.zeros((2, len(damped_joints(self._joints))))
+        self._damped_error, self._damped_size = np.zeros((2, len(joints_with_parallel_damper(self._joints))))
 
     def add(self, block: Block) -> None:
         """Merge a block of `BalancedDynamics`."""
@@ -143,12 +143,12 @@ class RunCheck:
         """Return the largest scaled residual of springs and of shafts; NaN if a value is missing."""
         probed = {name: np.concatenate([part[name] for part in self._excerpts]) for name in self._excerpts[0]}
         of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(self._joints))]
-        apart = balances(self._joints, of_joints)
-        error = np.max(apart["spring_error"], initial=self._error)
-        damped_error = np.max([self._damped_error, *np.transpose(apart["damped_error"])], axis=0)
+        recomputed = balance_errors(self._joints, of_joints)
+        error = np.max(recomputed["spring_error"], initial=self._error)
+        damped_error = np.max([self._damped_error, *np.transpose(recomputed["damped_error"])], axis=0)
         size = np.maximum(self._damped_size, np.finfo(float).tiny)
         springs = float(np.max(damped_error / size, initial=error))
-        return springs, float(np.max(apart["shaft_error"], initial=self._shaft_error))
+        return springs, float(np.max(recomputed["shaft_error"], initial=self._shaft_error))
 
 
 class Rung(NamedTuple):
@@ -208,9 +208,9 @@ def ladder(
     steps = np.minimum(reach / 3, trajectory.duration / 500)
     # Its kernel equals that of the run, so that compiled code is shared.
     dynamics = RunDynamics(robot, trajectory, internal=internal, engine=engine)
-    errors, bounds, everywhere = _compare(dynamics, times, FIRST_SCALES[:, None] * steps)
+    errors, bounds, everywhere = _derivative_errors(dynamics, times, FIRST_SCALES[:, None] * steps)
     if not (everywhere and errors.max() <= CLEAR):
-        errors, bounds, _ = _compare(dynamics, times, STEP_SCALES[:, None] * steps)
+        errors, bounds, _ = _derivative_errors(dynamics, times, STEP_SCALES[:, None] * steps)
     rounding = ROUNDING_GAIN * np.finfo(float).eps * trajectory.duration / (FIRST_SCALES[-1] * steps)
     bounds = np.maximum(bounds, np.maximum(LADDER_BOUND, rounding))
     worst = np.unravel_index(np.argmax(errors / bounds), errors.shape)
@@ -222,7 +222,7 @@ def _number_of_times(joints: int) -> int:
     return max(2 * NEIGHBORS + 1, PROBES * JOINTS_AT_ALL_TIMES // max(joints, JOINTS_AT_ALL_TIMES))
 
 
-def _compare(
+def _derivative_errors(
     dynamics: RunDynamics, times: FloatArray, steps: FloatArray
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Return errors (derivatives, times) at the best scale, bounds by noise, and whether all was compared.
@@ -245,7 +245,8 @@ def _compare(
         everywhere = everywhere and bool(smooth.any(axis=0).all())
         for rung, of_rung in zip(RUNGS, differences, strict=False):
             value, derivative, whole = (
-                _on_grid(robot, block, name, grid.shape) for name in (rung.value, rung.derivative, rung.whole)
+                _variable_on_grid(robot, block, name, grid.shape)
+                for name in (rung.value, rung.derivative, rung.whole)
             )
             compared = np.ones_like(smooth) if rung.value.endswith("tau_e") else smooth
             slowest = np.abs(whole[0, MIDDLE]) / duration**rung.order
@@ -279,13 +280,13 @@ def _energy_balances(dynamics: RunDynamics, block: Block) -> Iterator[FloatArray
     yield np.stack([*map(np.multiply, grains, turns), 0 * block.time], axis=-1)
 
 
-def _on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> FloatArray:
+def _variable_on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> FloatArray:
     """Return a variable of a block of the shape (scales, offsets, times), (*shape, joints, motors or 1)."""
     values: FloatArray = getattr(block, name).reshape(*shape, len(robot.joints), -1)
-    return np.where([_compared(joint.actuator, name) for joint in robot.joints], values, 0.0)
+    return np.where([_computed_columns(joint.actuator, name) for joint in robot.joints], values, 0.0)
 
 
-def _compared(actuator: Actuator, name: str) -> list[bool]:
+def _computed_columns(actuator: Actuator, name: str) -> list[bool]:
     """Return whether each column of a variable is computed, not commanded, for this actuator."""
     commanded = {name for key in actuator.commanded for name in COMMANDED[key].names}
     return [False] if name in commanded else actuator.has(VARIABLES[name])

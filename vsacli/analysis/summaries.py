@@ -14,7 +14,7 @@ from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
-from vsacli.dynamics.inverse import Stop
+from vsacli.dynamics.inverse import DeflectionStop
 from vsacli.dynamics.limits import Finding, limit_checks, worst_excess
 from vsacli.robot.joint import Joint
 
@@ -111,8 +111,8 @@ class JointSummary:
         """
         assert self._start is not None
         least, time, attainable = self._margin
-        start_theta, start_dtheta, torque_discontinuity = map(_pair, self._start)
-        end_theta, end_dtheta = map(_pair, self._end) if complete else (UNKNOWN, UNKNOWN)
+        start_theta, start_dtheta, torque_discontinuity = map(_motor_pair, self._start)
+        end_theta, end_dtheta = map(_motor_pair, self._end) if complete else (UNKNOWN, UNKNOWN)
         return JointReport(
             name=self._joint.name,
             type=self._joint.type,
@@ -126,7 +126,7 @@ class JointSummary:
             commanded_min=float(self._stiffness[0]),
             commanded_max=float(self._stiffness[1]),
             peak_tau_e=float(self._peaks[0]),
-            peak_tau_motor=_pair(self._peaks[1:3]),
+            peak_tau_motor=_motor_pair(self._peaks[1:3]),
             start_theta=start_theta,
             torque_discontinuity=torque_discontinuity,
             other_branch="infeasible" in self._worst and self._other_branch,
@@ -135,7 +135,7 @@ class JointSummary:
             start_dtheta=start_dtheta,
             end_theta=end_theta,
             end_dtheta=end_dtheta,
-            peak_dtheta=_pair(self._peaks[3:]),
+            peak_dtheta=_motor_pair(self._peaks[3:]),
             uncertainty=uncertainty,
             dry_friction=tuple(motor.report() for motor in self._dry_friction),
         )
@@ -185,8 +185,9 @@ class JointSummary:
     def _record_limits(self, flags: FlagArray, block: Block) -> None:
         values = block.of_joint(self._index)
         for check in self._limits:
-            own = flags & check.flags(values, check.allowance(values))  # the flag may be the other motor's
-            beyond, between = has(own, check.flag), self._between_samples
+            # The flag of a sample may be the other motor's.
+            exceeded = flags & check.flags(values, check.allowance(values))
+            beyond, between = has(exceeded, check.flag), self._between_samples
             worst = worst_excess(self._joint, check, values, block.time, beyond, between=between)
             if worst is not None:
                 first = self._first_time.get(worst.kind, worst.first)
@@ -213,7 +214,7 @@ class JointSummary:
 class DriftSummary:
     """Drift of a joint's integrated deflections from the root of (14); `add` blocks, then call `report`."""
 
-    def __init__(self, joint: Joint, index: int, stop: Stop | None) -> None:
+    def __init__(self, joint: Joint, index: int, stop: DeflectionStop | None) -> None:
         self._joint = joint
         self._index = index
         self._stop = stop
@@ -241,7 +242,7 @@ def _motors_at(block: Block, step: int, joint: int) -> tuple[FloatArray, FloatAr
     return block.theta[step, joint], block.dtheta[step, joint]
 
 
-def _pair(values: FloatArray) -> tuple[float, float]:
+def _motor_pair(values: FloatArray) -> tuple[float, float]:
     first, second = values.tolist()
     return first, second
 

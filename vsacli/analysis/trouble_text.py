@@ -1,6 +1,7 @@
 """Findings of a run as sentences: what fails, when, by how much, how uncertain it is, and what to do.
 
-`counts` is for the first line of a report, `findings` for the lines below it, the most critical first.
+`failing_joints_line` is for the first line of a report, `finding_lines` for the lines below it, the most
+critical first.
 """
 
 from __future__ import annotations
@@ -9,7 +10,14 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointReport, JointUncertainty, Spread
-from vsacli.analysis.report_text import by_joint, kind_of, number, of_joints, of_motors, percent
+from vsacli.analysis.report_text import (
+    actuator_kind,
+    list_by_joint,
+    short_number,
+    short_percent,
+    values_of_motors,
+    wrap_joint_entries,
+)
 from vsacli.base.flags import Flag
 from vsacli.base.texts import counted, significant
 from vsacli.base.units import time_text
@@ -54,12 +62,12 @@ def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
 
 def spread_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the standard deviations of motor torques of recorded motions."""
-    found = [(joint.name, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
-    torques = [(name, each.variables[JUDGED]) for name, each in found if JUDGED in each.variables]
+    uncertain = [(joint.name, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
+    torques = [(name, each.variables[JUDGED]) for name, each in uncertain if JUDGED in each.variables]
     if torques:
-        yield by_joint(
+        yield wrap_joint_entries(
             "standard deviation of motor torque, random noise only: ",
-            [_spread(name, spread) for name, spread in torques],
+            [_spread_text(name, spread) for name, spread in torques],
         )
 
 
@@ -69,8 +77,8 @@ def little_effect(joints: Sequence[JointReport]) -> Iterator[str]:
     if torques and all(each is not None and each.determined for each in torques):
         largest = max(each.bound for each in torques if each is not None)
         yield (
-            f"motor torques depend little on it: their error may reach {percent(largest)} of their root mean "
-            f"square; {100 * DETERMINED:.0f} % is allowed"
+            f"motor torques depend little on it: their error may reach {short_percent(largest)} of their "
+            f"root mean square; {100 * DETERMINED:.0f} % is allowed"
         )
 
 
@@ -78,8 +86,8 @@ def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[st
     yield from map(undetermined_text, uncertainty.undetermined)
     for kind, samples in uncertainty.samples.items():
         if samples:
-            found = counted(joint.samples[kind], "sample")
-            yield f"{samples} of {found} that are {kind} may not be: uncertainty decides"
+            of_samples = counted(joint.samples[kind], "sample")
+            yield f"{samples} of {of_samples} that are {kind} may not be: uncertainty decides"
     for worst in uncertainty.limits.values():
         yield f"{worst.text}, but by less than its uncertainty, so it does not count"
     if JUDGED in uncertainty.variables:
@@ -87,16 +95,16 @@ def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[st
 
 
 def _peak_at_an_end(joint: JointReport, spread: Spread) -> Iterator[str]:
-    largest = max(of_motors(joint, joint.peak_tau_motor))
+    largest = max(values_of_motors(joint, joint.peak_tau_motor))
     if largest > DIFFERENT_PEAK * spread.peak:
-        outside, inside = (f"{number(peak)} {spread.unit}" for peak in (largest, spread.peak))
+        outside, inside = (f"{short_number(peak)} {spread.unit}" for peak in (largest, spread.peak))
         yield f"its peak motor torque {outside} is at an unreliable end of the recording; inside {inside}"
 
 
-def _spread(name: str, spread: Spread) -> str:
+def _spread_text(name: str, spread: Spread) -> str:
     if not math.isnan(spread.rms):
-        return f"{name} +- {spread.rms:.2g} {spread.unit} ({percent(spread.share)})"
-    within = "" if math.isnan(spread.bound) else f", wrong by at most {percent(spread.bound)}"
+        return f"{name} +- {spread.rms:.2g} {spread.unit} ({short_percent(spread.share)})"
+    within = "" if math.isnan(spread.bound) else f", wrong by at most {short_percent(spread.bound)}"
     return f"{name} +- unknown{within}"
 
 
@@ -105,13 +113,13 @@ def undetermined_text(spread: Spread) -> str:
     subject = f"{spread.name} is not determined by the recording"
     if math.isnan(spread.bound):
         return f"{subject}, since a signal that it depends on is not"
-    error = f"its error may reach {percent(spread.bound)} of its root mean square"
+    error = f"its error may reach {short_percent(spread.bound)} of its root mean square"
     if not math.isnan(spread.rms):
         error += f", twice its standard deviation of {spread.rms:.2g} {spread.unit}"
     return f"{subject}: {error}; {100 * DETERMINED:.0f} % is allowed"
 
 
-def counts(joints: Sequence[JointReport]) -> str:
+def failing_joints_line(joints: Sequence[JointReport]) -> str:
     """Return how many joints fail which requirement; empty if none does, or there is only one."""
     failing = {words: sum(joint.shows(verdict) for joint in joints) for verdict, words in FAILURES.items()}
     return of_all_joints(failing, len(joints))
@@ -122,28 +130,32 @@ def of_all_joints(failing: Mapping[str, int], total: int) -> str:
     failed = [(words, number) for words, number in failing.items() if number]
     if total == 1 or not failed:
         return ""
-    (words, first), *others = failed
-    return ", ".join([f"{first} of {total} joints {words}", *(f"{each} {words}" for words, each in others)])
+    (words, first), *further = failed
+    return ", ".join([f"{first} of {total} joints {words}", *(f"{each} {words}" for words, each in further)])
 
 
-def findings(joints: Sequence[JointReport], samples: int) -> Iterator[str]:
+def finding_lines(joints: Sequence[JointReport], samples: int) -> Iterator[str]:
     """Yield the problems of a run, the most critical first.
 
     Args:
         joints: reports of the joints, base to tip.
         samples: number of samples of the run.
     """
-    found = [(number, worst) for number, joint in enumerate(joints) for worst in joint.worst.values()]
+    worst_findings = [
+        (number, worst) for number, joint in enumerate(joints) for worst in joint.worst.values()
+    ]
     names = [joint.name for joint in joints]
-    yield from grouped(found, names, lambda index, worst: _worded(joints[index], worst, samples))
+    yield from group_findings(
+        worst_findings, names, lambda index, worst: _finding_texts(joints[index], worst, samples)
+    )
 
 
 Words = Callable[[int, Finding], tuple[str, str, int]]
 """Words for a finding of a joint by index: a sentence, a few words for a list, and the number of samples."""
 
 
-def grouped(
-    found: Iterable[tuple[int, Finding]],
+def group_findings(
+    findings: Iterable[tuple[int, Finding]],
     names: Sequence[str],
     words: Words = lambda _, finding: (finding.text, finding.brief, 0),
 ) -> Iterator[str]:
@@ -153,48 +165,49 @@ def grouped(
     joints that fail in every way stays on one page: it then has fewer sentences, and lists of names alone.
 
     Args:
-        found: findings of all joints, each with the index of its joint, in any order.
+        findings: findings of all joints, each with the index of its joint, in any order.
         names: names of the joints, base to tip.
         words: words for each of them; of equally bad ones, the finding at more samples comes first.
     """
     kinds: dict[str, list[tuple[int, Finding]]] = {}
-    for index, finding in found:
+    for index, finding in findings:
         kinds.setdefault(finding.kind, []).append((index, finding))
     in_full = {
-        kind: len(own) if len(own) <= MOST_IN_FULL + 1 else MOST_IN_FULL for kind, own in kinds.items()
+        kind: len(of_kind) if len(of_kind) <= MOST_IN_FULL + 1 else MOST_IN_FULL
+        for kind, of_kind in kinds.items()
     }
     if sum(in_full.values()) > MOST_SENTENCES:
         in_full = dict.fromkeys(kinds, 1)
     for kind in sorted(kinds, key=_rank):
-        own = [(finding.share, *words(index, finding), index, finding) for index, finding in kinds[kind]]
-        own.sort(key=lambda entry: (entry[0], entry[3]), reverse=True)
-        yield from (f"{names[index]}: {sentence}" for _, sentence, _, _, index, _ in own[: in_full[kind]])
-        others = {index: (brief, finding) for _, _, brief, _, index, finding in own[in_full[kind] :]}
-        if others and len(kinds) > MOST_LISTS:
-            yield f"also {_words(kind)}: {', '.join(names[index] for index in sorted(others))}"
-        elif others:
-            yield _also(kind, dict(sorted(others.items())), names)
+        of_kind = [(finding.share, *words(index, finding), index, finding) for index, finding in kinds[kind]]
+        of_kind.sort(key=lambda entry: (entry[0], entry[3]), reverse=True)
+        yield from (f"{names[index]}: {sentence}" for _, sentence, _, _, index, _ in of_kind[: in_full[kind]])
+        in_list = {index: (brief, finding) for _, _, brief, _, index, finding in of_kind[in_full[kind] :]}
+        if in_list and len(kinds) > MOST_LISTS:
+            yield f"also {_kind_text(kind)}: {', '.join(names[index] for index in sorted(in_list))}"
+        elif in_list:
+            yield _further_joints_line(kind, dict(sorted(in_list.items())), names)
 
 
-def _also(kind: str, others: Mapping[int, tuple[str, Finding]], names: Sequence[str]) -> str:
+def _further_joints_line(kind: str, briefs: Mapping[int, tuple[str, Finding]], names: Sequence[str]) -> str:
     """Return findings of one kind in a list, with their unit once if it is the same."""
     values = kind.endswith("_limit") or kind == OFF_TARGET
-    units = {finding.unit if values else "" for _, finding in others.values()}
+    units = {finding.unit if values else "" for _, finding in briefs.values()}
     unit = "".join(f" ({unit})" for unit in units if unit) if len(units) == 1 else ""
-    said = {
+    texts = {
         index: brief if len(units) == 1 else f"{brief} {finding.unit}"
-        for index, (brief, finding) in others.items()
+        for index, (brief, finding) in briefs.items()
     }
-    return of_joints(f"also {_words(kind)}{unit}: ", said, names)
+    return list_by_joint(f"also {_kind_text(kind)}{unit}: ", texts, names)
 
 
-def _worded(joint: JointReport, worst: Finding, samples: int) -> tuple[str, str, int]:
+def _finding_texts(joint: JointReport, worst: Finding, samples: int) -> tuple[str, str, int]:
     """Return the words of a finding of a run of so many samples."""
     counted_as = COUNTED_AS.get(worst.kind, worst.kind)
     if counted_as not in joint.samples:
         return f"{worst.text} (first at {time_text(joint.first_time[worst.kind])})", worst.brief, 0
     sentence = _SENTENCES[worst.kind](joint, worst, samples)
-    return sentence, f"({_when(joint, counted_as, samples)})", joint.samples[counted_as]
+    return sentence, f"({_occurrence_text(joint, counted_as, samples)})", joint.samples[counted_as]
 
 
 def _rank(kind: str) -> tuple[int, int]:
@@ -204,27 +217,30 @@ def _rank(kind: str) -> tuple[int, int]:
     return (2, 0) if kind == "near_singular" else (1, Flag.labeled(kind).value)
 
 
-def _words(kind: str) -> str:
+def _kind_text(kind: str) -> str:
     words = kind.replace("_", " ")
     return f"beyond the {words}" if kind.endswith("limit") else words
 
 
-def _when(joint: JointReport, kind: str, samples: int) -> str:
+def _occurrence_text(joint: JointReport, kind: str, samples: int) -> str:
     """Return in how many samples a joint has a kind of problem, and from when on."""
-    found = joint.samples[kind]
-    if found == samples:
+    affected = joint.samples[kind]
+    if affected == samples:
         return "all samples"
-    words = counted(found, "sample")
-    return words if found == 1 else f"{words}, from {time_text(joint.first_time[kind])}"
+    words = counted(affected, "sample")
+    return words if affected == 1 else f"{words}, from {time_text(joint.first_time[kind])}"
 
 
-def _infeasible(joint: JointReport, worst: Finding, samples: int) -> str:
-    when, hints = worst.when(closed=True), f"({_when(joint, 'infeasible', samples)}){_hints(joint)}"
+def _infeasible_text(joint: JointReport, worst: Finding, samples: int) -> str:
+    when, hints = (
+        worst.when(closed=True),
+        f"({_occurrence_text(joint, 'infeasible', samples)}){_hints(joint)}",
+    )
     if math.isnan(worst.bound):
         return f"the springs cannot carry the elastic torque {when} at any stiffness; reduce the load {hints}"
     value, bound = worst.numbers
     relation = "below the minimum" if worst.below else "above the maximum"
-    if "stiffness" not in kind_of(joint).commanded:
+    if "stiffness" not in actuator_kind(joint).commanded:
         load = f"elastic torque {value} {worst.unit} {when} is {relation} of {bound} {worst.unit}"
         return f"{load} that its spring carries; reduce the load {hints}"
     return (
@@ -239,8 +255,8 @@ def _hints(joint: JointReport) -> str:
     return slack + ("; the opposite branch reaches it" if joint.other_branch else "")
 
 
-def _singular(joint: JointReport, worst: Finding, samples: int) -> str:
-    when = _when(joint, "singular", samples)
+def _singular_text(joint: JointReport, worst: Finding, samples: int) -> str:
+    when = _occurrence_text(joint, "singular", samples)
     if math.isnan(worst.bound):
         return f"the spring is slack {worst.when()}, so that motor torques are undefined ({when})"
     change = "decrease" if worst.bound == joint.attainable[1] else "increase"
@@ -250,33 +266,33 @@ def _singular(joint: JointReport, worst: Finding, samples: int) -> str:
     )
 
 
-def _near_singular(joint: JointReport, worst: Finding, samples: int) -> str:
-    gap, when = worst.excess / worst.value, _when(joint, "near_singular", samples)
+def _near_singular_text(joint: JointReport, worst: Finding, samples: int) -> str:
+    gap, when = worst.excess / worst.value, _occurrence_text(joint, "near_singular", samples)
     return (
         f"warning: stiffness {significant(worst.value)} {worst.unit} {worst.when(closed=True)} is "
         f"{100 * gap:.2g} % from the singularity, where motor torques grow without bound ({when})"
     )
 
 
-def _not_finite(joint: JointReport, worst: Finding, samples: int) -> str:
+def _not_finite_text(joint: JointReport, worst: Finding, samples: int) -> str:
     return (
         f"a motor variable is not finite {worst.when()}: motion, stiffness or load are too large or not "
-        f"numbers (infeasible: {_when(joint, 'infeasible', samples)})"
+        f"numbers (infeasible: {_occurrence_text(joint, 'infeasible', samples)})"
     )
 
 
-def _unstable(joint: JointReport, worst: Finding, samples: int) -> str:
+def _unstable_text(joint: JointReport, worst: Finding, samples: int) -> str:
     return (
         f"the motion inside its damped transmission is unstable from t = {time_text(worst.time)} on: its "
-        f"damper carries {number(worst.value)} {worst.unit} that the springs cannot; increase the stiffness "
-        f"({_when(joint, 'singular', samples)})"
+        f"damper carries {short_number(worst.value)} {worst.unit} that the springs cannot; increase the "
+        f"stiffness ({_occurrence_text(joint, 'singular', samples)})"
     )
 
 
 _SENTENCES = {
-    "not_finite": _not_finite,
-    "infeasible": _infeasible,
-    "singular": _singular,
-    "near_singular": _near_singular,
-    "internal_instability": _unstable,
+    "not_finite": _not_finite_text,
+    "infeasible": _infeasible_text,
+    "singular": _singular_text,
+    "near_singular": _near_singular_text,
+    "internal_instability": _unstable_text,
 }

@@ -25,7 +25,7 @@ from vsacli.base.flags import Flag, has
 from vsacli.base.variables import VARIABLES, Block, Variable
 from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
-from vsacli.dynamics.dampers import motor_torques
+from vsacli.dynamics.dampers import joints_with_parallel_damper, parallel_damper_torques
 from vsacli.dynamics.elastic_torques import link_constants
 from vsacli.dynamics.inverse import BlockKernel, InverseDynamics, call_at_joints, rows_of_joints
 from vsacli.robot.joint import Joint
@@ -51,36 +51,41 @@ def shaft_error(
         regular: Samples at which values must exist; the error is zero elsewhere.
     """
     errors = [
-        np.where(regular, np.abs(missing) / np.maximum(size, np.finfo(float).tiny), 0.0)
-        for missing, size in _residuals(joint, of_joint, tau_transmission)
+        np.where(regular, np.abs(residual) / np.maximum(size, np.finfo(float).tiny), 0.0)
+        for residual, size in _shaft_residuals(joint, of_joint, tau_transmission)
     ]
     return reduce(np.maximum, errors)
 
 
-def _residuals(joint: Joint, of_joint: JointVariables, tau_transmission: Components) -> Iterator[Residual]:
+def _shaft_residuals(
+    joint: Joint, of_joint: JointVariables, tau_transmission: Components
+) -> Iterator[Residual]:
     for index, motor in enumerate(joint.actuator.motors):
         torque, dtheta, power = (
             rows[index] for rows in (of_joint.tau_motor, of_joint.dtheta, of_joint.motor_power)
         )
         yield _torque_residual(joint, index, of_joint, tau_transmission[index])
-        yield _residual(power, torque * dtheta)
+        yield _balance_residual(power, torque * dtheta)
         if motor.torque_constant is not None:
             electrical = (of_joint.current, of_joint.voltage, of_joint.copper_loss)
             rows = (None if array is None else array[index] for array in electrical)
             yield from _winding_residuals(motor, torque, dtheta, power, *rows)
     if joint.damper is not None:
-        yield _residual(
+        yield _balance_residual(
             of_joint.tau_damper,
-            *(of_joint.damping * velocity for velocity in _damper_velocities(joint, of_joint).values()),
+            *(
+                of_joint.damping * velocity
+                for velocity in _damper_velocity_by_motor(joint, of_joint).values()
+            ),
         )
     if of_joint.dissipated_power is not None:
         lost = (*link_losses(joint, of_joint), *shaft_losses(joint, of_joint))
-        yield _residual(of_joint.dissipated_power, *lost)
+        yield _balance_residual(of_joint.dissipated_power, *lost)
 
 
-def _residual(given: FloatArray, *terms: FloatArray) -> Residual:
-    size = reduce(np.add, [np.abs(term) for term in terms], np.abs(given))
-    return given - reduce(np.add, terms, np.zeros_like(given)), size
+def _balance_residual(computed: FloatArray, *terms: FloatArray) -> Residual:
+    size = reduce(np.add, [np.abs(term) for term in terms], np.abs(computed))
+    return computed - reduce(np.add, terms, np.zeros_like(computed)), size
 
 
 def _torque_residual(
@@ -90,22 +95,22 @@ def _torque_residual(
     motor, dtheta = joint.actuator.motors[index], of_joint.dtheta[index]
     terms = [*_momentum_rates(joint, index, of_joint.ddtheta), tau_transmission]
     terms += [motor.damping * dtheta, *_friction_torques(motor.friction, dtheta)]
-    damped = _damper_velocities(joint, of_joint).get(index)
+    damped = _damper_velocity_by_motor(joint, of_joint).get(index)
     if damped is not None:
         terms.append(of_joint.damping * damped)
-    missing, size = _residual(of_joint.tau_motor[index], *terms)
+    residual, size = _balance_residual(of_joint.tau_motor[index], *terms)
     if joint.actuator.sprung:
         positions = np.abs(of_joint.q) + np.abs(of_joint.theta[index])
         rounding = POSITION_ROUNDING * of_joint.stiffness * positions
-        missing = np.maximum(np.abs(missing) - rounding, 0.0)
-    return missing, size
+        residual = np.maximum(np.abs(residual) - rounding, 0.0)
+    return residual, size
 
 
 def _momentum_rates(joint: Joint, index: int, ddtheta: FloatArray) -> list[FloatArray]:
     """Return row `index` of B theta'', term by term."""
-    own = joint.actuator.motors[index].inertia * ddtheta[index]
+    of_rotor = joint.actuator.motors[index].inertia * ddtheta[index]
     coupling = joint.actuator.coupled_rotors
-    return [own, coupling * ddtheta[1 - index]] if coupling else [own]
+    return [of_rotor, coupling * ddtheta[1 - index]] if coupling else [of_rotor]
 
 
 def _winding_residuals(
@@ -119,13 +124,13 @@ def _winding_residuals(
 ) -> Iterator[Residual]:
     """Yield the balances of the windings: torque of the current, heat R i^2, u i as heat and shaft power."""
     assert motor.torque_constant is not None, "windings without a torque constant have no current"
-    yield _residual(tau_motor, motor.torque_constant * current)
+    yield _balance_residual(tau_motor, motor.torque_constant * current)
     if motor.resistance is None or voltage is None or copper_loss is None:
         return
     heat = motor.resistance * current**2
-    yield _residual(copper_loss, heat)
-    yield _residual(voltage * current, heat, motor_power)
-    yield _residual(voltage, motor.resistance * current, motor.torque_constant * dtheta)
+    yield _balance_residual(copper_loss, heat)
+    yield _balance_residual(voltage * current, heat, motor_power)
+    yield _balance_residual(voltage, motor.resistance * current, motor.torque_constant * dtheta)
 
 
 def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[FloatArray]:
@@ -141,7 +146,7 @@ def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[F
     return [mean * shape, half * np.abs(shape), friction.offset + 0.0 * velocity]
 
 
-def _damper_velocities(joint: Joint, of_joint: JointVariables) -> dict[int | None, FloatArray]:
+def _damper_velocity_by_motor(joint: Joint, of_joint: JointVariables) -> dict[int | None, FloatArray]:
     """Return damper velocities of a joint by the motor that they act on; None for a damper between links."""
     if joint.damper is None:
         return {}
@@ -167,7 +172,7 @@ def shaft_losses(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
         lost.append(motor.damping * dtheta * dtheta)
         lost.extend(torque * dtheta for torque in _friction_torques(motor.friction, dtheta))
     if joint.damper_at("transmission"):
-        velocities = _damper_velocities(joint, of_joint).values()
+        velocities = _damper_velocity_by_motor(joint, of_joint).values()
         lost.extend(of_joint.damping * velocity * velocity for velocity in velocities)
     return lost
 
@@ -185,8 +190,8 @@ def shaft_energy(joint: Joint, of_joint: JointVariables) -> FloatArray:
 def shaft_powers(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
     """Return the powers that change `shaft_energy`: motors, torque on the link, losses; W."""
     motors = len(joint.actuator.motors)
-    taken = [of_joint.tau_e * of_joint.dq, *shaft_losses(joint, of_joint)]
-    return [*of_joint.motor_power[:motors], *(-power for power in taken)]
+    outflows = [of_joint.tau_e * of_joint.dq, *shaft_losses(joint, of_joint)]
+    return [*of_joint.motor_power[:motors], *(-power for power in outflows)]
 
 
 BALANCES = {
@@ -234,7 +239,7 @@ class BalancedDynamics(BlockKernel):
     def results(self) -> RowLayout:
         """Layout of the output rows: those of inverse dynamics, then `BALANCES`."""
         joints = self.dynamics.robot.joints
-        motors, damped = (len(joints), SIDES), (len(damped_joints(joints)),)
+        motors, damped = (len(joints), SIDES), (len(joints_with_parallel_damper(joints)),)
         shapes = dict(zip(BALANCES, (motors, motors, (), (), damped, damped), strict=True))
         return RowLayout({**self.dynamics.results.shapes, **shapes})
 
@@ -245,15 +250,12 @@ class BalancedDynamics(BlockKernel):
         powers, rates = zip(*passed, strict=True)
         by_motor = {"passed_power": rows_of_joints(powers), "passed_rate": rows_of_joints(rates)}
         computed = self.dynamics.rows_of(rows, of_joints)
-        return self.results.pack({**computed, **by_motor, **balances(joints, of_joints)})
+        return self.results.pack({**computed, **by_motor, **balance_errors(joints, of_joints)})
 
 
-def damped_joints(joints: Sequence[Joint]) -> list[int]:
-    """Return the joints with a damper parallel to their springs, by index."""
-    return [index for index, joint in enumerate(joints) if joint.damper_at("transmission")]
-
-
-def balances(joints: Sequence[Joint], of_joints: Sequence[JointVariables]) -> dict[str, list[FloatArray]]:
+def balance_errors(
+    joints: Sequence[Joint], of_joints: Sequence[JointVariables]
+) -> dict[str, list[FloatArray]]:
     """Return the residuals of (14), by the springs' laws at phi, and of the shafts, by name.
 
     They are zero at infeasible and singular samples. Springs are scaled as |sum tau_k - tau_e| / sum |tau_k|
@@ -263,7 +265,7 @@ def balances(joints: Sequence[Joint], of_joints: Sequence[JointVariables]) -> di
     """
     row = of_joints[0].tau_e
     springs, shafts, missing, sizes = [np.zeros_like(row)], [], [], []
-    balanced = call_at_joints(row, _balance, joints, zip(of_joints, strict=True))
+    balanced = call_at_joints(row, _joint_balance_errors, joints, zip(of_joints, strict=True))
     for of_stiffness, of_torque, size, of_shafts in balanced:
         shafts.append(of_shafts)
         if of_stiffness is not None:
@@ -277,7 +279,7 @@ def balances(joints: Sequence[Joint], of_joints: Sequence[JointVariables]) -> di
     return {**largest, "damped_error": missing, "damped_size": sizes}
 
 
-def _balance(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray | None, ...]:
+def _joint_balance_errors(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray | None, ...]:
     """Return the scaled errors of stiffness and torque of the springs, and the error of the shafts.
 
     With a parallel damper the torque error is in N m, and its size is returned, which is None otherwise.
@@ -314,15 +316,15 @@ def passed_power(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, Fl
     (2, samples), NaN where there is no motor.
     """
     dtheta, ddtheta = of_joint.dtheta, of_joint.ddtheta
-    motors = [motor.damping for motor in joint.actuator.motors]
-    damping = np.array([*motors, *[np.nan] * (SIDES - len(motors))])[:, None]
-    torque = damping * dtheta + of_joint.tau_transmission
-    rate = damping * ddtheta
+    dampings = [motor.damping for motor in joint.actuator.motors]
+    motor_damping = np.array([*dampings, *[np.nan] * (SIDES - len(dampings))])[:, None]
+    torque = motor_damping * dtheta + of_joint.tau_transmission
+    rate = motor_damping * ddtheta
     none = np.full_like(of_joint.q, np.nan)
     rate = rate + np.stack([*_transmission_rates(joint.actuator, of_joint), none][:SIDES])
     if joint.damper_at("transmission"):
-        against, its_rate = motor_torques(joint, of_joint)
-        torque, rate = torque + against, rate + its_rate
+        damper_torque, damper_rate = parallel_damper_torques(joint, of_joint)
+        torque, rate = torque + damper_torque, rate + damper_rate
     return torque * dtheta, rate * dtheta + torque * ddtheta
 
 
@@ -334,7 +336,7 @@ def _transmission_rates(actuator: Actuator, of_joint: JointVariables) -> Sequenc
     return actuator.springs_of(of_joint).transmission_rates(rates)
 
 
-class _Moving(NamedTuple):
+class _FrameVelocity(NamedTuple):
     """Motion of a link frame, in components of that frame.
 
     Attributes:
@@ -355,11 +357,11 @@ class _Moving(NamedTuple):
 def link_energy(robot: Robot, block: Block) -> FloatArray:
     """Return the kinetic and potential energy of all links, (samples,), J."""
     energy = np.zeros(len(block.time))
-    for joint, moving in zip(robot.joints, _link_motions(robot, block), strict=True):
+    for joint, frame in zip(robot.joints, _frame_velocities(robot, block), strict=True):
         link = link_constants(joint)
-        velocity = moving.velocity + cross(moving.omega, link.com)
-        turning = moving.omega.dot(link.inertia.times(moving.omega))
-        height = moving.gravity.dot(moving.origin + link.com)
+        velocity = frame.velocity + cross(frame.omega, link.com)
+        turning = frame.omega.dot(link.inertia.times(frame.omega))
+        height = frame.gravity.dot(frame.origin + link.com)
         energy = energy + turning / 2 + link.mass * (velocity.dot(velocity) / 2 - height)
     return energy
 
@@ -380,8 +382,8 @@ def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArra
     return powers if frame is None else [*powers, _wrench_power(robot, block, frame)]
 
 
-def _link_motions(robot: Robot, block: Block) -> Iterator[_Moving]:
-    moving = _Moving(ZERO, ZERO, ZERO, base_gravity(robot), ())
+def _frame_velocities(robot: Robot, block: Block) -> Iterator[_FrameVelocity]:
+    frame = _FrameVelocity(ZERO, ZERO, ZERO, base_gravity(robot), ())
     for joint, q, dq in zip(robot.joints, block.q.T, block.dq.T, strict=True):
         link = link_constants(joint)
         angle, offset = (
@@ -390,21 +392,21 @@ def _link_motions(robot: Robot, block: Block) -> Iterator[_Moving]:
         rotation = Rotation(np.cos(angle), np.sin(angle), link.cos_alpha, link.sin_alpha)
         axis = rotation.undo(Vector(0, 0, 1))
         step = Vector(link.a, 0, 0) + axis * offset
-        omega = rotation.undo(moving.omega) + (axis * dq if joint.is_revolute else ZERO)
+        omega = rotation.undo(frame.omega) + (axis * dq if joint.is_revolute else ZERO)
         slide = ZERO if joint.is_revolute else axis * dq
-        moving = _Moving(
-            origin=rotation.undo(moving.origin) + step,
-            velocity=rotation.undo(moving.velocity) + cross(omega, step) + slide,
+        frame = _FrameVelocity(
+            origin=rotation.undo(frame.origin) + step,
+            velocity=rotation.undo(frame.velocity) + cross(omega, step) + slide,
             omega=omega,
-            gravity=rotation.undo(moving.gravity),
-            rotations=(*moving.rotations, rotation),
+            gravity=rotation.undo(frame.gravity),
+            rotations=(*frame.rotations, rotation),
         )
-        yield moving
+        yield frame
 
 
 def _wrench_power(robot: Robot, block: Block, frame: str) -> FloatArray:
     """Return the power of the wrench on the end effector."""
-    *_, last = _link_motions(robot, block)
+    *_, last = _frame_velocities(robot, block)
     force, moment = Vector(*block.wrench.T[:3]), Vector(*block.wrench.T[3:])
     velocity = last.velocity + cross(last.omega, Vector(*robot.tool.xyz))
     if frame == "end_effector":

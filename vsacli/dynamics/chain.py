@@ -19,7 +19,7 @@ class LinkConstants(NamedTuple):
         mass: Mass of the augmented link.
         com: Center of mass, in the link frame.
         inertia: Inertia tensor about the center of mass, link axes.
-        damping: Viscous damping D of the joint.
+        viscous_damping: Viscous damping D of the joint, in (58)-(60).
     """
 
     revolute: bool
@@ -29,7 +29,7 @@ class LinkConstants(NamedTuple):
     mass: Scalar
     com: Vector
     inertia: SymmetricTensor
-    damping: Scalar
+    viscous_damping: Scalar
 
 
 class TorqueDerivatives(NamedTuple):
@@ -66,7 +66,7 @@ class TipLoad(NamedTuple):
     in_base: bool
 
 
-class Chain(NamedTuple):
+class RecursionInputs(NamedTuple):
     """A whole chain, base to tip.
 
     Attributes:

@@ -22,6 +22,11 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
 
+def joints_with_parallel_damper(joints: Sequence[Joint]) -> list[int]:
+    """Return the joints with a damper parallel to their springs, by index."""
+    return [index for index, joint in enumerate(joints) if joint.damper_at("transmission")]
+
+
 def damper_torque(damping: Sequence[Scalar], rates: Sequence[Scalar]) -> TorqueDerivatives:
     """Return the torque d v of a damper and its first two derivatives.
 
@@ -44,23 +49,23 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
     return [rate for rate, there in zip(dphi, joint.actuator.has(VARIABLES["phi"]), strict=True) if there]
 
 
-def motor_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
+def parallel_damper_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
     """Return the torque of a parallel damper on the motors of a joint, and its rate, each (2, samples)."""
-    damping, d_damping, dphi, ddtheta = (
+    damping, ddamping, dphi, ddtheta = (
         of_joint.damping,
         of_joint.ddamping,
         of_joint.dphi,
         of_joint.ddtheta,
     )
     torque, rate = np.zeros_like(dphi), np.zeros_like(dphi)
-    for motor, there in enumerate(joint.actuator.has(VARIABLES["phi"])):
-        if there:
+    for motor, has_spring in enumerate(joint.actuator.has(VARIABLES["phi"])):
+        if has_spring:
             torque[motor] = damping * dphi[motor]
-            rate[motor] = d_damping * dphi[motor] + damping * (ddtheta[motor] - of_joint.ddq)
+            rate[motor] = ddamping * dphi[motor] + damping * (ddtheta[motor] - of_joint.ddq)
     return torque, rate
 
 
-class Passed(NamedTuple):
+class ParallelDamperTorques(NamedTuple):
     """Torques of parallel dampers on the links, (..., joints), and against sprung motors, (..., springs)."""
 
     links: Scalar
@@ -73,10 +78,10 @@ class Dampers:
     def __init__(self, robot: Robot, drivetrain: Drivetrain) -> None:
         locations = [joint.damper and joint.damper.location for joint in robot.joints]
         self._between_links = np.array([location == "link" for location in locations])
-        beside = np.array([location == "transmission" for location in locations])
+        parallel = np.array([location == "transmission" for location in locations])
         behind_spring = drivetrain.of_motors(drivetrain.deflected)[drivetrain.sprung]
         self._joint = drivetrain.spring_joint
-        self._beside = behind_spring & beside[self._joint]
+        self._parallel = behind_spring & parallel[self._joint]
         self._absent = np.array([location is None for location in locations])
         self._share = np.equal.outer(self._joint, np.arange(len(locations))).astype(np.float64)
 
@@ -89,13 +94,15 @@ class Dampers:
         d, d_d, dd_d = (np.where(self._between_links, commanded[name], 0.0) for name in DAMPING.names)
         return damper_torque((d, d_d, dd_d), (dq, ddq, d3q))
 
-    def passed(self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray) -> Passed:
+    def parallel(
+        self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray
+    ) -> ParallelDamperTorques:
         """Return the torques of dampers parallel to springs, from velocities of joints and sprung motors."""
-        if not self._beside.any():
-            return Passed(0, 0)
-        damping = np.where(self._beside, commanded[DAMPING.key][..., self._joint], 0.0)
+        if not self._parallel.any():
+            return ParallelDamperTorques(0, 0)
+        damping = np.where(self._parallel, commanded[DAMPING.key][..., self._joint], 0.0)
         motors: FloatArray = damping * (dtheta - dq[..., self._joint])
-        return Passed(motors @ self._share, motors)
+        return ParallelDamperTorques(motors @ self._share, motors)
 
     def variables(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray
@@ -104,5 +111,5 @@ class Dampers:
         if self._absent.all():
             return {}
         damping = commanded[DAMPING.key]
-        torque = add(self.of_links(commanded, dq).tau, self.passed(commanded, dq, dtheta).links)
+        torque = add(self.of_links(commanded, dq).tau, self.parallel(commanded, dq, dtheta).links)
         return {"damping": damping, "tau_damper": np.where(self._absent, np.nan, torque)}

@@ -60,9 +60,9 @@ def drive(
         samples all motor variables are NaN; at singular samples those that need the inverse of the decoupling
         matrix. A motor that the actuator does not have is NaN throughout.
     """
-    driven = driven_by(joint, command, min_margin, deflections)
+    driven = driven_by(joint, command, min_margin, deflections)  # (61)-(74)
     exceeded = limit_flags(joint, driven.by_name(), np.zeros_like(driven.flags))
-    unexplained = not_finite_flags(_not_finite(joint, driven))
+    unexplained = not_finite_flags(_motors_not_finite(joint, driven))
     return driven._replace(flags=driven.flags | exceeded | unexplained)
 
 
@@ -77,25 +77,32 @@ def driven_by(
     if isinstance(deflections, InternalMotion):
         from vsacli.actuators.damped_springs import DampedSprings
 
-        moved = DampedSprings(actuator).transmit(command, deflections, min_margin)
+        transmitted = DampedSprings(actuator).transmit(command, deflections, min_margin)
     else:
-        moved = actuator.transmit(command, min_margin, deflections)  # (61)-(72)
-    tau_motor = motor_torques(actuator, moved.dtheta, moved.ddtheta, moved.tau_transmission)
-    tau_damper, beside = _damper_torques(joint, command, moved.dphi)
-    if beside is not None:
-        tau_motor = tau_motor + beside
+        transmitted = actuator.transmit(command, min_margin, deflections)  # (61)-(72)
+    tau_motor = shaft_torques(actuator, transmitted.dtheta, transmitted.ddtheta, transmitted.tau_transmission)
+    tau_damper, on_motors = _damper_torques(joint, command, transmitted.dphi)
+    if on_motors is not None:
+        tau_motor = tau_motor + on_motors
     windings = Windings.of(actuator.sides)
-    electrical = {} if windings is None else windings.with_axis_behind().variables(tau_motor, moved.dtheta)
-    driven = moved._replace(tau_motor=tau_motor, motor_power=tau_motor * moved.dtheta, **electrical)
+    electrical = (
+        {} if windings is None else windings.with_axis_behind().variables(tau_motor, transmitted.dtheta)
+    )
+    driven = transmitted._replace(
+        tau_motor=tau_motor, motor_power=tau_motor * transmitted.dtheta, **electrical
+    )
     return driven if tau_damper is None else driven._replace(tau_damper=tau_damper)
 
 
-def motor_torques(
+def shaft_torques(
     actuator: Actuator, dtheta: FloatArray, ddtheta: FloatArray, tau_transmission: FloatArray
 ) -> FloatArray:
-    """Compute motor torques from motion and spring torques, (73)-(74) with friction; all (2, samples)."""
-    damping = _by_motor([motor.damping for motor in actuator.motors])
-    torques = _rotor_torques(actuator, ddtheta) + damping * dtheta + tau_transmission
+    """Compute motor torques from motion and spring torques, (73)-(74) with friction; all (2, samples).
+
+    The paper's B_k is `motor.inertia`, D_mk `motor.damping`, tau_ek `tau_transmission`, tau_k the result.
+    """
+    motor_damping = _by_motor([motor.damping for motor in actuator.motors])
+    torques = _rotor_torques(actuator, ddtheta) + motor_damping * dtheta + tau_transmission  # (73)-(74)
     friction = FrictionLaws.of([side.friction if side else None for side in actuator.sides])
     if friction is not None:
         torques = torques + friction.with_axis_behind().torque(dtheta)
@@ -111,19 +118,21 @@ def _damper_torques(
     damping = command.commanded[DAMPING.key]
     if joint.damper_at("link"):
         return damping * command.dq, None
-    behind = joint.actuator.has(VARIABLES["phi"])
-    passed = [damping * rate if there else 0 * damping for rate, there in zip(dphi, behind, strict=True)]
-    return passed[0] + passed[1], np.stack(passed)
+    has_spring = joint.actuator.has(VARIABLES["phi"])
+    on_motors = [
+        damping * rate if sprung else 0 * damping for rate, sprung in zip(dphi, has_spring, strict=True)
+    ]
+    return on_motors[0] + on_motors[1], np.stack(on_motors)
 
 
 def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
     """Return B theta'', (2, samples), with the coupling B_12 of the rotors."""
-    own = _by_motor([motor.inertia for motor in actuator.motors]) * ddtheta
+    uncoupled = _by_motor([motor.inertia for motor in actuator.motors]) * ddtheta
     coupling = actuator.coupled_rotors
-    return own + coupling * ddtheta[::-1] if coupling else own
+    return uncoupled + coupling * ddtheta[::-1] if coupling else uncoupled
 
 
-def _not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
+def _motors_not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
     """Return where a motor variable is not finite although the sample is neither infeasible nor singular.
 
     Samples with a demand that is not finite count, too.

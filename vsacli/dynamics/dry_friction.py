@@ -49,7 +49,7 @@ class Response(NamedTuple):
     friction: FloatArray | None
 
 
-Balance = Callable[[FloatArray, BoolArray | None], tuple[FloatArray, FloatArray, FloatArray]]
+AccelerationLaw = Callable[[FloatArray, BoolArray | None], tuple[FloatArray, FloatArray, FloatArray]]
 """Function from the torques of all motors, (..., motors), and a mask of held motors (None if none can be
 held) to accelerations of joints and of sprung motors, and to holding torques, (..., motors), 0 for others."""
 
@@ -59,7 +59,7 @@ def response_with_friction(
     torque: FloatArray,
     velocity: FloatArray,
     slip: FloatArray | None,
-    balance: Balance,
+    accelerate: AccelerationLaw,
 ) -> Response:
     """Return the accelerations under motor torques and dry friction.
 
@@ -69,22 +69,22 @@ def response_with_friction(
         velocity: Velocities of all motors, (..., motors).
         slip: Direction in which each motor with sharp friction slides, 0 while it is held, (motors,). If
             None, a motor at rest is held as long as its friction suffices.
-        balance: Equations of motion without friction.
+        accelerate: Equations of motion without friction.
     """
 
     def under(direction: FloatArray) -> tuple[Response, FloatArray]:
         friction = laws.torque(velocity, direction)
-        ddq, ddtheta, holding = balance(torque - friction, laws.sharp & (direction == 0))
+        ddq, ddtheta, holding = accelerate(torque - friction, laws.sharp & (direction == 0))
         return Response(ddq, ddtheta, friction + holding), laws.beyond(friction + holding)
 
     if not laws.sharp.any():
         friction = laws.torque(velocity)
-        ddq, ddtheta, _ = balance(torque - friction, None)
+        ddq, ddtheta, _ = accelerate(torque - friction, None)
         return Response(ddq, ddtheta, friction)
     if slip is not None:
         return under(np.broadcast_to(slip, velocity.shape))[0]
     direction = direction_of(velocity)
-    found, beyond = under(direction)
+    response, beyond = under(direction)
     # A motor at rest whose holding torque exceeds its friction begins to slide in that direction.
     released = np.where(direction == 0, beyond, 0.0)
-    return under(direction + released)[0] if released.any() else found
+    return under(direction + released)[0] if released.any() else response

@@ -29,7 +29,7 @@ from vsacli.compute.vector import (
     exact,
     trigonometric,
 )
-from vsacli.dynamics.chain import Chain, JointState, LinkConstants, TipLoad, TorqueDerivatives
+from vsacli.dynamics.chain import JointState, LinkConstants, RecursionInputs, TipLoad, TorqueDerivatives
 from vsacli.dynamics.dampers import damper_torque
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.dynamics.recursion import recursion
@@ -57,7 +57,7 @@ def link_constants(joint: Joint) -> LinkConstants:
         inertia=SymmetricTensor(
             *map(exact, (inertia.xx, inertia.yy, inertia.zz, inertia.xy, inertia.xz, inertia.yz))
         ),
-        damping=exact(joint.damping),
+        viscous_damping=exact(joint.damping),
     )
 
 
@@ -110,23 +110,23 @@ class LinkTorques(RowKernel):
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(60)."""
-        torques = recursion(*self.chain(rows))
+        torques = recursion(*self.recursion_inputs(rows))  # (36)-(60)
         return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
 
-    def chain(self, rows: Sequence[Scalar]) -> Chain:
+    def recursion_inputs(self, rows: Sequence[Scalar]) -> RecursionInputs:
         """Return the inputs of the recursion from rows in the layout of `arguments`."""
-        given, joints = self.arguments.unpack(rows), self.robot.joints
-        none = [0] * len(joints)
-        dampings = zip(*(given.get(name, none) for name in DAMPING.names), strict=True)
+        inputs, joints = self.arguments.unpack(rows), self.robot.joints
+        zeros = [0] * len(joints)
+        dampings = zip(*(inputs.get(name, zeros) for name in DAMPING.names), strict=True)
         states = [
-            call(q, _state_of(joint), q, (dq, ddq, d3q, d4q), damping)
+            call(q, _keyed_joint_state(joint), q, (dq, ddq, d3q, d4q), damping)
             for joint, damping, q, dq, ddq, d3q, d4q in zip(
-                joints, dampings, *(given[name] for name in POSITION.names), strict=True
+                joints, dampings, *(inputs[name] for name in POSITION.names), strict=True
             )
         ]
-        wrench = [given[name] for name in WRENCH_NAMES if name in given]
+        wrench = [inputs[name] for name in WRENCH_NAMES if name in inputs]
         tip = None if self.frame is None else tip_load(self.robot, self.frame, wrench)
-        return Chain(self._links, states, self._gravity, tip)
+        return RecursionInputs(self._links, states, self._gravity, tip)
 
     @cached_property
     def _links(self) -> list[LinkConstants]:
@@ -194,30 +194,34 @@ def link_torques(
     check_robot(robot)
     if wrench is not None:
         check_wrench(wrench)
-    given = _given(robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True)))
-    shape = given[0].shape
-    motion = list(map(_rows, given))
+    motion_arrays = _check_motion_arrays(
+        robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True))
+    )
+    shape = motion_arrays[0].shape
+    motion = list(map(_rows_over_samples, motion_arrays))
     motion += [np.zeros_like(motion[0])] * (len(POSITION.names) - len(motion))
 
-    kernel = _kernel(robot, None if wrench is None else wrench.frame)
+    kernel = _recursion_kernel(robot, None if wrench is None else wrench.frame)
     damped = DAMPING.key in kernel.arguments.shapes
     dampings = _damping_rows(robot, shape, (damping, ddamping, dddamping)) if damped else ()
-    every = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
+    inputs = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
     chosen = engine_of_call(engine, kernel, motion[0].shape[1])
-    rows: Any = np.concatenate(every) if chosen is NUMBERS else [row for each in every for row in each]
+    rows: Any = np.concatenate(inputs) if chosen is NUMBERS else [row for each in inputs for row in each]
     computed = kernel.results.arrays(chosen.run(kernel, rows))
     tau_e, dtau_e, ddtau_e = (computed[name].T.reshape(shape) for name in TORQUES)
-    return ElasticTorques(tau_e, dtau_e if len(given) > 3 else None, ddtau_e if len(given) > 4 else None)
+    return ElasticTorques(
+        tau_e, dtau_e if len(motion_arrays) > 3 else None, ddtau_e if len(motion_arrays) > 4 else None
+    )
 
 
 @lru_cache(KEPT_PROGRAMS)
-def _kernel(robot: Robot, frame: str | None) -> LinkTorques:
+def _recursion_kernel(robot: Robot, frame: str | None) -> LinkTorques:
     return LinkTorques(robot, frame)
 
 
-def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
+def _check_motion_arrays(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
     """Return the given arrays, checked: of one shape, without a missing derivative before the last."""
-    given = [
+    arrays = [
         checked_shape(name, array, len(robot.joints)) for name, array in motion.items() if array is not None
     ]
     names = [name for name, array in motion.items() if array is not None]
@@ -227,27 +231,27 @@ def _given(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatAr
             f"{names[-1]} is given without {' and '.join(missing)}; give q alone if the robot holds still, "
             "else q, dq and ddq, then d3q for dtau_e, then d4q for ddtau_e"
         )
-    if any(array.shape != given[0].shape for array in given):
-        shapes = ", ".join(str(array.shape) for array in given)
+    if any(array.shape != arrays[0].shape for array in arrays):
+        shapes = ", ".join(str(array.shape) for array in arrays)
         raise InputError.one(f"{', '.join(names)} must have one shape, not {shapes}")
-    return given
+    return arrays
 
 
-def _rows(array: FloatArray) -> FloatArray:
+def _rows_over_samples(array: FloatArray) -> FloatArray:
     """Return the rows of an array of one sample, (n,), or over time, (samples, n)."""
     return array[:, None] if array.ndim == 1 else by_joint(array)
 
 
 def _damping_rows(
-    robot: Robot, shape: tuple[int, ...], given: Sequence[ArrayLike | None]
+    robot: Robot, shape: tuple[int, ...], dampings: Sequence[ArrayLike | None]
 ) -> Iterator[FloatArray]:
     """Yield the damping and its derivatives of a robot with dampers between the links."""
     least = np.array([joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints])
-    for name, array, default in zip(DAMPING.names, given, (least, 0 * least, 0 * least), strict=True):
+    for name, array, default in zip(DAMPING.names, dampings, (least, 0 * least, 0 * least), strict=True):
         values = np.broadcast_to(default, shape) if array is None else np.asarray(array, dtype=np.float64)
         if values.shape != shape:
             raise InputError.one(f"{name} must have the shape {shape} of q, not {values.shape}")
-        yield _rows(values)
+        yield _rows_over_samples(values)
 
 
 def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[FloatArray]:
@@ -258,10 +262,10 @@ def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[Fl
         array, expected = getattr(wrench, name), (*samples, len(WRENCH_AXES))
         if (shape := np.shape(array)) != expected:
             raise InputError.one(f"{name} must have the shape {expected}, not {shape}")
-        yield _rows(np.asarray(array, dtype=np.float64))
+        yield _rows_over_samples(np.asarray(array, dtype=np.float64))
 
 
-def _state_of(joint: Joint) -> Keyed:
+def _keyed_joint_state(joint: Joint) -> Keyed:
     return Keyed((joint.type, joint.dh, joint.friction, joint.damper), partial(joint_state, joint))
 
 
@@ -269,7 +273,7 @@ def joint_state(
     joint: Joint,
     q: Scalar,
     rates: tuple[Scalar, Scalar, Scalar, Scalar],
-    damping: tuple[Scalar, Scalar, Scalar] = (0, 0, 0),
+    damper_damping: tuple[Scalar, Scalar, Scalar] = (0, 0, 0),
 ) -> JointState:
     """Return the pose and motion of a joint for the recursion.
 
@@ -277,10 +281,10 @@ def joint_state(
         joint: Joint.
         q: Position of the joint.
         rates: First to fourth derivative of q.
-        damping: Damping of a damper between the links, with two derivatives; ignored otherwise.
+        damper_damping: Damping of a damper between the links, with two derivatives; ignored otherwise.
     """
     dh = joint.dh
-    resistance = link_resistance(joint, rates, damping)
+    resistance = link_resistance(joint, rates, damper_damping)
     if joint.is_revolute:
         angle = q + dh.theta
         return JointState(np.cos(angle), np.sin(angle), exact(dh.d), rates, resistance)
@@ -288,12 +292,14 @@ def joint_state(
     return JointState(cos, sin, q + dh.d, rates, resistance)
 
 
-def link_resistance(joint: Joint, rates: Sequence[Scalar], damping: Sequence[Scalar]) -> TorqueDerivatives:
+def link_resistance(
+    joint: Joint, rates: Sequence[Scalar], damper_damping: Sequence[Scalar]
+) -> TorqueDerivatives:
     """Return the torque of dry friction and of a damper between the links; arguments as for `joint_state`."""
     friction = joint_friction(joint.friction, rates)
     if not joint.damper_at("link"):
         return friction
-    return TorqueDerivatives(*map(add, damper_torque(damping, rates[:3]), friction))
+    return TorqueDerivatives(*map(add, damper_torque(damper_damping, rates[:3]), friction))
 
 
 def link_damped(robot: Robot) -> bool:

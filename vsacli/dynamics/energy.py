@@ -21,7 +21,7 @@ from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.control_flow import call
 from vsacli.compute.engine import Engine
 from vsacli.compute.rows import RowKernel, RowLayout
-from vsacli.dynamics.losses import LossMeter, Lost, integral, positive_work, work_on_each_other
+from vsacli.dynamics.losses import LossMeter, LostEnergy, integral, positive_work, work_on_each_other
 from vsacli.robot.model import Robot
 
 
@@ -143,30 +143,30 @@ class EnergyMeter:
 
     def report(self, robot: Robot) -> list[JointEnergy]:
         """Return the energy of each joint of a robot; at least one flow must have been added."""
-        there = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
+        has_motor = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
         totals = self._layout.arrays(np.asarray(self._totals))
-        work, spent = (np.sum(total, axis=1, where=there) for total in (self._work, totals["spent"]))
+        work, spent = (np.sum(total, axis=1, where=has_motor) for total in (self._work, totals["spent"]))
         duration = float(totals["intervals"])
         shared = [joint.actuator.co_contracts for joint in robot.joints]
         efforts = [
             np.where(shared, _mean_root(totals[name], duration), np.nan)
             for name in ("co_contraction", "load")
         ]
-        found = np.array((self._peak, spent, spent - work, *efforts))
-        lost = zip(_dissipated(robot, totals), _copper(robot, totals), strict=True)
+        energies = np.array((self._peak, spent, spent - work, *efforts))
+        lost = zip(_dissipated_energies(robot, totals), _copper_losses(robot, totals), strict=True)
         return [
             replace(JointEnergy(*each), dissipated=dissipated, copper_loss=copper_loss)
-            for each, (dissipated, copper_loss) in zip(found.T.tolist(), lost, strict=True)
+            for each, (dissipated, copper_loss) in zip(energies.T.tolist(), lost, strict=True)
         ]
 
 
-def _dissipated(robot: Robot, totals: Mapping[str, FloatArray]) -> list[float | None]:
+def _dissipated_energies(robot: Robot, totals: Mapping[str, FloatArray]) -> list[float | None]:
     if not robot.has(VARIABLES["dissipated_power"]):
         return [None] * len(robot.joints)
     return list(map(float, totals["dissipated"]))
 
 
-def _copper(robot: Robot, totals: Mapping[str, FloatArray]) -> Iterator[float | None]:
+def _copper_losses(robot: Robot, totals: Mapping[str, FloatArray]) -> Iterator[float | None]:
     for index, joint in enumerate(robot.joints):
         heated = joint.has(VARIABLES["copper_loss"])
         yield float(np.sum(totals["copper"][index, heated])) if any(heated) else None
@@ -219,15 +219,15 @@ class IntervalEnergy(RowKernel):
 
     def __call__(self, rows: Sequence[Any]) -> list[Any]:
         """Compute the energy joint by joint."""
-        given = self.arguments.unpack(rows)
-        (interval,) = given["interval"]
-        friction = _by_joint(given["friction"]) if self.rubbing else [None] * len(self.inertia)
-        every = [{name: _at_end(given[name], end) for name in self.at_steps} for end in range(2)]
-        found = []
+        inputs = self.arguments.unpack(rows)
+        (interval,) = inputs["interval"]
+        friction = _motor_pairs(inputs["friction"]) if self.rubbing else [None] * len(self.inertia)
+        both_ends = [{name: _rows_at_end(inputs[name], end) for name in self.at_steps} for end in range(2)]
+        flows = []
         for joint, constants in enumerate(zip(self.inertia, self.coupling, strict=True)):
-            ends = [{name: of_joints[joint] for name, of_joints in end.items()} for end in every]
-            found.append(call(interval, _joint_flow, *constants, interval, ends, friction[joint]))
-        works, spent, of_springs = zip(*found, strict=True)
+            ends = [{name: of_joints[joint] for name, of_joints in end.items()} for end in both_ends]
+            flows.append(call(interval, _joint_flow, *constants, interval, ends, friction[joint]))
+        works, spent, of_springs = zip(*flows, strict=True)
         kinds = works, spent, zip(*of_springs, strict=True)
         return [row for kind in kinds for part in kind for row in part]
 
@@ -256,13 +256,13 @@ def _joint_flow(
     return works, spent, efforts(interval, *(end["tau_transmission"] for end in ends))
 
 
-def _by_joint(rows: Sequence[Any]) -> list[Sequence[Any]]:
+def _motor_pairs(rows: Sequence[Any]) -> list[Sequence[Any]]:
     return [rows[first : first + SIDES] for first in range(0, len(rows), SIDES)]
 
 
-def _at_end(rows: Sequence[Any], end: int) -> list[Sequence[Any]]:
+def _rows_at_end(rows: Sequence[Any], end: int) -> list[Sequence[Any]]:
     half = len(rows) // 2
-    return _by_joint(rows[end * half : (end + 1) * half])
+    return _motor_pairs(rows[end * half : (end + 1) * half])
 
 
 class RunEnergy:
@@ -290,25 +290,25 @@ class RunEnergy:
         """Add a block of `BalancedDynamics`; return `motor_energy` at its samples, (samples, joints, 2)."""
         steps = {name: contiguous_rows(getattr(block, name)) for name in ("time", *self._kernel.at_steps)}
         lost = None if self._losses is None else self._losses.add(block)
-        first = _every(steps, slice(1))
+        first = _select_samples(steps, slice(1))
         before = self._last or first
         # Copies, since views would keep the whole block in memory.
         self._last = {name: [row[-1:].copy() for row in rows] for name, rows in steps.items()}
         self._meter.add_stored(np.moveaxis(block.elastic_energy, 0, -1))
-        works = [self._flown(before, first, lost and lost.taken(slice(1)))]
+        works = [self._add_flow(before, first, lost and lost.during(slice(1)))]
         if len(block.time) > 1:
-            earlier, later = _every(steps, slice(-1)), _every(steps, slice(1, None))
-            works.append(self._flown(earlier, later, lost and lost.taken(slice(1, None))))
+            earlier, later = _select_samples(steps, slice(-1)), _select_samples(steps, slice(1, None))
+            works.append(self._add_flow(earlier, later, lost and lost.during(slice(1, None))))
         return over_time(np.concatenate(works, axis=-1))
 
-    def _flown(self, before: _Steps, after: _Steps, lost: Lost | None) -> FloatArray:
+    def _add_flow(self, before: _Steps, after: _Steps, lost: LostEnergy | None) -> FloatArray:
         """Add the flow from samples to the next ones; return the work of motors until these."""
         interval = after["time"][0] - before["time"][0]
         rows = {name: [*before[name], *after[name]] for name in self._kernel.at_steps}
         if lost is not None:
             rows["friction"] = contiguous_rows(over_time(lost.motor_friction))
-        given = self._kernel.arguments.pack({"interval": [interval], **rows})
-        flow = Flow(interval, **self._kernel.results.arrays(self._engine.run(self._kernel, given)))
+        inputs = self._kernel.arguments.pack({"interval": [interval], **rows})
+        flow = Flow(interval, **self._kernel.results.arrays(self._engine.run(self._kernel, inputs)))
         if lost is not None:
             flow = flow._replace(dissipated=lost.dissipated, copper=lost.copper)
         return self._meter.add(flow)
@@ -322,5 +322,5 @@ _Steps = Mapping[str, Sequence[FloatArray]]
 """Rows (samples,) of variables at consecutive samples, by name."""
 
 
-def _every(steps: _Steps, part: slice) -> dict[str, list[FloatArray]]:
+def _select_samples(steps: _Steps, part: slice) -> dict[str, list[FloatArray]]:
     return {name: [row[part] for row in rows] for name, rows in steps.items()}

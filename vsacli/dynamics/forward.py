@@ -19,7 +19,7 @@ from vsacli.compute.engine import KEPT_PROGRAMS
 from vsacli.compute.vector import add
 from vsacli.dynamics.dampers import Dampers
 from vsacli.dynamics.dry_friction import Response, response_with_friction
-from vsacli.dynamics.rigid_body import chain_of
+from vsacli.dynamics.rigid_body import link_dynamics
 from vsacli.robot.model import Robot, check_robot
 
 
@@ -60,7 +60,7 @@ def mass_matrix(robot: Robot, q: npt.ArrayLike) -> FloatArray:
         TypeError: Robot is of another type.
     """
     check_robot(robot)
-    return chain_of(robot).mass_matrix(checked_shape("q", q, len(robot.joints)))
+    return link_dynamics(robot).mass_matrix(checked_shape("q", q, len(robot.joints)))
 
 
 def state_derivative(
@@ -123,12 +123,12 @@ class Plant:
 
     def __init__(self, robot: Robot, frame: str | None = None) -> None:
         self.drivetrain = Drivetrain(robot.actuators)
-        self.chain = chain_of(robot, frame)
+        self.chain = link_dynamics(robot, frame)
         self.dampers = Dampers(robot, self.drivetrain)
         self._rigid_inertia = self.drivetrain.direct(self.drivetrain.inertia)
         self._rigid_matrix = np.diag(self._rigid_inertia)
         self._rigid_damping = self.drivetrain.direct(self.drivetrain.damping)
-        self._damping = self.drivetrain.damping[self.drivetrain.sprung]
+        self._sprung_damping = self.drivetrain.damping[self.drivetrain.sprung]
 
     def unpacked(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return q, q' of the joints and theta, theta' of the motors with springs.
@@ -176,34 +176,36 @@ class Plant:
                 If None, a motor at rest is held as long as its friction suffices.
         """
         tau_e, spring = self.drivetrain.torques(q, theta)
-        damper = self.dampers.passed(commanded, dq, dtheta)
+        damper = self.dampers.parallel(commanded, dq, dtheta)
         resistance = add(self.chain.bias(q, dq, wrench), self.dampers.of_links(commanded, dq).tau)
         matrix = self.chain.mass_matrix(q) + self._rigid_matrix
         laws, velocity = self.drivetrain.friction, self.drivetrain.of_all(dq, dtheta)
 
-        def balance(given: FloatArray, held: BoolArray | None) -> tuple[FloatArray, FloatArray, FloatArray]:
-            drive = add(tau_e, damper.links) + self.drivetrain.direct(given)
-            on_joints = drive - resistance - self._rigid_damping * dq
-            left = given[..., self.drivetrain.sprung] - self._damping * dtheta
-            on_motors = left - add(spring, damper.motors)
-            return self._balanced(matrix, on_joints, on_motors, held)
+        def accelerate(
+            torque: FloatArray, held: BoolArray | None
+        ) -> tuple[FloatArray, FloatArray, FloatArray]:
+            drive = add(tau_e, damper.links) + self.drivetrain.direct(torque)
+            on_joints = drive - resistance - self._rigid_damping * dq  # (5a)
+            left = torque[..., self.drivetrain.sprung] - self._sprung_damping * dtheta
+            on_motors = left - add(spring, damper.motors)  # (5b), (5c)
+            return self._solve_accelerations(matrix, on_joints, on_motors, held)
 
         if laws is None:
-            ddq, ddtheta, _ = balance(torque, None)
+            ddq, ddtheta, _ = accelerate(torque, None)
             return Response(ddq, ddtheta, None)
-        return response_with_friction(laws, torque, velocity, slip, balance)
+        return response_with_friction(laws, torque, velocity, slip, accelerate)
 
-    def _balanced(
+    def _solve_accelerations(
         self, matrix: FloatArray, on_joints: FloatArray, on_motors: FloatArray, held: BoolArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the accelerations under torques on joints and on motors with springs; see `Balance`."""
+        """Return accelerations under torques on joints and on motors with springs; see `AccelerationLaw`."""
         rotors = self.drivetrain.rotors
         if held is None or not held.any():
             still = np.zeros((*on_motors.shape[:-1], len(self.drivetrain.joint)))
             return self.chain.solve(matrix, on_joints), rotors.accelerations(on_motors), still
         held_joints = self.drivetrain.direct(held.astype(np.float64)) > 0
-        apart = held_joints[..., :, None] | held_joints[..., None, :]
-        free = np.where(apart, np.eye(on_joints.shape[-1]), matrix)
+        decoupled = held_joints[..., :, None] | held_joints[..., None, :]
+        free = np.where(decoupled, np.eye(on_joints.shape[-1]), matrix)
         ddq = self.chain.solve(free, np.where(held_joints, 0.0, on_joints))
         holding_joints = on_joints - (matrix @ ddq[..., None])[..., 0]
         ddtheta, holding_motors = rotors.held(on_motors, held[..., self.drivetrain.sprung])
@@ -221,5 +223,5 @@ class Plant:
             tau_e: Torques of the springs, (..., joints), 0 where there are none.
             torque: Torques of all motors minus their dry friction, (..., motors).
         """
-        of_rotors = self._rigid_inertia * ddq + self._rigid_damping * dq
-        return tau_e + self.drivetrain.direct(torque) - of_rotors
+        rotor_torque = self._rigid_inertia * ddq + self._rigid_damping * dq
+        return tau_e + self.drivetrain.direct(torque) - rotor_torque

@@ -21,7 +21,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.signals import STIFFNESS
-from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
+from vsacli.dynamics.inverse import DeflectionStop, command_of, link_torques_along
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -44,7 +44,7 @@ def integrable(joint: Joint) -> bool:
     return STIFFNESS.key in joint.actuator.commanded and joint.damper_at("transmission") is None
 
 
-class Task:
+class DeflectionEquation:
     """A robot and its commanded motion; deflections are (joints, 2, samples).
 
     Attributes:
@@ -63,7 +63,10 @@ class Task:
     def roots(self, joints: tuple[int, ...], time: FloatArray) -> FloatArray:
         """Return the roots of (14) of some joints."""
         return np.stack(
-            [_root(actuator, command).deflections for actuator, command in self._commands(joints, time)]
+            [
+                _deflection_root(actuator, command).deflections
+                for actuator, command in self._commands(joints, time)
+            ]
         )
 
     def rates(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> FloatArray:
@@ -87,12 +90,12 @@ class Task:
     def _commands(self, joints: tuple[int, ...], time: FloatArray) -> Iterator[tuple[Actuator, Command]]:
         """Yield the commands of some joints, from one pass of the recursion."""
         motion = self.trajectory.at(time)
-        commanded = {**motion.variables(), **elastic_torques(self._robot, motion)}
+        commanded = {**motion.variables(), **link_torques_along(self._robot, motion)}
         for joint in joints:
             yield self._actuators[joint], command_of(joint, commanded)
 
 
-def _root(actuator: Actuator, command: Command) -> PairSolution:
+def _deflection_root(actuator: Actuator, command: Command) -> PairSolution:
     return actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
 
 
@@ -103,12 +106,12 @@ def _rates_of_unknowns(actuator: Actuator, command: Command, phi: FloatArray) ->
 
 def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
     """Return indices into `REASONS`; also singular where det A has another sign than on the branch."""
-    solution = _root(actuator, command)
+    solution = _deflection_root(actuator, command)
     flags = reach_flags(command.commanded["stiffness"], solution)
-    here, on_branch = (
+    at_phi, on_branch = (
         np.sign(actuator.springs(each, command.q).determinant) for each in (phi, solution.deflections)
     )
-    singular = has(flags, Flag.SINGULAR) | (here != on_branch)
+    singular = has(flags, Flag.SINGULAR) | (at_phi != on_branch)
     return np.where(has(flags, Flag.INFEASIBLE), UNATTAINABLE, np.where(singular, SINGULAR, FOLLOWED))
 
 
@@ -162,12 +165,12 @@ class Integration:
     """
 
     def __init__(
-        self, task: Task, joints: tuple[int, ...], pieces: Pieces, start: float, phi: FloatArray
+        self, task: DeflectionEquation, joints: tuple[int, ...], pieces: Pieces, start: float, phi: FloatArray
     ) -> None:
         self.joints = joints
         self.times = [start]
         self.stopped: dict[int, str] = {}
-        self._task = task
+        self._equation = task
         self._steps: list[DenseOutput] = []
         self._tolerance = pieces.tolerance
         self._smallest = float(np.abs(phi).max(axis=1).min())
@@ -181,7 +184,9 @@ class Integration:
         return OdeSolution(self.times, self._steps)
 
     def _rates(self, time: float, state: Any) -> Any:
-        return self._task.rates(self.joints, np.array([time]), by_joint(state[:, None])).ravel()
+        return self._equation.rates(
+            self.joints, np.array([time]), deflections_by_joint(state[:, None])
+        ).ravel()
 
     def _run(self, ends: list[float], state: FloatArray) -> None:
         from scipy.integrate import DOP853
@@ -217,13 +222,15 @@ class Integration:
         """Return the end of a step, or the first time in it at which a joint cannot be integrated."""
         while right - left > 4 * np.spacing(abs(right)):
             nodes = np.linspace(left, right, CHECKS + 1)
-            hindrances = self._task.hindrances(self.joints, nodes[1:], by_joint(step(nodes[1:])))
+            hindrances = self._equation.hindrances(
+                self.joints, nodes[1:], deflections_by_joint(step(nodes[1:]))
+            )
             hits = np.flatnonzero(hindrances.any(axis=0))
             if not hits.size:
                 break
             left, right = float(nodes[hits[0]]), float(nodes[hits[0] + 1])
-            found = zip(self.joints, hindrances[:, hits[0]].tolist(), strict=True)
-            self.stopped = {joint: REASONS[reason] for joint, reason in found if reason}
+            reasons = zip(self.joints, hindrances[:, hits[0]].tolist(), strict=True)
+            self.stopped = {joint: REASONS[reason] for joint, reason in reasons if reason}
         return right
 
     def _fastest(self, integrator: DOP853[np.float64]) -> int:
@@ -233,7 +240,7 @@ class Integration:
         return self.joints[int(np.nan_to_num(speed, nan=np.inf).argmax()) // 2]
 
 
-def by_joint(state: FloatArray) -> FloatArray:
+def deflections_by_joint(state: FloatArray) -> FloatArray:
     """Return the integrator's state (2 joints, samples) as (joints, 2, samples)."""
     return state.reshape(-1, 2, state.shape[1])
 
@@ -242,7 +249,7 @@ TOLERANCE = 1e-12
 """Relative tolerance of the integrator; the drift is about as large."""
 
 
-class _Course(NamedTuple):
+class _IntegratedPart(NamedTuple):
     """Deflections of some joints over a part of the trajectory."""
 
     joints: list[int]
@@ -257,8 +264,8 @@ class IntegratedDeflections:
         stops: For each joint, the time at which its integration ends before the trajectory, or None.
     """
 
-    stops: tuple[Stop | None, ...]
-    _courses: tuple[_Course, ...] = field(repr=False)
+    stops: tuple[DeflectionStop | None, ...]
+    _parts: tuple[_IntegratedPart, ...] = field(repr=False)
     _start: float
 
     def at(self, time: FloatArray) -> FloatArray:
@@ -268,13 +275,13 @@ class IntegratedDeflections:
         """
         phi = np.full((len(self.stops), 2, len(time)), np.nan)
         elapsed = time - self._start
-        for course in self._courses:
-            here = (course.solution.t_min <= elapsed) & (elapsed <= course.solution.t_max)
-            if here.any():
+        for part in self._parts:
+            inside = (part.solution.t_min <= elapsed) & (elapsed <= part.solution.t_max)
+            if inside.any():
                 for joint, deflections in zip(
-                    course.joints, by_joint(course.solution(elapsed[here])), strict=True
+                    part.joints, deflections_by_joint(part.solution(elapsed[inside])), strict=True
                 ):
-                    phi[joint][:, here] = deflections
+                    phi[joint][:, inside] = deflections
         for joint, stop in enumerate(self.stops):
             if stop is not None:
                 phi[joint, :, time >= stop.time] = np.nan
@@ -296,23 +303,25 @@ def integrate_deflections(
         tolerance: Relative tolerance of the integrator, at least 1e-13.
     """
     first, trajectory = trajectory.start, trajectory.from_zero()
-    task = Task(robot, trajectory)
-    if not task.joints:
+    equation = DeflectionEquation(robot, trajectory)
+    if not equation.joints:
         return IntegratedDeflections((None,) * trajectory.joints, (), first)
     time, end = trajectory.times.span
     pieces = Pieces.of(trajectory, tolerance)
     phi = np.full((trajectory.joints, SIDES, 1), np.nan)
-    phi[list(task.joints)] = task.roots(task.joints, np.array([time]))
-    hindrances = task.hindrances(task.joints, np.array([time]), phi[list(task.joints)])[:, 0]
-    found = zip(task.joints, hindrances.tolist(), strict=True)
-    stops = {joint: Stop(first + time, REASONS[reason]) for joint, reason in found if reason}
-    courses = []
-    while time < end and len(stops) < len(task.joints):
-        going = [joint for joint in task.joints if joint not in stops]
-        integration = Integration(task, tuple(going), pieces, time, phi[going, :, 0])
+    phi[list(equation.joints)] = equation.roots(equation.joints, np.array([time]))
+    hindrances = equation.hindrances(equation.joints, np.array([time]), phi[list(equation.joints)])[:, 0]
+    reasons = zip(equation.joints, hindrances.tolist(), strict=True)
+    stops = {joint: DeflectionStop(first + time, REASONS[reason]) for joint, reason in reasons if reason}
+    parts = []
+    while time < end and len(stops) < len(equation.joints):
+        going = [joint for joint in equation.joints if joint not in stops]
+        integration = Integration(equation, tuple(going), pieces, time, phi[going, :, 0])
         if integration.times[-1] > time:
             time = integration.times[-1]
-            courses.append(_Course(going, integration.solution()))
-            phi[going] = by_joint(courses[-1].solution(np.array([time])))
-        stops |= {joint: Stop(first + time, reason) for joint, reason in integration.stopped.items()}
-    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(courses), first)
+            parts.append(_IntegratedPart(going, integration.solution()))
+            phi[going] = deflections_by_joint(parts[-1].solution(np.array([time])))
+        stops |= {
+            joint: DeflectionStop(first + time, reason) for joint, reason in integration.stopped.items()
+        }
+    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(parts), first)

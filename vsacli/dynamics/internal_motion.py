@@ -21,8 +21,9 @@ from vsacli.actuators.transmission import Command, InternalMotion
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING
+from vsacli.dynamics.dampers import joints_with_parallel_damper
 from vsacli.dynamics.integrated_deflections import Pieces
-from vsacli.dynamics.inverse import Stop, command_of, elastic_torques
+from vsacli.dynamics.inverse import DeflectionStop, command_of, link_torques_along
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -146,7 +147,7 @@ class Marched(NamedTuple):
     reason: str | None
 
 
-class _Solution(NamedTuple):
+class _CellSolution(NamedTuple):
     """Solution in a cell, at its start and nodes, or at its nodes alone.
 
     Attributes:
@@ -211,38 +212,38 @@ class March:
         todo = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
         while todo:
             cell = todo.pop()
-            found = self._solved(cell, phi, peaks.torque)
-            if isinstance(found, str):
+            outcome = self._solve_cell(cell, phi, peaks.torque)
+            if isinstance(outcome, str):
                 share, unresolved = np.inf, True
             else:
-                fitted = self._fitted(cell, found)
-                share = peaks.share(*fitted, found)
-                settling = cell.new and found.constants > LAYER
+                fitted = self._fit_cell(cell, outcome)
+                share = peaks.share(*fitted, outcome)
+                settling = cell.new and outcome.constants > LAYER
                 falling = share < cell.shares[0] / GAIN
                 unresolved = share > RESOLVED and (share > TOLERATED or falling or settling)
             if unresolved and cell.halved < HALVINGS:
                 todo += cell.halves(share)[::-1]
-            elif isinstance(found, str):
-                return Marched(*_joined(ended, solved), cell.left, found)
+            elif isinstance(outcome, str):
+                return Marched(*_concatenate_cells(ended, solved), cell.left, outcome)
             else:
-                phi = found.phi[:, -1:]
+                phi = outcome.phi[:, -1:]
                 solved.append(fitted)
                 ended.append(cell.right)
-        return Marched(*_joined(ended, solved), ended[-1], None)
+        return Marched(*_concatenate_cells(ended, solved), ended[-1], None)
 
-    def _fitted(self, cell: _Cell, found: _Solution) -> tuple[FloatArray, FloatArray]:
+    def _fit_cell(self, cell: _Cell, solution: _CellSolution) -> tuple[FloatArray, FloatArray]:
         """Return coefficients of deflections and rates; in fast cells, rates are derivatives of the fit."""
         from numpy.polynomial import chebyshev
 
-        phi = self._rule.coefficients(found.phi)
-        if found.constants <= FAST:
-            return phi, self._rule.coefficients_of_rates(found.rates)
+        phi = self._rule.coefficients(solution.phi)
+        if solution.constants <= FAST:
+            return phi, self._rule.coefficients_of_rates(solution.rates)
         half = (cell.right - cell.left) / 2
         first = chebyshev.chebder(self._springs.spread(phi)) / half
         second = np.append(chebyshev.chebder(first) / half, 0.0)
         return phi, np.stack((first, second))
 
-    def _solved(self, cell: _Cell, start: FloatArray, peak: float) -> _Solution | str:
+    def _solve_cell(self, cell: _Cell, start: FloatArray, peak: float) -> _CellSolution | str:
         """Return deflections in a cell from those at its start, by Newton's method, or a reason of failure.
 
         Args:
@@ -252,35 +253,35 @@ class March:
         """
         springs, command = self._springs, self._demand(self._rule.times(cell.left, cell.right))
         slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
-        before, side = springs.spread(start), np.sign(springs.springs_at(start, command.q[:1]).pivot)
-        spread, phi = before + 0 * command.q, start + 0 * command.q
-        converged, rounding = False, POSITION_ROUNDING * _largest(command.q)
+        initial_spread, side = springs.spread(start), np.sign(springs.springs_at(start, command.q[:1]).pivot)
+        spread, phi = initial_spread + 0 * command.q, start + 0 * command.q
+        converged, rounding = False, POSITION_ROUNDING * _largest_size(command.q)
         for _ in range(NEWTON_STEPS):
             phi = springs.settled(spread, phi, command)
             if np.isnan(phi[0]).any() or not springs.within(phi).all():
                 return LOST
-            there = springs.springs_at(phi, command.q)
-            if (np.sign(there.pivot) != side).any():
+            springs_at_phi = springs.springs_at(phi, command.q)
+            if (np.sign(springs_at_phi.pivot) != side).any():
                 return SINGULAR
             if converged:
-                fastest = np.max(np.abs(there.slope) / damping)
-                return _Solution(
+                fastest = np.max(np.abs(springs_at_phi.slope) / damping)
+                return _CellSolution(
                     np.hstack((start, phi)),
                     np.stack(springs.driven(phi, command)),
                     float(np.max(np.abs(command.tau_e))),
                     float(np.max(damping)),
                     (cell.right - cell.left) * float(fastest),
                     rounding,
-                    _largest(there.slope),
+                    _largest_size(springs_at_phi.slope),
                 )
-            rate = slopes[:, 0] * before + slopes[:, 1:] @ spread
-            missing = command.tau_e - there.state.tau_e - damping * rate
-            slope = there.slope
+            rate = slopes[:, 0] * initial_spread + slopes[:, 1:] @ spread
+            torque_error = command.tau_e - springs_at_phi.state.tau_e - damping * rate
+            slope = springs_at_phi.slope
             matrix = damping[:, None] * slopes[:, 1:] + np.diag(slope)
-            step = np.asarray(np.linalg.solve(matrix, missing), dtype=np.float64)
+            step = np.asarray(np.linalg.solve(matrix, torque_error), dtype=np.float64)
             spread = spread + step
-            converged = _largest(step) <= max(
-                CONVERGED * _largest(spread), CONVERGED * peak / _largest(slope), rounding
+            converged = _largest_size(step) <= max(
+                CONVERGED * _largest_size(spread), CONVERGED * peak / _largest_size(slope), rounding
             )
         return LOST
 
@@ -302,35 +303,35 @@ class _Peaks:
 
     def __init__(self, springs: DampedSprings, demand: Command, start: FloatArray) -> None:
         self._springs = springs
-        self._slope = _largest(springs.slope(start, demand.q[:1]))
-        self.torque = _largest(demand.tau_e)
+        self._slope = _largest_size(springs.slope(start, demand.q[:1]))
+        self.torque = _largest_size(demand.tau_e)
         self._phi, self._spread = 0.0, LEAST_SPREAD
 
-    def share(self, phi: FloatArray, rates: FloatArray, found: _Solution) -> float:
+    def share(self, phi: FloatArray, rates: FloatArray, solution: _CellSolution) -> float:
         """Return the last coefficients of deflections, spread and torque, relative to the peaks so far.
 
         Positions of many turns are rounded; no cell is short enough for coefficients below that.
         """
         spread = self._springs.spread(phi)
         self._phi = max(self._phi, float(np.nanmax(np.abs(phi))))
-        self._spread = max(self._spread, _largest(spread), LEAST_SHARE * self._phi)
-        self.torque = max(self.torque, found.torque, self._slope * self._spread)
+        self._spread = max(self._spread, _largest_size(spread), LEAST_SHARE * self._phi)
+        self.torque = max(self.torque, solution.torque, self._slope * self._spread)
         missing = (
-            float(np.nanmax(np.abs(phi[:, -2:]))) - found.rounding,
-            _largest(spread[-2:]) - found.rounding,
+            float(np.nanmax(np.abs(phi[:, -2:]))) - solution.rounding,
+            _largest_size(spread[-2:]) - solution.rounding,
         )
         share = max(0.0, missing[0] / max(self._phi, LEAST_SPREAD), missing[1] / self._spread)
-        if found.constants > FAST:
+        if solution.constants > FAST:
             return share
-        of_torque = found.damping * _largest(rates[0, -2:]) - found.slope * found.rounding
+        of_torque = solution.damping * _largest_size(rates[0, -2:]) - solution.slope * solution.rounding
         return max(share, of_torque / self.torque)
 
 
-def _largest(values: FloatArray) -> float:
+def _largest_size(values: FloatArray) -> float:
     return float(np.max(np.abs(values)))
 
 
-def _joined(
+def _concatenate_cells(
     ended: list[float], solved: list[tuple[FloatArray, FloatArray]]
 ) -> tuple[Piecewise | None, Piecewise | None]:
     """Return the deflections and rates over all cells."""
@@ -350,7 +351,7 @@ class InternalMotions:
     """
 
     joints: tuple[int, ...]
-    stops: Mapping[int, Stop]
+    stops: Mapping[int, DeflectionStop]
     _marched: Mapping[int, Marched] = field(repr=False)
 
     @property
@@ -380,7 +381,7 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
     """
     first, trajectory = trajectory.start, trajectory.from_zero()
     joints = damped_joints(robot, trajectory)
-    demand = _Demand(robot, trajectory)
+    demand = _JointCommands(robot, trajectory)
     evenly = np.linspace(0.0, trajectory.duration, FIRST_CELLS + 1)
     ends = np.union1d(evenly, Pieces.of(trajectory, 0.0).ends)
     springs = {index: DampedSprings(robot.joints[index].actuator) for index in joints}
@@ -392,7 +393,7 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
             started = not np.isnan(begin[0]).any()
             marched[index] = march.through(ends, begin) if started else Marched(None, None, 0.0, LOST)
     stops = {
-        index: Stop(first + each.end, each.reason)
+        index: DeflectionStop(first + each.end, each.reason)
         for index, each in marched.items()
         if each.reason is not None
     }
@@ -401,12 +402,12 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
 
 def damped_joints(robot: Robot, trajectory: Trajectory) -> tuple[int, ...]:
     """Return the joints with a damper parallel to their springs whose damping is not always zero."""
-    chosen = [index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission")]
-    if not chosen:
+    joints = joints_with_parallel_damper(robot.joints)
+    if not joints:
         return ()
     # The first sample decides: `with_devices` refuses a damping that is zero only somewhere.
     damping = trajectory.block(0, 1).commanded[DAMPING.key][0]
-    return tuple(index for index in chosen if damping[index])
+    return tuple(index for index in joints if damping[index])
 
 
 def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str) -> None:
@@ -428,16 +429,16 @@ def refuse_damped_transmissions(robot: Robot, trajectory: Trajectory, work: str)
         )
 
 
-class _Demand:
+class _JointCommands:
     """Commands of joints over time; joints share the recursion's pass at the times of a cell."""
 
     def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
         self._robot, self._trajectory = robot, trajectory
-        self._known: dict[bytes, Mapping[str, FloatArray]] = {}
+        self._commands: dict[bytes, Mapping[str, FloatArray]] = {}
 
     def of(self, joint: int, time: FloatArray) -> Command:
         key = time.tobytes()
-        if key not in self._known:
+        if key not in self._commands:
             motion = self._trajectory.at(time)
-            self._known[key] = {**motion.variables(), **elastic_torques(self._robot, motion)}
-        return command_of(joint, self._known[key])
+            self._commands[key] = {**motion.variables(), **link_torques_along(self._robot, motion)}
+        return command_of(joint, self._commands[key])

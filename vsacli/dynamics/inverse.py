@@ -1,7 +1,7 @@
 """Inverse dynamics of a block of samples, (36)-(74): the recursion, then the actuation joint by joint.
 
 `InverseDynamics` is the kernel that an engine runs on rows of samples; `block_of` packs a motion into its
-rows, and the results into a `Block`. Before that, `fitted` checks a trajectory for a robot.
+rows, and the results into a `Block`. Before that, `adapt_trajectory` checks a trajectory for a robot.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def usual_block(joints: int) -> int:
 
 
 @dataclass(frozen=True)
-class Stop(Stored):
+class DeflectionStop(Stored):
     """Time, s, from which the deflections of a joint cannot be integrated, and the reason."""
 
     time: float
@@ -213,12 +213,14 @@ def compute_block(
     """
     frame = None if motion.wrench is None else motion.wrench.frame
     internal = internal_equilibrium(robot, motion) if internal is None else internal
-    kernel = _kernel(robot, frame, min_margin, tuple(internal))
+    kernel = _inverse_dynamics_kernel(robot, frame, min_margin, tuple(internal))
     return block_of(kernel, motion, engine, internal_rows(internal))
 
 
 @lru_cache(KEPT_PROGRAMS)
-def _kernel(robot: Robot, frame: str | None, min_margin: float, damped: tuple[int, ...]) -> InverseDynamics:
+def _inverse_dynamics_kernel(
+    robot: Robot, frame: str | None, min_margin: float, damped: tuple[int, ...]
+) -> InverseDynamics:
     deflections = (InternalRows(damped),) if damped else ()
     return InverseDynamics(robot, frame, min_margin, deflections)
 
@@ -251,7 +253,7 @@ def motor_torques(
     if single:
         motion = motion.mapped(np.atleast_1d(motion.time), lambda array, _: np.asarray(array)[None])
     frame = None if motion.wrench is None else motion.wrench.frame
-    kernel = _kernel(robot, frame, min_margin, ())
+    kernel = _inverse_dynamics_kernel(robot, frame, min_margin, ())
     block = compute_block(robot, motion, min_margin, engine_of_call(engine, kernel, len(motion.q)))
     return block.taken(0) if single else block
 
@@ -262,9 +264,9 @@ def _check_motion(robot: Robot, motion: Motion) -> None:
     Raises:
         InputError: with the names of the arrays.
     """
-    given, shape = motion.variables(), np.shape(motion.q)
+    arrays, shape = motion.variables(), np.shape(motion.q)
     required = (name for signal in (POSITION, *robot.signals) for name in signal.names)
-    if lacking := [name for name in required if name not in given]:
+    if lacking := [name for name in required if name not in arrays]:
         raise InputError.one(f"the motion lacks {', '.join(lacking)}, which {robot.name} requires")
     checked_shape("q", motion.q, len(robot.joints))
     for name, array in motion.of_joints.items():
@@ -306,13 +308,13 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
         return {}
     from vsacli.actuators.damped_springs import DampedSprings
 
-    commanded = {**motion.variables(), **elastic_torques(robot, motion)}
-    found = {}
+    commanded = {**motion.variables(), **link_torques_along(robot, motion)}
+    motions = {}
     for index, joint in damped.items():
         springs, command = DampedSprings(joint.actuator), command_of(index, commanded)
         phi = springs.equilibrium(command, joint.damper_start)
-        found[index] = InternalMotion(phi, *springs.driven(phi, command))
-    return found
+        motions[index] = InternalMotion(phi, *springs.driven(phi, command))
+    return motions
 
 
 def rows_of_joints(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
@@ -321,7 +323,7 @@ def rows_of_joints(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
         yield from array if array.ndim > 1 else [array]
 
 
-def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
+def link_torques_along(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
     """Return tau_e, dtau_e and ddtau_e, (58)-(60), by name, each (samples, joints)."""
     damping: dict[str, Any] = {
         name: motion.commanded[name] for name in DAMPING.names if name in motion.commanded
@@ -331,7 +333,7 @@ def elastic_torques(robot: Robot, motion: Motion) -> dict[str, FloatArray]:
     )._asdict()
 
 
-def fitted(robot: Robot, trajectory: Trajectory) -> Trajectory:
+def adapt_trajectory(robot: Robot, trajectory: Trajectory) -> Trajectory:
     """Return the trajectory with uncommanded dampers of the robot at their minimum, after checks.
 
     Raises:

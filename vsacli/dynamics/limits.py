@@ -57,8 +57,8 @@ def open_steps(joint: Joint, of_joint: OfJoint) -> BoolArray:
         if check.variable in of_joint:
             beyond |= check.flags(of_joint)
             too_far |= check.flags(of_joint, check.largest_allowance)
-    found: BoolArray = (beyond != 0) & (too_far == 0)
-    return found
+    undecided: BoolArray = (beyond != 0) & (too_far == 0)
+    return undecided
 
 
 MARGIN = "margin"
@@ -221,7 +221,7 @@ def worst_excess(
     )
 
 
-def keep_worse(worst: dict[str, Finding], found: Finding | None) -> None:
+def keep_worse(worst: dict[str, Finding], finding: Finding | None) -> None:
     """Keep a finding, if there is one, where it is the worst of its kind so far."""
-    if found is not None and (found.kind not in worst or found.excess > worst[found.kind].excess):
-        worst[found.kind] = found
+    if finding is not None and (finding.kind not in worst or finding.excess > worst[finding.kind].excess):
+        worst[finding.kind] = finding

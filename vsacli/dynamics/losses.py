@@ -80,8 +80,8 @@ def positive_work(
 ) -> FloatArray:
     """Return `positive_part` of single intervals, from the power before and after; arrays of one shape."""
     positive = np.maximum(work, 0.0)
-    (found,) = where_needed(before * after < 0, _linear, (interval, before, after, positive), (positive,))
-    return found
+    (spent,) = where_needed(before * after < 0, _linear, (interval, before, after, positive), (positive,))
+    return spent
 
 
 def _linear(
@@ -112,15 +112,15 @@ def dissipated_power(joint: Joint, motion: JointVariables) -> FloatArray:
         joint: Joint with its actuator.
         motion: Velocities `dq` and `dtheta`, and for a joint with a damper `damping` and `dphi`.
     """
-    power: FloatArray = _taken(joint.damping, FrictionLaws.of([joint.friction]), motion.dq)
+    power: FloatArray = _lost_power(joint.damping, FrictionLaws.of([joint.friction]), motion.dq)
     for velocity in damper_velocities(joint, motion.dq, motion.dphi) if joint.damper else ():
         power = power + motion.damping * velocity * velocity
     for index, motor in enumerate(joint.actuator.motors):
-        power = power + _taken(motor.damping, FrictionLaws.of([motor.friction]), motion.dtheta[index])
+        power = power + _lost_power(motor.damping, FrictionLaws.of([motor.friction]), motion.dtheta[index])
     return power
 
 
-def _taken(damping: float, friction: FrictionLaws | None, velocity: FloatArray) -> FloatArray:
+def _lost_power(damping: float, friction: FrictionLaws | None, velocity: FloatArray) -> FloatArray:
     torque = damping * velocity
     if friction is not None:
         torque = torque + friction.torque(velocity)
@@ -128,7 +128,7 @@ def _taken(damping: float, friction: FrictionLaws | None, velocity: FloatArray) 
     return power
 
 
-class Lost(NamedTuple):
+class LostEnergy(NamedTuple):
     """Energy lost in the intervals between samples, J.
 
     Attributes:
@@ -141,10 +141,10 @@ class Lost(NamedTuple):
     dissipated: FloatArray
     copper: FloatArray | None
 
-    def taken(self, intervals: slice) -> Lost:
+    def during(self, intervals: slice) -> LostEnergy:
         """Return the losses in a slice of the intervals."""
         copper = None if self.copper is None else self.copper[..., intervals]
-        return Lost(self.motor_friction[..., intervals], self.dissipated[..., intervals], copper)
+        return LostEnergy(self.motor_friction[..., intervals], self.dissipated[..., intervals], copper)
 
 
 class LossMeter:
@@ -156,7 +156,7 @@ class LossMeter:
         self._of_motors = laws and FrictionLaws(*(values.reshape(-1, SIDES, 1) for values in laws))
         of_joints = FrictionLaws.of([joint.friction for joint in robot.joints])
         self._of_joints = of_joints and of_joints.with_axis_behind()
-        self._there = np.array([side is not None for side in sides]).reshape(-1, SIDES)
+        self._has_motor = np.array([side is not None for side in sides]).reshape(-1, SIDES)
         self._motor_damping = np.array([side.damping if side else 0.0 for side in sides]).reshape(-1, SIDES)
         self._joint_damping = np.array([joint.damping for joint in robot.joints])
         self._robot = robot
@@ -165,21 +165,21 @@ class LossMeter:
         self._names = (*MOTION, *(["copper_loss"] if heated else []), *(DAMPED if damped else []))
         self._last: dict[str, FloatArray] = {}
 
-    def add(self, block: Block) -> Lost:
+    def add(self, block: Block) -> LostEnergy:
         """Return the losses from the previous sample to each sample of a block; zero before the first."""
         rows = {name: by_joint(getattr(block, name)) for name in self._names}
-        before = self._last or _step(rows, 0)
-        self._last = _step(rows, -1)
+        before = self._last or _sample_rows(rows, 0)
+        self._last = _sample_rows(rows, -1)
         return self.between({name: np.concatenate((before[name], rows[name]), axis=-1) for name in rows})
 
-    def between(self, rows: Mapping[str, FloatArray]) -> Lost:
+    def between(self, rows: Mapping[str, FloatArray]) -> LostEnergy:
         """Return the losses from sample to sample, from variables by name with samples on the last axis."""
         intervals = np.diff(rows["time"])
         of_motors = [rows[name] for name in ("theta", "dtheta", "ddtheta")]
         of_joints = [rows[name] for name in ("q", "dq", "ddq")]
         motor_friction = _friction_work(self._of_motors, intervals, *of_motors)
-        taken = motor_friction + _damping_work(self._motor_damping, intervals, *of_motors[1:])
-        dissipated = np.sum(taken, axis=1, where=self._there[..., None])
+        lost_by_motors = motor_friction + _damping_work(self._motor_damping, intervals, *of_motors[1:])
+        dissipated = np.sum(lost_by_motors, axis=1, where=self._has_motor[..., None])
         dissipated += _damping_work(self._joint_damping, intervals, *of_joints[1:])
         dissipated += _friction_work(self._of_joints, intervals, *of_joints)
         for index, joint in enumerate(self._robot.joints):
@@ -187,10 +187,10 @@ class LossMeter:
                 of_joint = {name: rows[name][index] for name in self._names if name != "time"}
                 dissipated[index] += _damper_work(joint, intervals, of_joint)
         heat = rows.get("copper_loss")
-        return Lost(motor_friction, dissipated, None if heat is None else trapezoids(intervals, heat))
+        return LostEnergy(motor_friction, dissipated, None if heat is None else trapezoids(intervals, heat))
 
 
-def _step(rows: Mapping[str, FloatArray], step: int) -> dict[str, FloatArray]:
+def _sample_rows(rows: Mapping[str, FloatArray], step: int) -> dict[str, FloatArray]:
     return {name: values[..., [step]] for name, values in rows.items()}
 
 
@@ -219,11 +219,11 @@ def _friction_work(
     acceleration: FloatArray,
 ) -> FloatArray:
     """Return the work of friction: integrated for smooth laws, torque times path for sharp ones."""
-    way = np.diff(position)
+    travel = np.diff(position)
     if laws is None:
-        return np.zeros_like(way)
+        return np.zeros_like(travel)
     work = integrals(intervals, *laws.power(velocity, acceleration))
     if laws.sharp.any():
-        forward = positive_part(intervals, velocity, way)
-        work += np.where(laws.sharp, laws.forward * forward + laws.backward * (forward - way), 0.0)
+        forward = positive_part(intervals, velocity, travel)
+        work += np.where(laws.sharp, laws.forward * forward + laws.backward * (forward - travel), 0.0)
     return work

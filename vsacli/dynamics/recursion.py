@@ -28,7 +28,7 @@ class _Angular(NamedTuple):
     varsigma: Vector
 
 
-class Frame(NamedTuple):
+class FrameMotion(NamedTuple):
     """Motion of a link frame: angular, and acceleration, jerk and snap of its origin."""
 
     angular: _Angular
@@ -58,7 +58,7 @@ class _Slide(NamedTuple):
 _NO_SLIDE = _Slide(ZERO, ZERO, ZERO, ZERO)
 
 
-class Body(NamedTuple):
+class MovingBody(NamedTuple):
     """Quantities of link k for the backward pass.
 
     Attributes:
@@ -73,7 +73,7 @@ class Body(NamedTuple):
 
     rotation: Rotation
     z: Vector
-    frame: Frame
+    frame: FrameMotion
     p: tuple[Vector, Vector, Vector]
     c: tuple[Vector, Vector, Vector]
     force: tuple[Vector, Vector, Vector]
@@ -113,24 +113,29 @@ def recursion(
     return backward(links, states, forward(links, states, base_frame(gravity)), tip)
 
 
-def base_frame(gravity: Vector) -> Frame:
+def base_frame(gravity: Vector) -> FrameMotion:
     """Return frame 0 at rest, with the acceleration -g that stands for gravity (IV-A)."""
-    return Frame(_Angular(ZERO, ZERO, ZERO, ZERO), a=ZERO - gravity, j=ZERO, s=ZERO)
+    return FrameMotion(_Angular(ZERO, ZERO, ZERO, ZERO), a=ZERO - gravity, j=ZERO, s=ZERO)
 
 
-def forward(links: Sequence[LinkConstants], states: Sequence[JointState], previous: Frame) -> list[Body]:
+def forward(
+    links: Sequence[LinkConstants], states: Sequence[JointState], previous: FrameMotion
+) -> list[MovingBody]:
     """Run (36)-(51) from a frame whose motion is known to the tip."""
     bodies = []
     for link, state in zip(links, states, strict=True):
         # Computes _forward(link, state, previous); `call` lets links of equal structure share one body.
-        body: Body = call(state.rates[0], _forward, link, state, previous)
+        body: MovingBody = call(state.rates[0], _forward, link, state, previous)
         previous = body.frame
         bodies.append(body)
     return bodies
 
 
 def backward(
-    links: Sequence[LinkConstants], states: Sequence[JointState], bodies: Sequence[Body], tip: TipLoad | None
+    links: Sequence[LinkConstants],
+    states: Sequence[JointState],
+    bodies: Sequence[MovingBody],
+    tip: TipLoad | None,
 ) -> list[TorqueDerivatives]:
     """Run (52)-(60) from tip to base; arguments and result as for `recursion`."""
     torques: list[TorqueDerivatives] = []
@@ -142,7 +147,7 @@ def backward(
     return torques[::-1]
 
 
-def _forward(link: LinkConstants, state: JointState, previous: Frame) -> Body:
+def _forward(link: LinkConstants, state: JointState, previous: FrameMotion) -> MovingBody:
     turning, sliding = (state.rates, (0, 0, 0, 0)) if link.revolute else ((0, 0, 0, 0), state.rates)
     rotation = Rotation(state.cos, state.sin, link.cos_alpha, link.sin_alpha)
     z = Vector(0, link.sin_alpha, link.cos_alpha)
@@ -151,7 +156,7 @@ def _forward(link: LinkConstants, state: JointState, previous: Frame) -> Body:
     angular = _angular_motion(rotation, turning, previous.angular)
     v_p = _point_rates(angular, p)
     slide = _slide(angular, sliding, z) if not link.revolute else _NO_SLIDE
-    frame = Frame(
+    frame = FrameMotion(
         angular,
         a=rotation.undo(previous.a) + v_p.second + slide.a,  # (40)
         j=rotation.undo(previous.j) + v_p.third + slide.j,  # (42)
@@ -159,7 +164,7 @@ def _forward(link: LinkConstants, state: JointState, previous: Frame) -> Body:
     )
     v_c = _point_rates(angular, link.com)
     a_c, j_c, s_c = frame.a + v_c.second, frame.j + v_c.third, frame.s + v_c.fourth  # (41) (43) (45)
-    return Body(
+    return MovingBody(
         rotation=rotation,
         z=z,
         frame=frame,
@@ -223,7 +228,7 @@ def _euler(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector,
     return moment, dmoment, ddmoment
 
 
-def _tip_reaction(tip: TipLoad, bodies: Sequence[Body]) -> _Reaction:
+def _tip_reaction(tip: TipLoad, bodies: Sequence[MovingBody]) -> _Reaction:
     """Return f_N+1, n_N+1 and their derivatives, about the origin of frame N, in frame N."""
     angular = bodies[-1].frame.angular
     if tip.in_base:
@@ -256,7 +261,7 @@ def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vec
 
 
 def _backward(
-    link: LinkConstants, state: JointState, body: Body, beyond: _Reaction, of_base: bool
+    link: LinkConstants, state: JointState, body: MovingBody, beyond: _Reaction, of_base: bool
 ) -> tuple[TorqueDerivatives, _Reaction]:
     """Return the torque of a joint, and the reaction on its link in frame k-1; zero if that is the base."""
     reaction = _reaction(body, beyond)
@@ -264,7 +269,7 @@ def _backward(
     return torque, _NO_REACTION if of_base else _in_previous_frame(body.rotation, reaction)
 
 
-def _reaction(body: Body, beyond: _Reaction) -> _Reaction:
+def _reaction(body: MovingBody, beyond: _Reaction) -> _Reaction:
     (c, dc, ddc), (p, dp, ddp) = body.c, body.p
     force, dforce, ddforce = body.force
     moment, dmoment, ddmoment = body.moment
@@ -284,16 +289,18 @@ def _reaction(body: Body, beyond: _Reaction) -> _Reaction:
     return _Reaction((f, df, ddf), (n, dn, ddn))
 
 
-def _project(link: LinkConstants, state: JointState, body: Body, reaction: _Reaction) -> TorqueDerivatives:
+def _project(
+    link: LinkConstants, state: JointState, body: MovingBody, reaction: _Reaction
+) -> TorqueDerivatives:
     w, g, z = body.frame.angular.omega, body.frame.angular.gamma, body.z
     x, dx, ddx = reaction.n if link.revolute else reaction.f
     x_w = cross(x, w)
     q1, q2, q3, _ = state.rates
-    tau = add(x.dot(z), mul(link.damping, q1))  # (58)
-    dtau = add((dx + x_w).dot(z), mul(link.damping, q2))  # (59)
+    tau = add(x.dot(z), mul(link.viscous_damping, q1))  # (58)
+    dtau = add((dx + x_w).dot(z), mul(link.viscous_damping, q2))  # (59)
     # `along=z` drops the components of the products that the inner product with z does not need.
     ddx_turned = ddx + cross(dx, w, along=z) * 2 + cross(x, g, along=z) + cross(x_w, w, along=z)
-    ddtau = add(ddx_turned.dot(z), mul(link.damping, q3))  # (60)
+    ddtau = add(ddx_turned.dot(z), mul(link.viscous_damping, q3))  # (60)
     return TorqueDerivatives(*map(add, (tau, dtau, ddtau), state.resistance))
 
 

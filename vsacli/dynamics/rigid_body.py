@@ -32,8 +32,8 @@ SMALLEST_PIVOT = 1e-12
 """Smallest pivot of M, relative to the diagonal entry; a smaller one is rounding of a missing mass."""
 
 
-class Chain:
-    """Programs of a chain of joints, each traced at first use; use `chain_of` to obtain one.
+class LinkDynamics:
+    """Programs of a chain of joints, each traced at first use; use `link_dynamics` to obtain one.
 
     Arrays are (joints,) or (samples, joints) throughout. A wrench must be given if and only if the chain was
     made for one.
@@ -70,13 +70,13 @@ class Chain:
 
     def bias(self, q: FloatArray, dq: FloatArray, wrench: Wrench | None) -> FloatArray:
         """Return n(q, q') of (34): gravity, centrifugal and Coriolis torques, damping, wrench; N m (N)."""
-        return self._bias(q, dq, *_derivatives(wrench, 0))
+        return self._bias(q, dq, *_wrench_derivatives(wrench, 0))
 
     def torque_rate(
         self, q: FloatArray, dq: FloatArray, ddq: FloatArray, wrench: Wrench | None
     ) -> FloatArray:
         """Return M' q'' + n' of (35): the recursion's tau_e' at q''' = 0."""
-        return self._rate(q, dq, ddq, *_derivatives(wrench, 1))
+        return self._rate(q, dq, ddq, *_wrench_derivatives(wrench, 1))
 
     def torque_acceleration(
         self,
@@ -88,7 +88,7 @@ class Chain:
         wrench: Wrench | None,
     ) -> FloatArray:
         """Return tau_e'' (60)."""
-        return self._acceleration(q, dq, ddq, d3q, d4q, *_derivatives(wrench, 2))
+        return self._acceleration(q, dq, ddq, d3q, d4q, *_wrench_derivatives(wrench, 2))
 
     def solve(self, matrix: FloatArray, torque: FloatArray) -> FloatArray:
         """Return matrix^-1 torque, for M(q) or its extension by rigid drives.
@@ -126,7 +126,7 @@ class Chain:
         )
 
 
-def _derivatives(wrench: Wrench | None, order: int) -> list[FloatArray]:
+def _wrench_derivatives(wrench: Wrench | None, order: int) -> list[FloatArray]:
     """Return the wrench and its derivatives up to an order."""
     return [] if wrench is None else [getattr(wrench, name) for name in WRENCH_NAMES[: order + 1]]
 
@@ -158,8 +158,8 @@ def _solve_positive_definite(matrix: Any, right: Any, smallest_pivot: float) -> 
         forward.append(_subtracted(right[row], [lower[row, inner] * forward[inner] for inner in range(row)]))
     solution: dict[int, Any] = {}
     for row in reversed(range(size)):
-        known = [lower[below, row] * solution[below] for below in range(row + 1, size)]
-        solution[row] = _subtracted(forward[row] / pivots[row], known)
+        terms = [lower[below, row] * solution[below] for below in range(row + 1, size)]
+        solution[row] = _subtracted(forward[row] / pivots[row], terms)
     return np.stack([solution[row] for row in range(size)])
 
 
@@ -176,17 +176,17 @@ def _last_pivot(matrices: FloatArray) -> float:
 
 
 @lru_cache(maxsize=16)
-def chain_of(robot: Robot, frame: str | None = None) -> Chain:
+def link_dynamics(robot: Robot, frame: str | None = None) -> LinkDynamics:
     """Return the programs of a robot's links and joints; equal chains share them.
 
     Args:
         robot: Robot; its actuators and dampers are ignored.
         frame: Frame of the wrench at the end effector, as in `Wrench`; None without a wrench.
     """
-    return _recorded(bare(robot), frame)
+    return _shared_link_dynamics(without_drives(robot), frame)
 
 
-def bare(robot: Robot) -> Robot:
+def without_drives(robot: Robot) -> Robot:
     """Return the robot with a common placeholder for its drives, so that equal chains compare equal."""
     nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
     joints = tuple(replace(joint, **nothing) for joint in robot.joints)
@@ -197,8 +197,8 @@ _ANY_DRIVE: Any = Rigid(motor=Motor(inertia=1.0))
 
 
 @lru_cache(maxsize=16)
-def _recorded(robot: Robot, frame: str | None) -> Chain:
-    return Chain(robot, frame)
+def _shared_link_dynamics(robot: Robot, frame: str | None) -> LinkDynamics:
+    return LinkDynamics(robot, frame)
 
 
 def _inertia_program(robot: Robot) -> StateFunction:
@@ -208,7 +208,7 @@ def _inertia_program(robot: Robot) -> StateFunction:
     q = tape.inputs(len(robot.joints))
     numbers = range(len(robot.joints))
     columns = [
-        _torques(robot, q, [(0, int(joint == moving), 0, 0) for joint in numbers], ZERO, None)
+        _recursion_torques(robot, q, [(0, int(joint == moving), 0, 0) for joint in numbers], ZERO, None)
         for moving in numbers
     ]
     lower = [columns[column][row].tau for row in numbers for column in range(row + 1)]
@@ -221,19 +221,23 @@ def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -
     joints = len(robot.joints)
     q = tape.inputs(joints)
     rates = [tape.inputs(joints) if order < orders else [0] * joints for order in range(4)]
-    tip = None if frame is None else _load(tape, robot, frame, ("tau", "dtau", "ddtau").index(output))
-    torques = _torques(robot, q, list(zip(*rates, strict=True)), base_gravity(robot), tip)
+    tip = (
+        None
+        if frame is None
+        else _tip_load_inputs(tape, robot, frame, ("tau", "dtau", "ddtau").index(output))
+    )
+    torques = _recursion_torques(robot, q, list(zip(*rates, strict=True)), base_gravity(robot), tip)
     return StateFunction(tape.program([getattr(torque, output) for torque in torques]))
 
 
-def _load(tape: Tape, robot: Robot, frame: str, order: int) -> TipLoad:
+def _tip_load_inputs(tape: Tape, robot: Robot, frame: str, order: int) -> TipLoad:
     """Return the wrench and its derivatives up to an order as inputs, the others zero."""
     axes = len(WRENCH_AXES)
     wrench = [tape.inputs(axes) if derivative <= order else [0] * axes for derivative in range(3)]
     return tip_load(robot, frame, wrench)
 
 
-def _torques(
+def _recursion_torques(
     robot: Robot,
     q: Sequence[Symbol],
     rates: Sequence[tuple[Scalar, ...]],

@@ -27,7 +27,7 @@ from vsacli.dynamics.inverse import (
     InverseDynamics,
     block_of,
     command_of,
-    elastic_torques,
+    link_torques_along,
     usual_block,
 )
 from vsacli.robot.model import Robot
@@ -77,21 +77,21 @@ class Uncertainty:
             elapsed = self._elapsed[start : start + batch]
             motion = trajectory.at(trajectory.start + elapsed)
             covariances = {signal: each.covariance(elapsed) for signal, each in estimates.items()}
-            parts.append(deviations(robot, motion, estimates, covariances, engine))
-        self._known, self.unstated = Deviations.joined(parts, axis=0)
+            parts.append(propagate_deviations(robot, motion, estimates, covariances, engine))
+        self._at_probes, self.unstated = Deviations.concatenated(parts, axis=0)
 
     def at(self, time: FloatArray) -> dict[str, FloatArray]:
         """Return the deviations at any times by variable, and of `MARGIN`: each (samples, joints[, 2])."""
-        return {name: self._between(known, time) for name, known in self._known.items()}
+        return {name: self._between(known, time) for name, known in self._at_probes.items()}
 
-    def _between(self, known: FloatArray, time: FloatArray) -> FloatArray:
-        found = np.full((known[0].size, len(time)), np.nan)
-        for row, column in zip(found, known.reshape(len(known), -1).T, strict=True):
+    def _between(self, at_probes: FloatArray, time: FloatArray) -> FloatArray:
+        interpolated = np.full((at_probes[0].size, len(time)), np.nan)
+        for row, column in zip(interpolated, at_probes.reshape(len(at_probes), -1).T, strict=True):
             exists = ~np.isnan(column)
             if exists.any():
                 row[:] = np.interp(time - self._start, self._elapsed[exists], column[exists])
-        found[np.isinf(found)] = np.nan
-        return np.moveaxis(found.reshape(*known.shape[1:], len(time)), -1, 0)
+        interpolated[np.isinf(interpolated)] = np.nan
+        return np.moveaxis(interpolated.reshape(*at_probes.shape[1:], len(time)), -1, 0)
 
 
 def times_at_once(robot: Robot, estimates: Mapping[Signal, SampledProfile]) -> int:
@@ -121,7 +121,7 @@ class Deviations(NamedTuple):
     unstated: dict[str, BoolArray]
 
     @classmethod
-    def joined(cls, parts: Sequence[Deviations], axis: int) -> Deviations:
+    def concatenated(cls, parts: Sequence[Deviations], axis: int) -> Deviations:
         """Return the deviations at the times of all parts; `axis` is that of the times."""
         names = parts[0].deviations
         return cls(
@@ -146,7 +146,7 @@ class _Shift(NamedTuple):
     size: FloatArray
 
 
-def deviations(
+def propagate_deviations(
     robot: Robot,
     motion: Motion,
     estimates: Mapping[Signal, SampledProfile],
@@ -173,9 +173,9 @@ def deviations(
         return {**{name: getattr(block, name) for name in _COMPUTED}, MARGIN: gap}
 
     components = {signal: range(len(covariance)) for signal, covariance in covariances.items()}
-    computed = _propagated(variables, motion, estimates, covariances, components)
-    given = _given(robot, estimates, covariances)
-    return Deviations(computed.deviations | given.deviations, computed.unstated | given.unstated)
+    computed = _propagate(variables, motion, estimates, covariances, components)
+    of_signals = _signal_deviations(robot, estimates, covariances)
+    return Deviations(computed.deviations | of_signals.deviations, computed.unstated | of_signals.unstated)
 
 
 def deviations_of_joint(
@@ -192,15 +192,15 @@ def deviations_of_joint(
         index: Index of the joint.
         motion: Motion at some times.
         estimates: Signals that were recorded.
-        covariances: Their covariances, as in `deviations`.
+        covariances: Their covariances, as in `propagate_deviations`.
 
     Returns:
-        The values that `deviations` has for the joint, except that of `MARGIN`.
+        The values that `propagate_deviations` has for the joint, except that of `MARGIN`.
     """
     undamped = _without_inner_dampers(robot)
 
     def variables(shifted: Motion) -> dict[str, AnyArray]:
-        command = command_of(index, {**shifted.variables(), **elastic_torques(undamped, shifted)})
+        command = command_of(index, {**shifted.variables(), **link_torques_along(undamped, shifted)})
         driven = drive(undamped.joints[index], command)
         return {name: getattr(driven, name).T[:, None] for name in _COMPUTED}
 
@@ -208,14 +208,14 @@ def deviations_of_joint(
         signal: [index] if signal.key in COMMANDED else range(len(covariance))
         for signal, covariance in covariances.items()
     }
-    computed = _propagated(variables, motion, estimates, covariances, components)
+    computed = _propagate(variables, motion, estimates, covariances, components)
     of_joints = {signal: each for signal, each in covariances.items() if signal is not WRENCH}
-    given = _given(robot, estimates, of_joints)
+    of_signals = _signal_deviations(robot, estimates, of_joints)
     return Deviations(
-        {**of_joint(computed.deviations, 0), **of_joint(given.deviations, index)},
+        {**of_joint(computed.deviations, 0), **of_joint(of_signals.deviations, index)},
         {
             **{name: row[0] for name, row in computed.unstated.items()},
-            **{name: row[index] for name, row in given.unstated.items()},
+            **{name: row[index] for name, row in of_signals.unstated.items()},
         },
     )
 
@@ -224,7 +224,7 @@ _Variables = Callable[[Motion], Mapping[str, AnyArray]]
 """Function that computes variables along a motion, by name, each (times, joints[, 2])."""
 
 
-def _propagated(
+def _propagate(
     variables: _Variables,
     motion: Motion,
     estimates: Mapping[Signal, SampledProfile],
@@ -242,7 +242,7 @@ def _propagated(
         for name, row in zip(signal.names, rows, strict=True)
     ]
     values, gradients = _values_and_gradients(variables, motion, shifts)
-    found, unstated = {}, {}
+    spreads_by_name, unstated = {}, {}
     hidden = np.array([not shift.stated for shift in shifts])
     for name, value in values.items():
         unstated[name] = np.any(gradients[name][hidden] != 0, axis=(0, 1))
@@ -252,24 +252,26 @@ def _propagated(
             variance += _variance(gradient, _correlations(covariance, spreads[signal]))
             first += len(gradient)
         spread = np.sqrt(np.maximum(variance, 0))  # below zero by rounding only
-        found[name] = np.where(np.isnan(value), np.nan, np.nan_to_num(spread, nan=np.inf, posinf=np.inf))
-    return Deviations(found, unstated)
+        spreads_by_name[name] = np.where(
+            np.isnan(value), np.nan, np.nan_to_num(spread, nan=np.inf, posinf=np.inf)
+        )
+    return Deviations(spreads_by_name, unstated)
 
 
-def _given(
+def _signal_deviations(
     robot: Robot, estimates: Mapping[Signal, SampledProfile], covariances: Mapping[Signal, FloatArray]
 ) -> Deviations:
     """Return the deviations of the recorded signals themselves, and of their derivatives."""
-    found, unstated = {}, {}
+    spreads_by_name, unstated = {}, {}
     for signal, covariance in covariances.items():
         for name, rows in zip(signal.names, np.moveaxis(_spreads(covariance), 1, 0), strict=True):
             if name in estimates[signal].estimated:
-                rows[_ignored(robot, signal)] = np.nan
-                found[name], unstated[name] = rows.T, ~estimates[signal].stated
-    return Deviations(found, unstated)
+                rows[_joints_without_signal(robot, signal)] = np.nan
+                spreads_by_name[name], unstated[name] = rows.T, ~estimates[signal].stated
+    return Deviations(spreads_by_name, unstated)
 
 
-def _ignored(robot: Robot, signal: Signal) -> list[int]:
+def _joints_without_signal(robot: Robot, signal: Signal) -> list[int]:
     """Return the joints that ignore a signal, although it may have a column for them."""
     commanded = signal.key in COMMANDED
     return [
@@ -313,9 +315,9 @@ def _without_inner_dampers(robot: Robot) -> Robot:
 
 def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:
     """Return the motion, followed for each shift by the motion with it added and with it subtracted."""
-    given = motion.variables()
-    times = given.pop("time")
-    copies = {name: np.repeat(array[None], 1 + 2 * len(shifts), axis=0) for name, array in given.items()}
+    variables = motion.variables()
+    times = variables.pop("time")
+    copies = {name: np.repeat(array[None], 1 + 2 * len(shifts), axis=0) for name, array in variables.items()}
     for place, shift in enumerate(shifts):
         copies[shift.name][1 + 2 * place, :, shift.component] += shift.size
         copies[shift.name][2 + 2 * place, :, shift.component] -= shift.size

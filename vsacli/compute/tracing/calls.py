@@ -19,7 +19,7 @@ MOST_OUTLINED = 500
 """Largest number of operations of an outlined body; the compiler's time grows with its square."""
 
 
-class _Run(NamedTuple):
+class _OperationRun(NamedTuple):
     """Consecutive operations."""
 
     operations: list[Symbol]
@@ -31,7 +31,7 @@ def with_outlined_runs(program: Program) -> Program:
     last_part = {
         operand.index: number
         for number, part in enumerate(parts)
-        for symbol in (part.operations if isinstance(part, _Run) else [part])
+        for symbol in (part.operations if isinstance(part, _OperationRun) else [part])
         for operand in symbol.operands
         if isinstance(operand, Symbol)
     }
@@ -39,7 +39,7 @@ def with_outlined_runs(program: Program) -> Program:
     free = count(1 + max((symbol.index for symbol in program.operations), default=0))
     operations: list[Symbol] = []
     for number, part in enumerate(parts):
-        if isinstance(part, _Run):
+        if isinstance(part, _OperationRun):
             results = [symbol for symbol in part.operations if last_part.get(symbol.index, 0) > number]
             operations += _called(part.operations, results, next(free))
         else:
@@ -47,20 +47,20 @@ def with_outlined_runs(program: Program) -> Program:
     return program._replace(operations=tuple(operations))
 
 
-def _calls_and_runs(operations: Sequence[Symbol]) -> Iterator[Symbol | _Run]:
+def _calls_and_runs(operations: Sequence[Symbol]) -> Iterator[Symbol | _OperationRun]:
     """Yield calls and their items unchanged, and the operations between them in runs."""
     run: list[Symbol] = []
     for symbol in operations:
         of_call = symbol.operation == "call" or _is_item_of_call(symbol)
         if run and (of_call or (len(run) >= MOST_OUTLINED and symbol.operation != "item")):
-            yield _Run(run)
+            yield _OperationRun(run)
             run = []
         if of_call:
             yield symbol
         else:
             run.append(symbol)
     if run:
-        yield _Run(run)
+        yield _OperationRun(run)
 
 
 def _is_item_of_call(symbol: Symbol) -> bool:

@@ -230,7 +230,7 @@ def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[st
     ddq, _, friction = loop.response(integrated.time, phase, integrated.demand)
     springs = drivetrain.state(phase.q, phase.theta, phase.dq, phase.dtheta)
     passed_on = torque if friction is None else torque - friction
-    dampers = plant.dampers.passed(loop.reference.damping(integrated.time), phase.dq, phase.dtheta)
+    dampers = plant.dampers.parallel(loop.reference.damping(integrated.time), phase.dq, phase.dtheta)
     tau_e = plant.link_torque(phase.dq, ddq, add(springs.tau_e, dampers.links), passed_on)
     deflected = drivetrain.deflected
     theta, dtheta = drivetrain.merged(phase.theta, phase.q), drivetrain.merged(phase.dtheta, phase.dq)

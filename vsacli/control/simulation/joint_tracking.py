@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vsacli.analysis.report_text import number
+from vsacli.analysis.report_text import short_number
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Stored, named
@@ -176,7 +176,7 @@ def error_text(value: float) -> str:
     """Return a number as reports show it: with two digits if it is small, 0 if it is rounding."""
     if math.isnan(value):
         return "-"
-    return number(value) if abs(value) >= 10 else "0" if abs(value) < SMALLEST_ERROR else f"{value:.2g}"
+    return short_number(value) if abs(value) >= 10 else "0" if abs(value) < SMALLEST_ERROR else f"{value:.2g}"
 
 
 def tracking_findings(joints: Sequence[JointTracking], complete: bool) -> Iterator[tuple[int, Finding]]:

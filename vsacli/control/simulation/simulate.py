@@ -34,7 +34,7 @@ from vsacli.control.simulation.stick_slip import sliding
 from vsacli.control.simulation.stiff import check_rounding
 from vsacli.control.simulation.tabulated import Reference
 from vsacli.dynamics.forward import State
-from vsacli.dynamics.inverse import compute_block, fitted
+from vsacli.dynamics.inverse import adapt_trajectory, compute_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -94,7 +94,7 @@ class SimulationRun:
         runs: int = 1,
         tell: Tell = unheard,
     ) -> None:
-        self.robot, self.trajectory = robot, fitted(robot, trajectory)
+        self.robot, self.trajectory = robot, adapt_trajectory(robot, trajectory)
         check_feedback(feedback, gains)
         self._gains, self._initial_error, self._feedback = gains, initial_error, feedback
         self._exact = gains is None and (model is None or model is robot) and initial_error.is_zero

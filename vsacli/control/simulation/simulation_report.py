@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from vsacli.analysis.report_text import energy_lines
-from vsacli.analysis.trouble_text import grouped, of_all_joints
+from vsacli.analysis.trouble_text import group_findings, of_all_joints
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import ReportText, headline
@@ -125,7 +125,9 @@ class SimulationReport(Stored):
         """Return the report in its parts, as people read it."""
         found = [
             *([] if self.ending is None else [self.ending]),
-            *grouped(tracking_findings(self.joints, self.complete), [joint.name for joint in self.joints]),
+            *group_findings(
+                tracking_findings(self.joints, self.complete), [joint.name for joint in self.joints]
+            ),
             *warnings_and_notes(self.warnings, self.notes),
         ]
         lines = [

@@ -48,7 +48,7 @@ class Summary:
         self._late = span[1] - FINAL_SHARE * (span[1] - span[0])
         self._late_errors: list[FloatArray] = []
         self.samples = self.flags = 0
-        self._joints = [_JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
+        self._joints = [_JointTrackingSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._energy = _Energy()
         self._stiffest: FloatArray = np.full(len(robot.joints), -np.inf)
         self._last: tuple[FloatArray, FloatArray] = self._stiffest, self._stiffest
@@ -67,7 +67,7 @@ class Summary:
     def joints(self) -> tuple[JointTracking, ...]:
         """Return the findings of each joint; at least one block must have been added."""
         energies = self._energy.report(self._robot)
-        return tuple(map(_JointSummary.report, self._joints, energies, [self._goal] * len(energies)))
+        return tuple(map(_JointTrackingSummary.report, self._joints, energies, [self._goal] * len(energies)))
 
     def unsettled_warnings(self, joints: Sequence[JointTracking]) -> Iterator[str]:
         """Yield a warning for each joint that ends on target but was often off it shortly before."""
@@ -93,7 +93,7 @@ class Summary:
             )
 
 
-class _JointSummary:
+class _JointTrackingSummary:
     """Findings of one joint, accumulated."""
 
     def __init__(self, joint: Joint, index: int) -> None:

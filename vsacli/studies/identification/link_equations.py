@@ -18,7 +18,7 @@ from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.transmission import JointVariables
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.duals import tangent_of, value_of
-from vsacli.dynamics.drive import motor_torques
+from vsacli.dynamics.drive import shaft_torques
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, apart, seeded
@@ -230,7 +230,7 @@ def _resistance(
     torque: Any = joint.damping * dq + joint_friction(joint.friction, (dq, 0, 0, 0)).tau
     if not joint.actuator.sprung:
         dtheta, ddtheta = (np.stack([rows] * SIDES) for rows in (dq, motion.ddq))
-        torque = torque + motor_torques(joint.actuator, dtheta, ddtheta, np.zeros_like(dtheta))[0]
+        torque = torque + shaft_torques(joint.actuator, dtheta, ddtheta, np.zeros_like(dtheta))[0]
     return value_of(torque), tangent_of(torque, len(numbers), np.shape(dq.value))
 
 

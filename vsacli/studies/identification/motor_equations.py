@@ -19,7 +19,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError, Problem
 from vsacli.compute.duals import Dual, tangent_of, value_of
-from vsacli.dynamics.drive import motor_torques
+from vsacli.dynamics.drive import shaft_torques
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, apart, parameters, seeded
 from vsacli.studies.identification.conditioning import Signals
@@ -149,7 +149,7 @@ def predicted_torques(actuator: Actuator, motion: JointVariables) -> Any:
     tau_transmission = np.stack(actuator.springs_of(motion).tau_transmission)
     missing = np.full((SIDES - len(tau_transmission), *tau_transmission.shape[1:]), np.nan)
     against = np.concatenate((tau_transmission, missing))
-    return motor_torques(actuator, motion.dtheta, motion.ddtheta, against)
+    return shaft_torques(actuator, motion.dtheta, motion.ddtheta, against)
 
 
 def motor_names(robot: Robot, index: int) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from vsacli.compute.vector import ZERO, Scalar, SymmetricTensor, Vector, sub
 from vsacli.dynamics.chain import TorqueDerivatives
 from vsacli.dynamics.elastic_torques import joint_state, link_constants
 from vsacli.dynamics.recursion import recursion
-from vsacli.dynamics.rigid_body import bare
+from vsacli.dynamics.rigid_body import without_drives
 from vsacli.robot.joint import Inertia, Link
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot
@@ -158,7 +158,7 @@ class Regressor(RowKernel):
         """Return the torques of all joints for one link alone; joints beyond it carry nothing."""
         joints = self.robot.joints
         *before, last = [
-            link_constants(joint)._replace(mass=0, com=ZERO, inertia=_NO_INERTIA, damping=0)
+            link_constants(joint)._replace(mass=0, com=ZERO, inertia=_NO_INERTIA, viscous_damping=0)
             for joint in joints[: moving + 1]
         ]
         links = [*before, last._replace(mass=mass, com=com, inertia=inertia)]
@@ -182,7 +182,7 @@ def regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> F
     Returns:
         Y, (joints, 10 joints, samples), N m (N) per kg, kg m, kg m^2.
     """
-    kernel = Regressor(bare(robot))
+    kernel = Regressor(without_drives(robot))
     rows = kernel.arguments.pack({"q": by_joint(q), "dq": by_joint(dq), "ddq": by_joint(ddq)})
     return kernel.results.arrays(TracedEngine().run(kernel, rows))["Y"]
 

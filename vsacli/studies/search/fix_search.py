@@ -21,7 +21,7 @@ from vsacli.base.progress import Countdown, Progress, unseen
 from vsacli.base.texts import significant
 from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.internal_motion import damped_joints, refuse_damped_transmissions
-from vsacli.dynamics.inverse import fitted
+from vsacli.dynamics.inverse import adapt_trajectory
 from vsacli.dynamics.limits import Finding
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
@@ -71,7 +71,7 @@ def fixes(
             valid margin.
         TypeError: robot or trajectory is of another type.
     """
-    trajectory = fitted(robot, trajectory)
+    trajectory = adapt_trajectory(robot, trajectory)
     check_min_margin(min_margin)
     acceptance = Acceptance(robot, min_margin, RecordedLimits(trajectory))
     asked = Task(acceptance, trajectory)

@@ -13,7 +13,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
-from vsacli.dynamics.inverse import command_of, elastic_torques, usual_block
+from vsacli.dynamics.inverse import command_of, link_torques_along, usual_block
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.times import stretch
@@ -87,7 +87,7 @@ class TaskSamples(NamedTuple):
     def loads(self, robot: Robot) -> list[Load]:
         """Return the load of each joint of a robot."""
         motion = self.motion
-        commanded = {**motion.variables(), **elastic_torques(robot, motion)}
+        commanded = {**motion.variables(), **link_torques_along(robot, motion)}
         commands = (command_of(index, commanded) for index in range(len(robot.joints)))
         return [Load(motion.time, command, self.instants) for command in commands]
 
@@ -199,7 +199,7 @@ def _rows(robot: Robot, motion: Motion, joints: list[int], names: tuple[str, ...
     """Return commands of joints along a motion, with elastic torques, (joints, names, instants)."""
     if not (joints and len(motion.time)):
         return np.empty((len(joints), len(names), len(motion.time)))
-    commanded = {**motion.variables(), **elastic_torques(robot, motion)}
+    commanded = {**motion.variables(), **link_torques_along(robot, motion)}
     return np.stack([[commanded[name][:, joint] for name in names] for joint in joints])
 
 

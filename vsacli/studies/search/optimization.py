@@ -19,7 +19,7 @@ from vsacli.base.progress import Countdown
 from vsacli.base.texts import as_name
 from vsacli.base.units import ENERGY
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
-from vsacli.dynamics.inverse import fitted
+from vsacli.dynamics.inverse import adapt_trajectory
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.changed_motion import reads_back, with_raised_stiffness
@@ -90,7 +90,7 @@ def optimize(
         InputError: the trajectory is not for the robot, a required parameter is missing, or `minimize` and
             `vary` cannot be combined.
     """
-    trajectory = fitted(robot, trajectory)
+    trajectory = adapt_trajectory(robot, trajectory)
     check_min_margin(min_margin)
     refuse_damped_transmissions(robot, trajectory, "optimizations")
     varied = varied_joints(robot, vary)

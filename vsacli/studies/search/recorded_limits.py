@@ -132,7 +132,7 @@ def _known_at(
         _probe(limits, changed, index, *rows[:, start : start + several])
         for start in range(0, rows.shape[1], several)
     ]
-    found = Deviations.joined(parts, axis=-1)
+    found = Deviations.concatenated(parts, axis=-1)
     return {
         deviation(name): np.where(found.unstated[name][..., None], np.nan, array)
         for name, array in found.deviations.items()

@@ -18,10 +18,10 @@ from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.variables import Block
 from vsacli.compute.duals import tangents_of
 from vsacli.compute.vector import Scalar
-from vsacli.dynamics.chain import Chain
+from vsacli.dynamics.chain import RecursionInputs
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
-from vsacli.dynamics.inverse import command_of, compute_block, fitted
+from vsacli.dynamics.inverse import adapt_trajectory, command_of, compute_block
 from vsacli.dynamics.recursion import backward, base_frame, forward
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters, seeded
@@ -56,7 +56,9 @@ def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> 
     frame, given = None if motion.wrench is None else motion.wrench.frame, motion.variables()
     arguments = LinkTorques(robot, frame).arguments
     rows = arguments.pack({name: by_joint(given[name]) for name in arguments.shapes})
-    plain, carrying = (LinkTorques(each, frame).chain(rows) for each in (robot, seeded(robot, chosen)))
+    plain, carrying = (
+        LinkTorques(each, frame).recursion_inputs(rows) for each in (robot, seeded(robot, chosen))
+    )
     bodies = forward(plain.links, plain.states, base_frame(plain.gravity))
     for joint, places in _by_joint(chosen).items():
         links, states, gravity, tip = _mixed(plain, carrying, joint)
@@ -75,7 +77,7 @@ def _by_joint(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
     return places
 
 
-def _mixed(plain: Chain, carrying: Chain, joint: int | None) -> Chain:
+def _mixed(plain: RecursionInputs, carrying: RecursionInputs, joint: int | None) -> RecursionInputs:
     """Return the chain with derivatives by the parameters of one joint, or of the robot as a whole."""
     if joint is None:
         return plain._replace(gravity=carrying.gravity, tip=carrying.tip)
@@ -235,7 +237,7 @@ class SensitivityRun:
     slopes: ClassVar[Mapping[str, bool]] = {**dict.fromkeys(OF_MOTORS, True), MARGIN: False}
 
     def __init__(self, robot: Robot, trajectory: Trajectory, patterns: Sequence[str] = ()) -> None:
-        self.robot, self.trajectory = robot, fitted(robot, trajectory)
+        self.robot, self.trajectory = robot, adapt_trajectory(robot, trajectory)
         refuse_damped_transmissions(robot, self.trajectory, "sensitivities")
         self.parameters: tuple[Parameter, ...] = parameters(robot, patterns)
 

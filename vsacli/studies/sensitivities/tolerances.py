@@ -25,7 +25,7 @@ from vsacli.documents.fields import LARGEST
 from vsacli.documents.number import PER_CENT, evaluate
 from vsacli.documents.source import Problems, read_source
 from vsacli.documents.tree import parse_yaml
-from vsacli.dynamics.inverse import compute_block, fitted, usual_block
+from vsacli.dynamics.inverse import adapt_trajectory, compute_block, usual_block
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, no_match
 from vsacli.trajectory.trajectory import Trajectory
@@ -238,7 +238,7 @@ def monte_carlo(
     Raises:
         InputError: the tolerances are so large that every drawn robot is invalid.
     """
-    trajectory, random = fitted(robot, trajectory), np.random.default_rng(seed)
+    trajectory, random = adapt_trajectory(robot, trajectory), np.random.default_rng(seed)
     sums = _Sums(trajectory.samples, len(robot.joints))
     refused = 0
     for _ in range(runs):

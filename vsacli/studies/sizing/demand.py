@@ -19,7 +19,7 @@ from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.flags import Flag, has
 from vsacli.base.json_records import Published, named
 from vsacli.base.variables import Block
-from vsacli.dynamics.dampers import motor_torques
+from vsacli.dynamics.dampers import parallel_damper_torques
 from vsacli.robot.model import Robot
 from vsacli.studies.sizing.shaft import shaft_signals
 from vsacli.trajectory.trajectory import Trajectory
@@ -271,7 +271,7 @@ def _moved(robot: Robot, block: Block) -> dict[str, FloatArray]:
     load = block.tau_transmission.copy()
     for index, joint in enumerate(robot.joints):
         if joint.damper_at("transmission"):
-            load[:, index] += motor_torques(joint, JointVariables.of(block.of_joint(index)))[0].T
+            load[:, index] += parallel_damper_torques(joint, JointVariables.of(block.of_joint(index)))[0].T
         if joint.actuator.coupled_rotors:
             load[:, index] += joint.actuator.coupled_rotors * block.ddtheta[:, index, ::-1]
     load[has(block.flags, UNDONE)] = np.nan

@@ -21,7 +21,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag
 from vsacli.base.signals import POSITION, STIFFNESS, Signal
 from vsacli.base.variables import Block
-from vsacli.dynamics.inverse import command_of, compute_block, elastic_torques
+from vsacli.dynamics.inverse import command_of, compute_block, link_torques_along
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffness
@@ -220,7 +220,7 @@ class Design:
     def _corridors(self, position: Sinusoids) -> tuple[FloatArray, FloatArray]:
         """Return the stiffness range that is admissible at all times, NaN for joints without stiffness."""
         motion = self._motion(position)
-        commanded = {**motion.variables(), **elastic_torques(self.robot, motion)}
+        commanded = {**motion.variables(), **link_torques_along(self.robot, motion)}
         ends = np.full((2, len(self.robot.joints)), np.nan)
         for index, takes in enumerate(self._takes_stiffness):
             if takes:

@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Published
 from vsacli.base.variables import Block
-from vsacli.dynamics.inverse import compute_block, fitted
+from vsacli.dynamics.inverse import adapt_trajectory, compute_block
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.conditioning import Filter, Signals, bandwidth_of, conditioned
 from vsacli.studies.identification.excitation.family import RATE
@@ -247,7 +247,7 @@ def executed(robot: Robot, trajectory: Trajectory) -> Block:
     """
     steps = min(trajectory.samples - 1, round(trajectory.duration * RATE))
     elapsed = np.linspace(0.0, trajectory.duration, steps + 1)
-    block = compute_block(robot, fitted(robot, trajectory).from_zero().at(elapsed))
+    block = compute_block(robot, adapt_trajectory(robot, trajectory).from_zero().at(elapsed))
     motors = [joint.actuator.motor_count for joint in robot.joints]
     torques = [block.tau_motor[:, index, :count] for index, count in enumerate(motors)]
     if not all(np.isfinite(each).all() for each in torques):
