@@ -54,7 +54,7 @@ class InternalMotion(NamedTuple):
     acceleration: FloatArray | None
 
 
-class _Springs(NamedTuple):
+class _DampedState(NamedTuple):
     """State of the springs at deflections.
 
     Attributes:
@@ -188,7 +188,7 @@ class DampedSprings:
         }
 
     def _reach(
-        self, springs: _Springs, phi: FloatArray, command: Command, min_margin: float
+        self, springs: _DampedState, phi: FloatArray, command: Command, min_margin: float
     ) -> tuple[FloatArray, FloatArray, Reach]:
         """Return minimum and maximum stiffness at the torque of the springs, and the reach of the samples."""
         lost, none = ~np.isfinite(phi[0]), np.full_like(command.q, np.nan)
@@ -210,7 +210,7 @@ class DampedSprings:
             ),
         )
 
-    def _margin(self, springs: _Springs, stiffness: FloatArray) -> FloatArray:
+    def _margin(self, springs: _DampedState, stiffness: FloatArray) -> FloatArray:
         """Return the distance of the stiffness from its extremum at the same spread, relative to itself."""
         bent = springs.state.stiffness_curvature(self._rates(0 * stiffness, self._along(stiffness)))
         divisor = 2 * stiffness * np.abs(bent)
@@ -221,13 +221,13 @@ class DampedSprings:
         """Return motor velocities that leave the spread unchanged, (motors, samples)."""
         return np.stack((0 * like - self._behind[1], 0 * like + self._behind[0]))
 
-    def _velocities(self, springs: _Springs, velocity: FloatArray, command: Command) -> FloatArray:
+    def _velocities(self, springs: _DampedState, velocity: FloatArray, command: Command) -> FloatArray:
         still = self._rates(command.dq, np.zeros((self._motors, 1)) * command.dq)
         rate = command.commanded[STIFFNESS.names[1]] - springs.state.stiffness_rate(still)
         return self._solved(springs, velocity + sum(self._behind) * command.dq, rate)
 
     def _accelerations(
-        self, springs: _Springs, acceleration: FloatArray, rates: Components, command: Command
+        self, springs: _DampedState, acceleration: FloatArray, rates: Components, command: Command
     ) -> FloatArray:
         still = self._rates(command.ddq, np.zeros((self._motors, 1)) * command.ddq)
         state = springs.state
@@ -235,14 +235,14 @@ class DampedSprings:
         missing = command.commanded[STIFFNESS.names[2]] - bent
         return self._solved(springs, acceleration + sum(self._behind) * command.ddq, missing)
 
-    def _solved(self, springs: _Springs, of_spread: FloatArray, of_stiffness: FloatArray) -> FloatArray:
+    def _solved(self, springs: _DampedState, of_spread: FloatArray, of_stiffness: FloatArray) -> FloatArray:
         """Return the solution of both rows; of the first alone if there is one motor."""
         if springs.spreading is None:
             return of_spread[None]
         return np.stack(springs.spreading.solve(of_spread, of_stiffness))
 
     def _stiffness(
-        self, springs: _Springs, rates: Components, ddtheta: FloatArray, command: Command
+        self, springs: _DampedState, rates: Components, ddtheta: FloatArray, command: Command
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the commanded stiffness, or that of the springs, with its derivatives."""
         if self._settable:
@@ -252,13 +252,13 @@ class DampedSprings:
         bent = state.stiffness_curvature(rates) + state.stiffness_rate(turning)
         return state.stiffness, state.stiffness_rate(rates), bent
 
-    def springs_at(self, phi: FloatArray, q: FloatArray) -> _Springs:
+    def springs_at(self, phi: FloatArray, q: FloatArray) -> _DampedState:
         """Return the state of the springs at deflections and joint positions."""
         state = self._state(phi, q)
         if not self._settable:
-            return _Springs(state, None)
+            return _DampedState(state, None)
         (one, two), decoupling = self._behind, state.matrix
-        return _Springs(state, MotorMatrix(one, two, decoupling.stiffness_1, decoupling.stiffness_2))
+        return _DampedState(state, MotorMatrix(one, two, decoupling.stiffness_1, decoupling.stiffness_2))
 
     def _state(self, phi: FloatArray, q: FloatArray) -> ElasticState:
         theta = self._positions(phi, q)

@@ -72,7 +72,7 @@ SIDES = 2
 """Largest number of motors of a joint."""
 
 
-class _Group(NamedTuple):
+class _SpringGroup(NamedTuple):
     """Joints of one `Actuator.spring_group`: their springs, and where the joints and motors are."""
 
     elasticity: Elasticity
@@ -124,13 +124,13 @@ class Drivetrain:
         ranges = [each for actuator in actuators if actuator.sprung for each in actuator.phi_ranges]
         self.domain = np.array(ranges).reshape(-1, 2).T
 
-    def _group(self, group: Hashable, actuators: Sequence[Actuator]) -> _Group:
+    def _group(self, group: Hashable, actuators: Sequence[Actuator]) -> _SpringGroup:
         indices = [
             index for index, each in enumerate(actuators) if each.sprung and each.spring_group == group
         ]
         springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in indices])
         members = [actuators[joint] for joint in indices]
-        return _Group(type(members[0]).elasticity(members), np.array(indices), springs)
+        return _SpringGroup(type(members[0]).elasticity(members), np.array(indices), springs)
 
     def of_motors(self, values: FloatArray) -> FloatArray:
         """Return (..., motors) from (..., joints, 2), whose entries without a motor are ignored."""

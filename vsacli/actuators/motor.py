@@ -166,7 +166,7 @@ class Motor(DeclaredRecord):
     def _without_side(self, ratio: float) -> FieldProblem:
         """Return the problem of a motor with a gear but no side, with both meanings of its values."""
         values, of_shaft, of_joint = map(
-            _given, (vars(self), self._reflected(ratio), self._reflected(1 / ratio))
+            _format_constants, (vars(self), self._reflected(ratio), self._reflected(1 / ratio))
         )
         meanings: list[str] = []
         quantities: list[Quantity] = []
@@ -229,7 +229,7 @@ class Motor(DeclaredRecord):
         }
 
 
-def _given(values: Mapping[str, Any]) -> Iterator[tuple[str, Quantity, str]]:
+def _format_constants(values: Mapping[str, Any]) -> Iterator[tuple[str, Quantity, str]]:
     """Yield name, quantity and text of the values of `_ON_EITHER_SIDE` that are neither zero nor infinite."""
     friction = values["friction"] or NO_FRICTION
     for name, quantity in _ON_EITHER_SIDE.items():

@@ -143,7 +143,7 @@ class Serial(VariableStiffness):
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
         """Return the springs of joints whose mechanisms are equal."""
-        return _Springs(actuators[0].mechanism)
+        return _MechanismElasticity(actuators[0].mechanism)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """Return phi and theta_2 on the mechanism's branch."""
@@ -159,7 +159,7 @@ class Serial(VariableStiffness):
         return self.mechanism.other_branch(tau_e, stiffness, q)
 
 
-class _Springs(Elasticity):
+class _MechanismElasticity(Elasticity):
     """A mechanism at any number of joints."""
 
     def __init__(self, mechanism: Mechanism) -> None:

@@ -126,7 +126,7 @@ class ColumnMapping:
         Raises:
             InputError: a column is missing, ambiguous, or mapped twice.
         """
-        return _Choice(self, header, known, file).made()
+        return _ColumnSelection(self, header, known, file).made()
 
     def joined(self, other: ColumnMapping) -> ColumnMapping:
         """Return the combination of two mappings of the same file.
@@ -151,7 +151,7 @@ AS_NAMED = ColumnMapping()
 """A mapping that reads each column under its own name."""
 
 
-class _Choice:
+class _ColumnSelection:
     """Selection of columns from a header, with the problems of the mapping."""
 
     def __init__(

@@ -31,14 +31,14 @@ COMMENT_COLUMN = 44
 WIDTH = 110
 
 
-class _Line(NamedTuple):
+class _YamlLine(NamedTuple):
     """A line: its text, a comment on it, and whether it is active or commented out."""
 
     text: str
     comment: str = ""
     active: bool = True
 
-    def inside(self, indent: str = "  ") -> _Line:
+    def inside(self, indent: str = "  ") -> _YamlLine:
         return self._replace(text=indent + self.text)
 
 
@@ -58,12 +58,12 @@ def commented_document(
         head: lines of the comment at the top.
         sources: where a reader finds the value of a field, by `Class.field`; each text is said once.
     """
-    lines = [_Line(f"format: {format_name}"), *_Commented(sources).record(cls, values, "")]
+    lines = [_YamlLine(f"format: {format_name}"), *_Commented(sources).record(cls, values, "")]
     comments = [f"# {line}".rstrip() for line in head]
-    return "\n".join([*comments, *(text for line in lines for text in _rendered(line))]) + "\n"
+    return "\n".join([*comments, *(text for line in lines for text in _wrap_comment(line))]) + "\n"
 
 
-def _rendered(line: _Line) -> Iterator[str]:
+def _wrap_comment(line: _YamlLine) -> Iterator[str]:
     """Yield a line and its wrapped comment, next to it or, if the line is long, before it."""
     text = line.text if line.active else f"# {line.text}"
     comments = [f"# {part}" for part in textwrap.wrap(line.comment, WIDTH - COMMENT_COLUMN - 2)]
@@ -89,7 +89,7 @@ class _Commented:
         self._explained: set[tuple[type, str]] = set()
         self._again = False
 
-    def record(self, cls: type, values: Values, variant: str) -> Iterator[_Line]:
+    def record(self, cls: type, values: Values, variant: str) -> Iterator[_YamlLine]:
         """Yield all fields of a record; fields without a value are inactive and show their defaults."""
         variant = variant_inside(cls, values.get(getattr(cls, "unit_variant", "")), variant) or variant
         for name, (field, default) in declared(cls).items():
@@ -103,48 +103,50 @@ class _Commented:
             elif not known:
                 yield from self._optional(field, name, default, comment, variant)
 
-    def _given(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_Line]:
+    def _given(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_YamlLine]:
         """Yield a field with a value, in one line if all inside is explained already."""
         first, *inside = self._field(kind, name, value, comment, variant)
         if inside and self._again and all(line.active and not line.comment for line in inside):
-            yield _Line(f"{name}: {on_one_line(value)}", comment)
+            yield _YamlLine(f"{name}: {on_one_line(value)}", comment)
         else:
             yield first
             yield from inside
 
-    def _optional(self, field: Field, name: str, default: Any, comment: str, variant: str) -> Iterator[_Line]:
+    def _optional(
+        self, field: Field, name: str, default: Any, comment: str, variant: str
+    ) -> Iterator[_YamlLine]:
         """Yield a field without a value, inactive; of a record its example."""
         if not isinstance(field.kind, Record):
-            yield _Line(f"{name}: {_default(default)}".rstrip(), comment, active=False)
+            yield _YamlLine(f"{name}: {_format_default(default)}".rstrip(), comment, active=False)
             return
         example: Values = {} if default is not None else field.kind.records[""].example(variant)  # type: ignore[attr-defined]
         lines = self._given(field.kind, name, example, comment, variant)
         yield from (line._replace(active=False) for line in lines)
 
-    def _field(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_Line]:
+    def _field(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_YamlLine]:
         """Yield a field for a value in the form used in files; nested fields are indented."""
         match kind:
             case Pair(item):
                 yield from self._field(item, name, value, comment, variant)
             case Record(cls):
-                yield _Line(f"{name}:", comment)
+                yield _YamlLine(f"{name}:", comment)
                 yield from (line.inside() for line in self.record(cls, value, variant))
             case OneOf(variants):
                 chosen = value["type"]
                 others = ", ".join(word for word in variants if word != chosen)
-                yield _Line(f"{name}:", comment)
-                yield _Line(f"type: {chosen}", f"or {others}" if others and comment else "").inside()
+                yield _YamlLine(f"{name}:", comment)
+                yield _YamlLine(f"type: {chosen}", f"or {others}" if others and comment else "").inside()
                 yield from (line.inside() for line in self.record(variants[chosen], value, variant))
             case Items() if kind.records or isinstance(value[0], list):
-                yield _Line(f"{name}:", comment)
+                yield _YamlLine(f"{name}:", comment)
                 yield from self._entries(kind, value, variant)
             case _:
-                yield _Line(f"{name}: {on_one_line(value)}", comment)
+                yield _YamlLine(f"{name}: {on_one_line(value)}", comment)
 
-    def _entries(self, kind: Items, values: Any, variant: str) -> Iterator[_Line]:
+    def _entries(self, kind: Items, values: Any, variant: str) -> Iterator[_YamlLine]:
         """Yield lists as one line each, and the keys of records."""
         if not kind.records:
-            yield from (_Line(f"- {on_one_line(entry)}").inside() for entry in values)
+            yield from (_YamlLine(f"- {on_one_line(entry)}").inside() for entry in values)
             return
         outside = self._again
         for value in values:
@@ -172,7 +174,7 @@ class _Commented:
         return f"{meaning}. {source}"
 
 
-def _default(default: Any) -> str:
+def _format_default(default: Any) -> str:
     """Return a default in the form used in files; empty if it has none."""
     numbers = default if isinstance(default, tuple) else (default,)
     if all(isinstance(number, int | float) and math.isfinite(number) for number in numbers):

@@ -191,7 +191,7 @@ def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: 
     elif len(line) == MAX_HEADER:
         yield f"{HEADER}, found more than {MAX_HEADER} characters without a line break"
     elif all(is_number(column) for column in columns):
-        yield f"{HEADER}, found numbers{_advice(comment)}"
+        yield f"{HEADER}, found numbers{_advise_on_numeric_header(comment)}"
     elif _KEY.match(line):
         yield f"{HEADER}, found YAML, {line.strip()[:40]!r}; rename the file to .yaml"
     elif strict:
@@ -200,7 +200,7 @@ def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: 
         yield from (f"column {column!r} appears {n} times" for column, n in repeated.items() if n > 1)
 
 
-def _advice(comment: int) -> str:
+def _advise_on_numeric_header(comment: int) -> str:
     if comment:
         return f"; if line {comment} is meant, remove its {COMMENT!r}"
     return "; without one, columns are given by their numbers, as in columns: {time: 1, elbow.q: 2}"
@@ -286,9 +286,9 @@ def read_numbers(rows: Rows) -> FloatArray:
     """
     values, reason = np.empty((0, 0)), None
     if not rows.header.interrupted and (rows.all_used or _is_regular(rows)):
-        values, reason = _loaded(rows, float)
+        values, reason = _load_with_numpy(rows, float)
     if not values.size:
-        values, reason = _loaded(rows, float, _cleaned(rows))
+        values, reason = _load_with_numpy(rows, float, _normalized_rows(rows))
     odd = np.isinf(values) if rows.empty_cells else ~np.isfinite(values)
     if values.shape[1] == len(rows.used) and not odd.any():
         return values
@@ -297,11 +297,11 @@ def read_numbers(rows: Rows) -> FloatArray:
 
 def read_integers(rows: Rows) -> npt.NDArray[np.int64] | None:
     """Return the columns used as 64-bit integers, (rows, columns); None if they are not whole numbers."""
-    integers, _ = _loaded(rows, np.int64, _cleaned(rows))
+    integers, _ = _load_with_numpy(rows, np.int64, _normalized_rows(rows))
     return integers if integers.size else None
 
 
-def _loaded(
+def _load_with_numpy(
     rows: Rows, kind: npt.DTypeLike, cleaned: Iterable[str] | None = None
 ) -> tuple[npt.NDArray[Any], object]:
     """Return the rows of the file, or of cleaned lines, and the reason if there are none."""
@@ -361,7 +361,7 @@ class _IrregularError(Exception):
     """A row that does not belong to the table."""
 
 
-def _cleaned(rows: Rows) -> Iterator[str]:
+def _normalized_rows(rows: Rows) -> Iterator[str]:
     """Yield rows of the cells used, with points for decimal commas, and `nan` in empty cells."""
     header, decimals = rows.header, _Decimals(rows.header.separator)
     for _, line in rows.lines():
@@ -404,7 +404,7 @@ def _row_problems(rows: Rows) -> list[Problem]:
             break
     if empty:
         return [Problem(rows.path, 0, "has a header but no rows of values")]
-    problems = [_summary(found) for found in list(alike.values())[:MAX_KINDS]]
+    problems = [_first_with_count(found) for found in list(alike.values())[:MAX_KINDS]]
     if len(alike) > MAX_KINDS:
         problems.append(
             Problem(rows.path, 0, f"more than {MAX_KINDS} kinds of problems; reading stopped there")
@@ -412,7 +412,7 @@ def _row_problems(rows: Rows) -> list[Problem]:
     return problems
 
 
-def _summary(found: list[Problem]) -> Problem:
+def _first_with_count(found: list[Problem]) -> Problem:
     first, count = found[0], len(found)
     if count == 1:
         return first

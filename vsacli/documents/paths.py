@@ -36,22 +36,22 @@ def find(content: Any, path: str) -> Any:
     Raises:
         InputError: with the first word that is not found, and the nearest valid one.
     """
-    return _found(content, path.split("."), ())
+    return _find_from(content, path.split("."), ())
 
 
-def _found(content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+def _find_from(content: Any, words: list[str], place: tuple[str, ...]) -> Any:
     if not words:
         return content
     word, *rest = words
     if word == ALL and isinstance(content, list):
-        return [_found(entry, rest, (*place, str(index))) for index, entry in enumerate(content)]
-    entries = _entries(content)
+        return [_find_from(entry, rest, (*place, str(index))) for index, entry in enumerate(content)]
+    entries = _entries_by_word(content)
     if word not in entries:
-        raise _nowhere(word, entries, place)
-    return _found(entries[word], rest, (*place, word))
+        raise _missing_word_error(word, entries, place)
+    return _find_from(entries[word], rest, (*place, word))
 
 
-def _entries(content: Any) -> dict[str, Any]:
+def _entries_by_word(content: Any) -> dict[str, Any]:
     match content:
         case Mapping():
             return dict(content)
@@ -76,10 +76,10 @@ class ReplacementError(InputError):
         self.path = path
 
 
-def _nowhere(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputError:
+def _missing_word_error(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputError:
     """Return the error for a word that is not among the valid words at a place."""
     words = list(there)
-    where = f"{_joined(place)} has" if place else "there is"
+    where = f"{_dotted_path(place)} has" if place else "there is"
     names = [each for each in words if not each.isdecimal()]
     if not words:
         hint = "; it is a single value"
@@ -91,7 +91,7 @@ def _nowhere(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputEr
     return InputError.one(f"{where} no {word!r}{hint}")
 
 
-def _joined(place: Iterable[str]) -> str:
+def _dotted_path(place: Iterable[str]) -> str:
     return ".".join(place)
 
 
@@ -134,7 +134,7 @@ def replace(
             and the path to it.
     """
     scope = Scope(Problems(file), members or {}, exempt or {})
-    found: _Record = _Replacement(_node(value), scope).in_record(record, path.split("."), ())
+    found: _Record = _Replacement(_node_of_value(value), scope).in_record(record, path.split("."), ())
     return found
 
 
@@ -168,7 +168,7 @@ def replace_all(
     return replace_all(record, refused, members, exempt, file)
 
 
-def _node(value: Any) -> tree.Node:
+def _node_of_value(value: Any) -> tree.Node:
     """Return a value as if it had been read from a file; texts as if in quotes."""
     match value:
         case str():
@@ -176,10 +176,10 @@ def _node(value: Any) -> tree.Node:
         case bool():
             return tree.Scalar(0, on_one_line(value), plain=True)
         case Mapping():
-            entries = {str(key): _node(entry) for key, entry in value.items()}
+            entries = {str(key): _node_of_value(entry) for key, entry in value.items()}
             return tree.Mapping(0, entries, dict.fromkeys(entries, 0))
         case Iterable():
-            return tree.Sequence(0, tuple(map(_node, value)))
+            return tree.Sequence(0, tuple(map(_node_of_value, value)))
     return tree.Scalar(0, "" if value is None else str(value), plain=True)
 
 
@@ -199,7 +199,7 @@ class _Replacement(NamedTuple):
         cls: type = type(record)
         fields = declared(cls)
         if word not in fields:
-            raise _nowhere(word, fields, place)
+            raise _missing_word_error(word, fields, place)
         kind = fields[word][0].kind
         chosen = getattr(record, getattr(cls, "unit_variant", ""), None)
         variant = variant_inside(cls, chosen, self.scope.variant)
@@ -216,21 +216,21 @@ class _Replacement(NamedTuple):
         if not words:
             return self._read(kind, place)
         if content is None:
-            raise InputError.one(f"there is nothing at {_joined(place)}; replace it as a whole")
+            raise InputError.one(f"there is nothing at {_dotted_path(place)}; replace it as a whole")
         if isinstance(kind, Pair) and words[0] not in SIDES:
             return self._in_pair(kind, content, words, place)
         if kind.item is not None:
             return self._in_list(kind, kind.item, content, words, place)
         if words == ["type"] and "" not in kind.records:
             reason = "the type cannot be changed alone, since each type has other keys"
-            example = f"'{_joined(place)}={{type: {tree.plain(self.node)}, ...}}'"
-            raise InputError.one(f"{_joined(place)}.type: {reason}; give the whole mapping, {example}")
+            example = f"'{_dotted_path(place)}={{type: {tree.plain(self.node)}, ...}}'"
+            raise InputError.one(f"{_dotted_path(place)}.type: {reason}; give the whole mapping, {example}")
         if kind.records:
             return self.in_record(content, words, place)
-        raise _nowhere(words[0], (), place)
+        raise _missing_word_error(words[0], (), place)
 
     def _read(self, kind: Kind, place: tuple[str, ...]) -> Any:
-        label, problems = _joined(place), Problems(self.scope.problems.file)
+        label, problems = _dotted_path(place), Problems(self.scope.problems.file)
         if kind.records and not isinstance(kind, Items | Pair) and isinstance(self.node, tree.Scalar):
             keys = dict.fromkeys(key for cls in kind.records.values() for key in declared(cls))
             raise InputError.one(f"{label} is a mapping; set one of its keys: {', '.join(keys)}")
@@ -249,8 +249,8 @@ class _Replacement(NamedTuple):
             both = self.in_value(kind.item, content[0], rest if word == ALL else words, place)
             return both, both
         if word != ALL:
-            choices = f"0, 1 or {ALL}, as in {_joined((*place, '0', *words))}"
-            raise InputError.one(f"{_joined(place)}: its two sides differ; say which by {choices}")
+            choices = f"0, 1 or {ALL}, as in {_dotted_path((*place, '0', *words))}"
+            raise InputError.one(f"{_dotted_path(place)}: its two sides differ; say which by {choices}")
         return self._in_list(kind, kind.item, content, words, place)
 
     def _in_list(self, kind: Kind, each: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
@@ -259,12 +259,12 @@ class _Replacement(NamedTuple):
         names = entry_names(kind, content, self.scope.members)
         indices = _indices(names)
         if word != ALL and word not in indices:
-            raise _nowhere(word, indices, place)
+            raise _missing_word_error(word, indices, place)
         entries = list(content)
         if word != ALL and entries[indices[word]] is None:
             exempt = self.scope.exempt.get(getattr(kind, "purpose", ""), {})
             reason = exempt.get(names[indices[word]], "it has none")
-            raise InputError.one(f"{_joined((*place, word))}: no value goes there: {reason}")
+            raise InputError.one(f"{_dotted_path((*place, word))}: no value goes there: {reason}")
         there = [index for index, entry in enumerate(entries) if entry is not None]
         for index in there if word == ALL else [indices[word]]:
             inside = self._replace(scope=self.scope.of_member(names[index]))

@@ -120,18 +120,18 @@ class Rule(NamedTuple, Generic[_Subject]):
 
     def sentence(self, measured: Measured, other: OtherUnit | None) -> str:
         """Return the warning: field, value, finding, and the likely unit."""
-        path = _of_unit(measured.path, other)
+        path = _path_to_report(measured.path, other)
         known = path == measured.path and not math.isnan(measured.value)
         value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if known else ""
         # Three digits, with a power of ten only where there would be many zeros.
         found = self.finding.format(size=f"{float(f'{measured.size:.3g}'):.6g}", **measured.beside)
         advice = self.advice
         if other is not None:
-            advice = _guess(measured, other) if known else f"is it in {other.unit}?"
-        return f"{'.'.join(map(str, path))}{_component(path)}{value} {found}; {advice}"
+            advice = _guess_unit(measured, other) if known else f"is it in {other.unit}?"
+        return f"{'.'.join(map(str, path))}{_component_name(path)}{value} {found}; {advice}"
 
 
-def _component(path: NumberPath) -> str:
+def _component_name(path: NumberPath) -> str:
     """Return the name of a component that a path gives by its index only; empty if it has none."""
     if len(path) < 3 or not isinstance(path[-1], Entry) or path[-1].name:
         return ""
@@ -140,14 +140,14 @@ def _component(path: NumberPath) -> str:
     return f" ({words[path[-1].number]})" if path[-1].number < len(words) else ""
 
 
-def _guess(measured: Measured, other: OtherUnit) -> str:
+def _guess_unit(measured: Measured, other: OtherUnit) -> str:
     meant = f"did you mean {measured.value:.6g} {other.unit}"
     if measured.unit in ANGLES and other.unit == "deg":
         return f"{meant}?"
     return f"{meant}, which is {measured.value * other.factor:.4g} {measured.unit}?"
 
 
-def _of_unit(path: NumberPath, other: OtherUnit | None) -> NumberPath:
+def _path_to_report(path: NumberPath, other: OtherUnit | None) -> NumberPath:
     return (*path[:-1], *other.field) if other and other.field else path
 
 
@@ -176,7 +176,7 @@ class Written:
         steps = path if self._moved is None else self._moved(self._root, path)
         node = self._root
         for taken, step in enumerate(steps):
-            inner = _inside(node, step)
+            inner = _child_node(node, step)
             if inner is None:
                 return node, steps[taken:]
             node = inner
@@ -207,7 +207,7 @@ class Written:
         return bool(_EXPRESSION_OF_ANGLE.search(node.text))
 
 
-def _inside(node: tree.Node, step: str | Entry) -> tree.Node | None:
+def _child_node(node: tree.Node, step: str | Entry) -> tree.Node | None:
     match node, step:
         case tree.Mapping(entries=entries), _:
             return entries.get(str(step))
@@ -250,15 +250,17 @@ def findings(
     """Return the warnings about implausible values, with file and line if the file has the same value."""
     named = {rule.name: rule for rule in rules}
     found = strange(rules, subject, written, known)
-    problems = (_problem(named[name], each, written) for name, several in found.items() for each in several)
+    problems = (
+        _warning_about(named[name], each, written) for name, several in found.items() for each in several
+    )
     return tuple(dict.fromkeys(problems))
 
 
-def _problem(rule: Rule[Any], measured: Measured, written: Written | None) -> Problem:
+def _warning_about(rule: Rule[Any], measured: Measured, written: Written | None) -> Problem:
     """Return the warning about a number."""
     other = rule.other_unit(measured)
     said = written.said(measured) if written is not None else None
     if written is None or said is None:
         return Problem("", 0, rule.sentence(measured, other))
-    line = written.line(_of_unit(measured.path, other))
+    line = written.line(_path_to_report(measured.path, other))
     return Problem(written.path, line, rule.sentence(said, other))

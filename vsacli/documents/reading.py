@@ -122,21 +122,21 @@ def read_changes(texts: Iterable[str]) -> dict[str, Any]:
             raise ChangeError.of(text, "expected PATH=VALUE, e.g. joints.*.link.mass=2.5")
         if path in given:
             raise ChangeError.of(text, f"{path} is also set to {quoted(given[path])}; set it once")
-        given[path], changes[path] = written, _value(text, written)
+        given[path], changes[path] = written, _parse_change_value(text, written)
     return changes
 
 
 def written(changes: Changes) -> list[str]:
     """Return changes as texts that `read_changes` accepts."""
-    return [f"{path}={_text(value)}" for path, value in changes.items()]
+    return [f"{path}={_format_change_value(value)}" for path, value in changes.items()]
 
 
-def _text(value: Any) -> str:
+def _format_change_value(value: Any) -> str:
     """Return a value as YAML: JSON, without the quotes of texts that begin with a digit."""
     return value if isinstance(value, str) else _NUMBER.sub(r"\1", json.dumps(value))
 
 
-def _value(change: str, text: str) -> Any:
+def _parse_change_value(change: str, text: str) -> Any:
     problems = Problems("")
     try:
         node = parse_yaml(text, problems)

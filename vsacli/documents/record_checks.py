@@ -102,7 +102,7 @@ def value_problems(kind: Kind, check: Check | None, content: Any, path: FieldPat
     """Yield the problems of a value at a path; its numbers must meet the condition."""
     fault = fault_of(kind, content)
     if fault is not None:
-        yield _problem(kind, path, fault)
+        yield _problem_in_units(kind, path, fault)
     elif isinstance(kind, OwnKind):
         yield from kind.problems(path, content)
     elif isinstance(kind, Items) and kind.unique is not None:  # of records, which are checked
@@ -125,7 +125,7 @@ def _number_problems(
         return
     fault = fault_of_number(content, check or _ANY)
     if fault:
-        yield _problem(kind, path, f"{fault} {{}}" if _has_unit(kind) else fault)
+        yield _problem_in_units(kind, path, f"{fault} {{}}" if _has_unit(kind) else fault)
 
 
 def _repeated_entries(key: str, content: Iterable[Any], path: FieldPath) -> Iterator[FieldProblem]:
@@ -140,7 +140,7 @@ def _has_unit(kind: Kind) -> bool:
     return kind.unit is not None and _WITHOUT_UNIT.isdisjoint((kind.unit.revolute, kind.unit.prismatic))
 
 
-def _problem(kind: Kind, path: FieldPath, message: str) -> FieldProblem:
+def _problem_in_units(kind: Kind, path: FieldPath, message: str) -> FieldProblem:
     """Return a problem; each `{}` in the message stands for the unit."""
     quantities = (kind.unit,) * message.count("{}") if kind.unit is not None else ()
     return FieldProblem(path, message, quantities=quantities)

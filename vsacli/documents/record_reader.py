@@ -77,13 +77,13 @@ def read_record(
     valid = {name: content for name, content in values.items() if content is not INVALID}
     problems = list(field_problems(cls, valid))
     if problems:
-        _note_of_fields(problems, fields, node, scope)
+        _note_field_problems(problems, fields, node, scope)
     if problems or len(valid) < len(values) or not mistyped.isdisjoint(fields):
         return INVALID
     try:
         return cls.of_valid_fields(valid)
     except InvalidRecordError as error:
-        _note_of_record(error.fields, node, prefix, scope)
+        _note_record_problems(error.fields, node, prefix, scope)
     except InputError as error:
         scope.problems.include(error)
     return INVALID
@@ -121,7 +121,7 @@ def _note_missing(name: str, field: Field, node: tree.Mapping, prefix: str, scop
     scope.problems.add(node.line, f"{prefix}missing key {name!r} ({field.doc}){example}")
 
 
-def _note_of_fields(
+def _note_field_problems(
     problems: Iterable[FieldProblem],
     fields: Mapping[str, tuple[Field, Any]],
     node: tree.Mapping,
@@ -138,17 +138,19 @@ def _note_of_fields(
         fault = "" if of_joints else f"{name}: {problem.message}"
         equal.setdefault((name, line_along(problem.path, node, scope), message, fault), []).append(joint)
     for (name, line, message, fault), joints in equal.items():
-        scope.problems.add(line, f"{name}{_of_joints(joints, members)}: {message}", fault)
+        scope.problems.add(line, f"{name}{_joints_with_problem(joints, members)}: {message}", fault)
 
 
-def _of_joints(joints: Sequence[str], members: Sequence[str]) -> str:
+def _joints_with_problem(joints: Sequence[str], members: Sequence[str]) -> str:
     """Return the joints that share a problem, after the name of a field; empty if all joints do."""
     if not joints[0] or (len(joints) > 1 and len(joints) == len(members)):
         return ""
     return f" of {'joint' if len(joints) == 1 else 'joints'} {', '.join(joints)}"
 
 
-def _note_of_record(problems: Iterable[FieldProblem], node: tree.Mapping, prefix: str, scope: Scope) -> None:
+def _note_record_problems(
+    problems: Iterable[FieldProblem], node: tree.Mapping, prefix: str, scope: Scope
+) -> None:
     """Note the problems of a record whose fields are valid."""
     for problem in problems:
         message = problem.in_units(scope.variant).in_file(list(scope.members))
@@ -231,7 +233,7 @@ def _read_choice(kind: Choice, node: Node, label: str, scope: Scope) -> Any:
     return scope.unexpected(node, f"one of {', '.join(kind.options)}", label)
 
 
-def _read_table(kind: TableFile, node: Node, label: str, scope: Scope) -> Any:
+def _read_table_file(kind: TableFile, node: Node, label: str, scope: Scope) -> Any:
     """Return the table in a file, whose problems are noted under the name of that file."""
     name = read_text(kind, node, label, scope)
     if name is INVALID:
@@ -327,25 +329,27 @@ def _read_per_joint(kind: PerJoint, node: Node, label: str, scope: Scope) -> Any
         scope.survey.append((kind.unit, node))
         return INVALID
     exempt = scope.exempt.get(kind.purpose, {})
-    nodes = _by_joint(node, label, scope, exempt)
+    nodes = _nodes_by_joint(node, label, scope, exempt)
     if nodes is None:
         return INVALID
     return all_valid(
-        _no_number(nodes.get(name), name, exempt[name], label, scope)
+        _refuse_number(nodes.get(name), name, exempt[name], label, scope)
         if name in exempt
         else _read_number(kind.item, nodes[name], label, scope.of_member(name))
         for name in scope.members
     )
 
 
-def _no_number(node: Node | None, name: str, reason: str, label: str, scope: Scope) -> Any:
+def _refuse_number(node: Node | None, name: str, reason: str, label: str, scope: Scope) -> Any:
     """Return None for an exempt joint; note a problem if it has a value."""
     if node is None or (isinstance(node, Scalar) and node.is_null):
         return None
     return scope.unexpected(node, f"no value for {name}", label, f": {reason}")
 
 
-def _by_joint(node: Node, label: str, scope: Scope, exempt: Mapping[str, str]) -> Mapping[str, Node] | None:
+def _nodes_by_joint(
+    node: Node, label: str, scope: Scope, exempt: Mapping[str, str]
+) -> Mapping[str, Node] | None:
     """Return the node for each joint (a scalar for all except exempt ones); None if joints are wrong."""
     names = scope.members
     match node:
@@ -407,7 +411,7 @@ _READERS: Mapping[type[Kind], Callable[[Any, Node, str, Scope], Any]] = {
     Text: read_text,
     Name: read_text,
     Choice: _read_choice,
-    TableFile: _read_table,
+    TableFile: _read_table_file,
     Vector: _read_vector,
     Interval: _read_interval,
     NamedNumbers: _read_named_numbers,

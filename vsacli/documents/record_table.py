@@ -49,7 +49,7 @@ class RecordTable(NamedTuple, Generic[_Record]):
     source: Source
 
 
-class _Columns(NamedTuple):
+class _ColumnsByField(NamedTuple):
     """The columns of a table, assigned to fields.
 
     Attributes:
@@ -85,7 +85,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     source, text = read_source(path, MAX_BYTES, HEADER)
     problems = Problems(source.path)
     header = header_of(BytesIO(text.encode()), source.path)
-    columns = _columns(header, cls, problems)
+    columns = _assign_columns(header, cls, problems)
     problems.check()
     records: dict[int, _Record] = {}
     first: dict[Any, int] = {}
@@ -93,7 +93,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
         cells = [cell.strip() for cell in cells_of(content, header.separator)]
         if not any(cells):
             continue
-        record = _record(cells, columns, cls, Scope(problems, {}, {}), number)
+        record = _read_row(cells, columns, cls, Scope(problems, {}, {}), number)
         if record is not None:
             records[number] = record
             key = getattr(record, unique)
@@ -105,17 +105,17 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     return RecordTable(tuple(records.values()), tuple(records), tuple(columns.others), source)
 
 
-def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
+def _assign_columns(header: Header, cls: type, problems: Problems) -> _ColumnsByField:
     """Return the columns of a header by field; refuse an unknown name that is close to a field's."""
     fields = declared(cls)
-    columns = _Columns(len(header.columns), {}, {}, {}, [])
+    columns = _ColumnsByField(len(header.columns), {}, {}, {}, [])
     meant = set()
     for index, (name, unit) in enumerate(map(split_heading, header.columns)):
         if name in columns.places:
             problems.add(header.line, f"column {name!r} appears more than once")
         elif name in fields:
             columns.places[name] = index
-            columns.factors[name] = _factor(name, unit, fields[name][0].kind, header.line, problems)
+            columns.factors[name] = _factor_to_si(name, unit, fields[name][0].kind, header.line, problems)
             if columns.factors[name] != 1 and unit is not None:
                 columns.units[name] = unit, fields[name][0].quantity.revolute
         else:
@@ -136,7 +136,7 @@ def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
     return columns
 
 
-def _factor(name: str, unit: str | None, kind: Kind, line: int, problems: Problems) -> float:
+def _factor_to_si(name: str, unit: str | None, kind: Kind, line: int, problems: Problems) -> float:
     if unit is None:
         return 1.0
     try:
@@ -148,8 +148,8 @@ def _factor(name: str, unit: str | None, kind: Kind, line: int, problems: Proble
         return math.nan
 
 
-def _record(
-    cells: Sequence[str], columns: _Columns, cls: type[_Record], scope: Scope, line: int
+def _read_row(
+    cells: Sequence[str], columns: _ColumnsByField, cls: type[_Record], scope: Scope, line: int
 ) -> _Record | None:
     """Return the record of a row; None if its problems were noted."""
     if len(cells) != columns.width:
@@ -175,11 +175,11 @@ def _record(
         problems.check()
     except InputError as error:
         for problem in error.problems:
-            scope.problems.add(line, _as_written(problem.message, cells, columns))
+            scope.problems.add(line, _in_file_units(problem.message, cells, columns))
     return None if record is INVALID else record
 
 
-def _as_written(message: str, cells: Sequence[str], columns: _Columns) -> str:
+def _in_file_units(message: str, cells: Sequence[str], columns: _ColumnsByField) -> str:
     """Return a message about a converted number with the number and unit of the file."""
     field = message.partition(":")[0]
     if field not in columns.units:

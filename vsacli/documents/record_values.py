@@ -58,20 +58,20 @@ def arrays(
         case Record():
             yield from of_record(content)
         case OneOf():
-            yield _single(Text(), kind.word_of(content))._replace(path=("type",))
+            yield _resolve_single(Text(), kind.word_of(content))._replace(path=("type",))
             yield from of_record(content)
         case NamedNumbers():
             for name, entry in content:
-                yield _single(kind.number, entry)._replace(path=(name,))
+                yield _resolve_single(kind.number, entry)._replace(path=(name,))
         case Pair(item, dim):
-            yield from _stacked(dim, (arrays(item, side, of_record) for side in content))
+            yield from _stack_members(dim, (arrays(item, side, of_record) for side in content))
         case Items(item=item, records=records) if records:
-            yield from _stacked("joint", (arrays(item, joint, of_record) for joint in content))
+            yield from _stack_members("joint", (arrays(item, joint, of_record) for joint in content))
         case _:
-            yield _single(kind, content)
+            yield _resolve_single(kind, content)
 
 
-def _single(kind: Kind, content: Any) -> ResolvedField:
+def _resolve_single(kind: Kind, content: Any) -> ResolvedField:
     """Return one text, one number, or numbers along dimensions; the caller sets path and description."""
     if kind.dims is None:
         raise TypeError(f"a field of the kind {type(kind).__name__} has no array form")
@@ -81,7 +81,7 @@ def _single(kind: Kind, content: Any) -> ResolvedField:
     return ResolvedField((), kind.dims, kind.unit, "", np.array(content, dtype=np.float64))
 
 
-def _stacked(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[ResolvedField]:
+def _stack_members(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[ResolvedField]:
     """Join the fields of all joints, or of both sides of a joint, along a new first axis.
 
     The variant of a field with most dimensions determines the shape: joints may have one or two motors or
@@ -95,11 +95,11 @@ def _stacked(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[R
             prototypes[part.path] = part
     for path, part in prototypes.items():
         absent = np.full_like(part.values, "" if part.quantity is None else np.nan)
-        values = np.stack([_fitted(table.get(path, absent), absent) for table in tables])
+        values = np.stack([_pad_to_both_sides(table.get(path, absent), absent) for table in tables])
         yield part._replace(dims=(dim, *part.dims), values=values)
 
 
-def _fitted(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+def _pad_to_both_sides(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """Return the values in the shape of two sides; values of one side become the first."""
     if values.shape == absent.shape:
         return values
@@ -183,10 +183,12 @@ def numbers(
         variant = variant_inside(cls, getattr(record, cls.unit_variant), variant)
     for name, (field, _) in declared(cls).items():
         requirement = "" if field.check is None else field.check.requirement
-        yield from _numbers(field.kind, getattr(record, name), requirement, members, (*path, name), variant)
+        yield from _numbers_in_value(
+            field.kind, getattr(record, name), requirement, members, (*path, name), variant
+        )
 
 
-def _numbers(
+def _numbers_in_value(
     kind: Kind,
     content: Any,
     requirement: str,
@@ -197,11 +199,13 @@ def _numbers(
     if content is None:
         return
     if isinstance(kind, Pair) and content[0] is content[1]:
-        yield from _numbers(kind.item, content[0], requirement, members, path, variant)
+        yield from _numbers_in_value(kind.item, content[0], requirement, members, path, variant)
     elif kind.item is not None:
         names = entry_names(kind, content, members)
         for number, (name, entry) in enumerate(zip(names, content, strict=True)):
-            yield from _numbers(kind.item, entry, requirement, members, (*path, Entry(number, name)), variant)
+            yield from _numbers_in_value(
+                kind.item, entry, requirement, members, (*path, Entry(number, name)), variant
+            )
     elif kind.records:
         yield from numbers(content, members, path, variant)
     elif kind.unit is not None and math.isfinite(content):

@@ -301,7 +301,7 @@ def refuse_other_formats(path: str | os.PathLike[str]) -> None:
     name = os.fspath(path)
     if noun := unreadable(name):
         raise InputError.one(f"is a {noun}; expected text", name) from None
-    sentence = SENTENCES.get(_format(name))
+    sentence = SENTENCES.get(_recognize_format(name))
     if sentence is None:
         return
     stem = PurePath(name).name.split(".")[0] or "arm"
@@ -319,10 +319,10 @@ def refuse_other_formats(path: str | os.PathLike[str]) -> None:
 
 def unreadable(path: str | os.PathLike[str]) -> str:
     """Return what a file is that no command reads, such as `PNG image`; empty for other files."""
-    return UNREADABLE.get(_format(os.fspath(path)), "")
+    return UNREADABLE.get(_recognize_format(os.fspath(path)), "")
 
 
-def _format(name: str) -> str:
+def _recognize_format(name: str) -> str:
     """Return the format by the content, or else by the ending; empty if unknown."""
     ending = PurePath(name).suffix.lower().removeprefix(".")
     try:
@@ -339,7 +339,7 @@ def _format(name: str) -> str:
         return by_name if found == "zip" and by_name in SENTENCES else found
     text = beginning.decode("latin-1").lstrip("\ufeffï»¿ \t\r\n")
     if text.startswith("<"):
-        return _of_xml(text, ending)
+        return _recognize_xml(text, ending)
     if by_name in SENTENCES:
         return by_name if b"\0" in beginning else ""
     return "" if beginning.startswith((HDF5_SIGNATURE, *UTF16_MARKS)) else _binary(beginning)
@@ -351,7 +351,7 @@ def _binary(beginning: bytes) -> str:
     return "binary" if len(first) <= 3 * first.count(0) > 0 else ""
 
 
-def _of_xml(text: str, ending: str) -> str:
+def _recognize_xml(text: str, ending: str) -> str:
     tag = _ROOT_TAG.search(_COMMENT.sub("", text))
     root = tag[1] if tag else ""
     if root != "robot":

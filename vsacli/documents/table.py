@@ -199,9 +199,9 @@ def read_table(
                     numbered=mapping.numbers,
                     skipped=mapping.skip_rows,
                 )
-                digest, text = _survey(content, name)
+                digest, text = _digest_and_text(content, name)
             chosen = mapping.applied(header, known, name)
-            headings, values, first_stamp = _values(name, header, chosen, empty_cells)
+            headings, values, first_stamp = _read_values(name, header, chosen, empty_cells)
             rated = mapping.rate is not None and chosen.time is None and len(values) > 0
             if rated:
                 headings = (*headings, TIME)
@@ -223,7 +223,7 @@ def read_table(
     )
 
 
-def _survey(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
+def _digest_and_text(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
     """Return the SHA-256 of a file, and its content if kept; refuse NUL characters and very long lines."""
     content.seek(0)
     digest, line, text = hashlib.sha256(), 1, b""
@@ -241,7 +241,7 @@ def _survey(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
     return digest.hexdigest(), text if len(text) <= MAX_DOCUMENT_BYTES else None
 
 
-def _values(
+def _read_values(
     name: str, header: Header, chosen: ChosenColumns, empty_cells: bool
 ) -> tuple[tuple[str, ...], FloatArray, int | str | None]:
     """Return headings and numbers of the columns, and the first stamp if it was subtracted from the times."""
@@ -249,7 +249,7 @@ def _values(
         return chosen.headings, np.empty((0, 0)), None
     rows = Rows(name, header, chosen.places, empty_cells)
     if chosen.time is None:
-        return chosen.headings, _scaled(read_numbers(rows), chosen), None
+        return chosen.headings, _apply_factors(read_numbers(rows), chosen), None
     headings, column = chosen.headings, chosen.places.index(chosen.time)
     times = rows._replace(used=(chosen.time,))
     if shows_a_clock(times._replace(empty_cells=True)):
@@ -259,15 +259,15 @@ def _values(
         values = np.insert(numbers, column, stamps, axis=1) if others else stamps[:, None]
         heading = f"{split_heading(headings[column])[0]} [ns]"
         headings = (*headings[:column], heading, *headings[column + 1 :])
-        return headings, _scaled(values, chosen), first
+        return headings, _apply_factors(values, chosen), first
     values = read_numbers(rows)
     since, values[:, column] = read_stamps(rows, chosen.time, chosen.nanoseconds, values[:, column])
     if since is not None:
         _check_unit(since, headings[column], name, header.line)
-    return headings, _scaled(values, chosen), since
+    return headings, _apply_factors(values, chosen), since
 
 
-def _scaled(values: FloatArray, chosen: ChosenColumns) -> FloatArray:
+def _apply_factors(values: FloatArray, chosen: ChosenColumns) -> FloatArray:
     for column, factor in enumerate(chosen.factors):
         if factor != 1:
             values[:, column] *= factor

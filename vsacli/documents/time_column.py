@@ -103,7 +103,7 @@ def read_clock(text: str) -> Clock | None:
     if found["half"]:
         hours = hours % 12 + 12 * (found["half"].upper() == "PM")
     fraction = (found["fraction"] or found["after_colon"] or "").ljust(DIGITS, "0")[:DIGITS]
-    whole = hours * 3600 + int(found["minutes"]) * 60 + int(found["seconds"]) - _offset(found["zone"])
+    whole = hours * 3600 + int(found["minutes"]) * 60 + int(found["seconds"]) - _zone_offset(found["zone"])
     if found["year"] is not None:
         try:
             day = date(int(found["year"]), int(found["month"]), int(found["day"]))
@@ -113,7 +113,7 @@ def read_clock(text: str) -> Clock | None:
     return Clock(whole * NANOSECONDS + int(fraction), found["year"] is not None)
 
 
-def _offset(zone: str | None) -> int:
+def _zone_offset(zone: str | None) -> int:
     """Return the offset of a time zone from UTC, s."""
     if zone is None or zone.upper() == "Z":
         return 0
@@ -166,7 +166,7 @@ def shows_a_clock(times: Rows) -> bool:
     Raises:
         InputError: the column begins with a text that is neither a clock text nor a number.
     """
-    line, cell = next(_cells(times), (0, ""))
+    line, cell = next(_time_cells(times), (0, ""))
     if is_number(cell.replace(",", ".")) or is_missing(cell):
         return False
     if read_clock(cell) is None:
@@ -181,7 +181,7 @@ def read_clocks(times: Rows) -> tuple[str, FloatArray]:
     Raises:
         InputError: a cell is not a clock text, or not all cells have a date, or none.
     """
-    cells, clocks = list(_cells(times)), list[Clock]()
+    cells, clocks = list(_time_cells(times)), list[Clock]()
     for line, cell in cells:
         clock = read_clock(cell)
         if clock is None or clock.dated != (clocks or [clock])[0].dated:
@@ -191,7 +191,7 @@ def read_clocks(times: Rows) -> tuple[str, FloatArray]:
     return cells[0][1], elapsed(clocks).astype(float)
 
 
-def _cells(times: Rows) -> Iterator[tuple[int, str]]:
+def _time_cells(times: Rows) -> Iterator[tuple[int, str]]:
     return ((line, cells[times.used[0]].strip()) for line, cells in times.texts())
 
 

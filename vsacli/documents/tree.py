@@ -159,7 +159,7 @@ def parse_yaml(text: str, problems: Problems) -> Node:
         problems.fail(
             line, f"the character U+{ord(unprintable[0]):04X} is not allowed in YAML; is this a text file?"
         )
-    builder = _Builder(problems)
+    builder = _TreeBuilder(problems)
     try:
         for event in yaml.parse(text, Loader=_LOADER):
             builder.take(event)
@@ -254,7 +254,7 @@ class _Anchored(NamedTuple):
     height: int
 
 
-class _Builder:
+class _TreeBuilder:
     """A builder that receives events one by one and stores the document in `root`."""
 
     def __init__(self, problems: Problems) -> None:

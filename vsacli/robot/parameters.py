@@ -87,10 +87,12 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
     Raises:
         InputError: a pattern matches no parameter.
     """
-    found = [_parameter(robot, number) for number in numbers(robot) if _matters(number.path)]
-    chosen = [each for each in found if not patterns or any(_fits(each, pattern) for pattern in patterns)]
+    found = [_parameter_at(robot, number) for number in numbers(robot) if _affects_results(number.path)]
+    chosen = [
+        each for each in found if not patterns or any(_matches_pattern(each, pattern) for pattern in patterns)
+    ]
     for pattern in patterns:
-        if not any(_fits(each, pattern) for each in found):
+        if not any(_matches_pattern(each, pattern) for each in found):
             raise InputError.one(no_match(pattern, found))
     return tuple(chosen)
 
@@ -101,36 +103,38 @@ def no_match(pattern: str, found: Sequence[Parameter]) -> str:
     A path is compared word by word. Of a pattern with `*` only the last word counts, since `*` also stands
     for several words.
     """
-    near = [] if "*" in pattern else [path for path in map(str, found) if _similar(pattern, path)][:1]
+    near = (
+        [] if "*" in pattern else [path for path in map(str, found) if _are_similar_paths(pattern, path)][:1]
+    )
     patterns = list(dict.fromkeys(each.of_every_joint for each in found))
-    word = nearest(_last(pattern), dict.fromkeys(map(_last, patterns)))
-    near = near or [each for each in patterns if _last(each) == word]
+    word = nearest(_last_word(pattern), dict.fromkeys(map(_last_word, patterns)))
+    near = near or [each for each in patterns if _last_word(each) == word]
     problem = f"no parameter of the robot matches {pattern!r}"
     if 0 < len(near) <= MOST_NEAR:
         return f"{problem}; did you mean {' or '.join(map(repr, near))}?"
     return f"{problem}; valid: {', '.join(dict.fromkeys(each.of_its_part for each in found))}"
 
 
-def _last(path: str) -> str:
+def _last_word(path: str) -> str:
     return path.rpartition(".")[2]
 
 
-def _similar(one: str, other: str) -> bool:
+def _are_similar_paths(one: str, other: str) -> bool:
     words, others = one.split("."), other.split(".")
     return len(words) == len(others) and all(map(nearest, words, ([each] for each in others)))
 
 
-def _matters(path: NumberPath) -> bool:
+def _affects_results(path: NumberPath) -> bool:
     bounds = LIMITS in path or path[2:4] == OF_DAMPER
     return not bounds and not str(path[-1]).startswith(LARGEST)
 
 
-def _fits(parameter: Parameter, pattern: str) -> bool:
+def _matches_pattern(parameter: Parameter, pattern: str) -> bool:
     words = (str(parameter), ".".join(parameter.by_index))
     return any(fnmatchcase(path, pattern) for path in words)
 
 
-def _parameter(robot: Robot, number: Number) -> Parameter:
+def _parameter_at(robot: Robot, number: Number) -> Parameter:
     entry = number.path[1] if number.path[0] == JOINTS else None
     if not isinstance(entry, Entry):
         return Parameter(*number, None, "")
@@ -165,15 +169,15 @@ def _with_number(content: Any, path: NumberPath, scalar: Scalar) -> Any:
     if not path:
         return scalar
     word = str(path[0])
-    return _remade(content, {word: _with_number(getattr(content, word), path[1:], scalar)})
+    return _replace_unchecked(content, {word: _with_number(getattr(content, word), path[1:], scalar)})
 
 
 def apart(joint: Joint) -> Joint:
     """Return the joint with its own copy of the actuator, which several robots may share."""
-    return _remade(joint, {"actuator": _remade(joint.actuator, {})})
+    return _replace_unchecked(joint, {"actuator": _replace_unchecked(joint.actuator, {})})
 
 
-def _remade(record: _Record, contents: Mapping[str, Any]) -> _Record:
+def _replace_unchecked(record: _Record, contents: Mapping[str, Any]) -> _Record:
     """Return a record with other values in some fields, without its checks and cached values."""
     fields = dataclasses.fields(record)  # type: ignore[arg-type]  # records are dataclasses
     same = {field.name: getattr(record, field.name) for field in fields}

@@ -177,7 +177,7 @@ def load_trajectory(
     """
     check_path(path, "load_trajectory(path, robot)")
     check_robot(robot)
-    return _with_devices(declared_trajectory(path, robot, changes, progress), robot)
+    return _add_device_signals(declared_trajectory(path, robot, changes, progress), robot)
 
 
 def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tuple[TrajectoryFile, Source]:
@@ -216,11 +216,13 @@ def declared_trajectory(
         return recorded_trajectory(path, joints, progress, _rate_of_table(path, changes))
     document, source = changed(*read_trajectory(path, joints), changes, joints.types, joints.exempt)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
-    with _blaming(changes, "rate"):
-        declared = _times(document, recordings, source.path)
+    with _blaming_change(changes, "rate"):
+        declared = _declared_times(document, recordings, source.path)
     if recordings:
         _check_lasting(document, declared, source.path, joints.names)
-    times, profiles = _slowed(document.slow_down, declared, _profiles(document, declared, recordings))
+    times, profiles = _slow_down(
+        document.slow_down, declared, _declared_profiles(document, declared, recordings)
+    )
     wrench = document.declared.get(WRENCH)
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
     checked = CheckedTrajectory(robot, tuple(numbers(document, joints.types)), times, motion)
@@ -232,10 +234,13 @@ def declared_trajectory(
         name=document.name,
         warnings=[
             *(warning for recording in recordings for warning in recording.warnings),
-            *_warnings(document, declared, joints),
+            *_formula_warnings(document, declared, joints),
             *implausible(checked, source),
         ],
-        notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, declared)],
+        notes=[
+            *(note for recording in recordings for note in recording.notes),
+            *_formula_notes(document, declared),
+        ],
         sources=[source, *(recording.source for recording in recordings)],
     )
 
@@ -253,12 +258,12 @@ def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | No
         return None
     from vsacli.documents.columns_file import checked_rate
 
-    with _blaming(changes, "rate"):
+    with _blaming_change(changes, "rate"):
         return checked_rate(changes["rate"])
 
 
 @contextmanager
-def _blaming(changes: Changes, path: str) -> Iterator[None]:
+def _blaming_change(changes: Changes, path: str) -> Iterator[None]:
     """Raise errors of a value as errors of its change, if it was changed."""
     try:
         yield
@@ -269,7 +274,7 @@ def _blaming(changes: Changes, path: str) -> Iterator[None]:
         raise ChangeError(problems, written({path: changes[path]})[0]) from None
 
 
-def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
+def _add_device_signals(trajectory: Trajectory, robot: Robot) -> Trajectory:
     try:
         return with_devices(trajectory, robot)
     except InputError as error:
@@ -304,21 +309,23 @@ def _read_recordings(
     return recordings
 
 
-def _times(document: TrajectoryFile, recordings: Sequence[Recording], file: str) -> Times:
+def _declared_times(document: TrajectoryFile, recordings: Sequence[Recording], file: str) -> Times:
     if recordings:
         return recordings[0].times_at(document.rate, file)
     assert document.lasts is not None, "see TrajectoryFile"
     return UniformTimes(document.lasts, document.rate or DEFAULT_RATE)
 
 
-def _profiles(document: TrajectoryFile, times: Times, recordings: Sequence[Recording]) -> dict[str, Profile]:
+def _declared_profiles(
+    document: TrajectoryFile, times: Times, recordings: Sequence[Recording]
+) -> dict[str, Profile]:
     """Return the profiles by signal key, at the declared pace."""
     first, last = times.span
     formulas = {signal.key: each.over((0.0, last - first)) for signal, each in document.formulas.items()}
     return {**formulas, **{each.signal.key: each for one in recordings for each in one.profiles}}
 
 
-def _slowed(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[Times, dict[str, Profile]]:
+def _slow_down(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[Times, dict[str, Profile]]:
     if factor == 1:
         return times, profiles
     return times.stretched(factor), {key: each.stretched(factor) for key, each in profiles.items()}
@@ -332,12 +339,12 @@ def _check_lasting(document: TrajectoryFile, times: Times, file: str, joint_name
         raise InputError(Problem(file, 0, problem.in_file(joint_names)) for problem in problems)
 
 
-def _warnings(document: TrajectoryFile, times: Times, joints: CommandedJoints) -> Iterator[str]:
+def _formula_warnings(document: TrajectoryFile, times: Times, joints: CommandedJoints) -> Iterator[str]:
     for signal, formula in document.formulas.items():
         for warning in formula.warnings_over(times.span, joints.types):
             yield f"{signal.key}: {warning}"
 
 
-def _notes(document: TrajectoryFile, times: Times) -> Iterator[str]:
+def _formula_notes(document: TrajectoryFile, times: Times) -> Iterator[str]:
     for signal, formula in document.formulas.items():
         yield from (f"{signal.key}: {note}" for note in formula.notes_over(times.span))

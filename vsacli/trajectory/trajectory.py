@@ -178,7 +178,7 @@ class Trajectory:
 
         given = {
             POSITION: (q, dq, ddq, d3q, d4q),
-            **_by_signal({"stiffness": stiffness, **commanded}),
+            **_arrays_by_signal({"stiffness": stiffness, **commanded}),
             WRENCH: (wrench, dwrench, ddwrench),
         }
         times, profiles, warnings = profiles_of_arrays(time, given, fit)
@@ -332,7 +332,7 @@ class Trajectory:
         return time, np.minimum(time - left, right - time)
 
 
-def _by_signal(
+def _arrays_by_signal(
     of_joints: Mapping[str, ArrayLike | None],
 ) -> dict[Signal, tuple[ArrayLike | None, ...]]:
     """Return commanded signals with their derivatives, from arrays by name.
