@@ -133,12 +133,12 @@ class Declaration(DeclaredRecord, ABC):
     @classmethod
     def record(cls, use: Use) -> type[Self]:
         """Return the record class for a use."""
-        made: type[Self] = _record_class(cls, use)
+        made: type[Self] = _record(cls, use)
         return made
 
 
 @cache
-def _record_class(cls: type[Declaration], use: Use) -> Any:
+def _record(cls: type[Declaration], use: Use) -> Any:
     fields = [(name, Any, field) for name, field in cls.fields(use).items()]
     name = f"{'Rigid' if use.rigid else ''}{use.signal.key.capitalize()}{cls.__name__}"
     namespace = {"__doc__": cls.meaning(use), "use": use}
