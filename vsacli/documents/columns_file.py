@@ -46,7 +46,7 @@ class ColumnName(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return a text, or an integer if the node is a whole number without quotes."""
-        if isinstance(node, tree.Scalar) and node.plain and node.text.isdecimal():
+        if isinstance(node, tree.TextNode) and node.plain and node.text.isdecimal():
             return int(node.text)
         return read_text(self, node, label, scope)
 
@@ -94,7 +94,7 @@ class Columns(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return `ColumnSource` records by name."""
-        if not isinstance(node, tree.Mapping) or not node.entries:
+        if not isinstance(node, tree.MapNode) or not node.entries:
             return scope.unexpected(node, "a mapping such as {time: stamp, elbow.q: position}", label)
         found = {name: self._source(entry, f"{label}.{name}", scope) for name, entry in node.entries.items()}
         if INVALID in found.values():
@@ -107,7 +107,7 @@ class Columns(OwnKind):
         }
 
     def _source(self, node: Node, label: str, scope: Scope) -> Any:
-        if isinstance(node, tree.Mapping):
+        if isinstance(node, tree.MapNode):
             return read_record(ColumnSource, node, label, scope)
         column = ColumnName().read(node, label, scope)
         if column == 0:
@@ -137,9 +137,9 @@ class Ignored(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return the word `REST`, or a tuple of names."""
-        if isinstance(node, tree.Sequence):
+        if isinstance(node, tree.ListNode):
             return tree.all_valid([ColumnName().read(item, label, scope) for item in node.items])
-        if isinstance(node, tree.Scalar) and node.text == REST:
+        if isinstance(node, tree.TextNode) and node.text == REST:
             return REST
         return scope.unexpected(node, f"{REST} or a list of columns", label)
 

@@ -172,15 +172,15 @@ def _node_of_value(value: Any) -> tree.Node:
     """Return a value as if it had been read from a file; texts as if in quotes."""
     match value:
         case str():
-            return tree.Scalar(0, value, plain=False)
+            return tree.TextNode(0, value, plain=False)
         case bool():
-            return tree.Scalar(0, on_one_line(value), plain=True)
+            return tree.TextNode(0, on_one_line(value), plain=True)
         case Mapping():
             entries = {str(key): _node_of_value(entry) for key, entry in value.items()}
-            return tree.Mapping(0, entries, dict.fromkeys(entries, 0))
+            return tree.MapNode(0, entries, dict.fromkeys(entries, 0))
         case Iterable():
-            return tree.Sequence(0, tuple(map(_node_of_value, value)))
-    return tree.Scalar(0, "" if value is None else str(value), plain=True)
+            return tree.ListNode(0, tuple(map(_node_of_value, value)))
+    return tree.TextNode(0, "" if value is None else str(value), plain=True)
 
 
 class _Replacement(NamedTuple):
@@ -231,7 +231,7 @@ class _Replacement(NamedTuple):
 
     def _read(self, kind: Kind, place: tuple[str, ...]) -> Any:
         label, problems = _dotted_path(place), Problems(self.scope.problems.file)
-        if kind.records and not isinstance(kind, Items | Pair) and isinstance(self.node, tree.Scalar):
+        if kind.records and not isinstance(kind, Items | Pair) and isinstance(self.node, tree.TextNode):
             keys = dict.fromkeys(key for cls in kind.records.values() for key in declared(cls))
             raise InputError.one(f"{label} is a mapping; set one of its keys: {', '.join(keys)}")
         content = read_value(kind, self.node, label, self.scope._replace(problems=problems))

@@ -169,7 +169,7 @@ class Written:
         try:
             return parse_yaml(self._text, Problems(self.path))
         except InputError:  # not a YAML file
-            return tree.Mapping(0, {}, {})
+            return tree.MapNode(0, {}, {})
 
     def at(self, path: NumberPath) -> tuple[tree.Node, NumberPath]:
         """Return the deepest node along a path, and the remaining steps."""
@@ -189,7 +189,7 @@ class Written:
     def said(self, measured: Measured) -> Measured | None:
         """Return the number with the path to its scalar, which all joints may share; None if it differs."""
         node, left = self.at(measured.path)
-        if not isinstance(node, tree.Scalar) or math.isnan(measured.value):
+        if not isinstance(node, tree.TextNode) or math.isnan(measured.value):
             return measured
         try:
             value = evaluate(node.text, measured.unit)
@@ -202,16 +202,16 @@ class Written:
     def in_angles(self, measured: Measured) -> bool:
         """Return whether the file has this number as an expression with `deg` or `pi`."""
         node, _ = self.at(measured.path)
-        if not isinstance(node, tree.Scalar) or self.said(measured) is None:
+        if not isinstance(node, tree.TextNode) or self.said(measured) is None:
             return False
         return bool(_EXPRESSION_OF_ANGLE.search(node.text))
 
 
 def _child_node(node: tree.Node, step: str | Entry) -> tree.Node | None:
     match node, step:
-        case tree.Mapping(entries=entries), _:
+        case tree.MapNode(entries=entries), _:
             return entries.get(str(step))
-        case tree.Sequence(items=items), Entry(number=number) if number < len(items):
+        case tree.ListNode(items=items), Entry(number=number) if number < len(items):
             return items[number]
     return None
 

@@ -52,7 +52,7 @@ def read_document(
         source, text = read_source(path, expected=expected)
         problems = Problems(source.path)
         root = parse_yaml(text, problems)
-        if not isinstance(root, tree.Mapping):
+        if not isinstance(root, tree.MapNode):
             problems.fail(root.line, f"{expected}, found {root}")
         _check_format(root, format_name, problems)
     record = read_record(cls, root, "", Scope(problems, members or {}, exempt or {}), beside=("format",))
@@ -62,7 +62,7 @@ def read_document(
 
 def survey_document(
     path: str | os.PathLike[str], cls: type[DeclaredRecord]
-) -> tuple[tree.Mapping, list[tuple[Quantity, tree.Node]]]:
+) -> tuple[tree.MapNode, list[tuple[Quantity, tree.Node]]]:
     """Return the root of a YAML file, and its PerJoint values as written, for any joints.
 
     Args:
@@ -75,7 +75,7 @@ def survey_document(
     source, text = read_source(path)
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
-    if not isinstance(root, tree.Mapping):
+    if not isinstance(root, tree.MapNode):
         problems.fail(root.line, f"expected a mapping, found {root}")
     survey: list[tuple[Quantity, tree.Node]] = []
     with suppress(InputError):  # too many problems; reading the document reports them
@@ -83,11 +83,11 @@ def survey_document(
     return root, survey
 
 
-def _check_format(root: tree.Mapping, expected: str, problems: Problems) -> None:
+def _check_format(root: tree.MapNode, expected: str, problems: Problems) -> None:
     node = root.entries.get("format")
     if node is None:
         problems.add(root.line, f"missing key 'format'; the file must begin with `format: {expected}`")
-    elif not (isinstance(node, tree.Scalar) and node.text == expected):
+    elif not (isinstance(node, tree.TextNode) and node.text == expected):
         problems.fail(node.line, f"format: expected {expected!r}, found {node}")
 
 

@@ -51,7 +51,7 @@ from vsacli.documents.record_checks import (
     repetitions,
     unknown_word,
 )
-from vsacli.documents.tree import INVALID, NULLS, Node, Scalar, Scope, all_valid, quoted
+from vsacli.documents.tree import INVALID, NULLS, Node, TextNode, Scope, all_valid, quoted
 
 TRUTHS = ("true", "false")
 WITHOUT_UNIT = Number(DIMENSIONLESS)
@@ -60,7 +60,7 @@ NOT_TEXTS = BOOLEANS | NULLS
 
 
 def read_record(
-    cls: type[DeclaredRecord], node: tree.Mapping, label: str, scope: Scope, beside: tuple[str, ...] = ()
+    cls: type[DeclaredRecord], node: tree.MapNode, label: str, scope: Scope, beside: tuple[str, ...] = ()
 ) -> Any:
     """Return a mapping as a record, or INVALID; the additional keys `beside` are left to the caller."""
     prefix = f"{label}: " if label else ""
@@ -89,7 +89,7 @@ def read_record(
     return INVALID
 
 
-def scope_inside(scope: Scope, cls: type, node: tree.Mapping) -> Scope:
+def scope_inside(scope: Scope, cls: type, node: tree.MapNode) -> Scope:
     """Return the scope of the values in a record."""
     if not hasattr(cls, "unit_variant"):
         return scope
@@ -97,12 +97,12 @@ def scope_inside(scope: Scope, cls: type, node: tree.Mapping) -> Scope:
     return scope._replace(variant=variant_inside(cls, chosen.text if chosen else None, scope.variant))
 
 
-def _scalar_entry(node: Node, key: str) -> Scalar | None:
-    entry = node.entries.get(key) if isinstance(node, tree.Mapping) else None
-    return entry if isinstance(entry, Scalar) else None
+def _scalar_entry(node: Node, key: str) -> TextNode | None:
+    entry = node.entries.get(key) if isinstance(node, tree.MapNode) else None
+    return entry if isinstance(entry, TextNode) else None
 
 
-def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], scope: Scope) -> set[str]:
+def _refuse_unknown_keys(cls: type, node: tree.MapNode, known: Collection[str], scope: Scope) -> set[str]:
     """Note unknown keys; return the known keys probably meant, which are then not reported as missing."""
     meant: set[str] = set()
     for key, line in node.key_lines.items():
@@ -116,7 +116,7 @@ def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], 
     return meant - node.entries.keys()
 
 
-def _note_missing(name: str, field: Field, node: tree.Mapping, prefix: str, scope: Scope) -> None:
+def _note_missing(name: str, field: Field, node: tree.MapNode, prefix: str, scope: Scope) -> None:
     example = f", e.g. {name}: {{type: constant, value: ...}}" if "constant" in field.kind.records else ""
     scope.problems.add(node.line, f"{prefix}missing key {name!r} ({field.doc}){example}")
 
@@ -124,7 +124,7 @@ def _note_missing(name: str, field: Field, node: tree.Mapping, prefix: str, scop
 def _note_field_problems(
     problems: Iterable[FieldProblem],
     fields: Mapping[str, tuple[Field, Any]],
-    node: tree.Mapping,
+    node: tree.MapNode,
     scope: Scope,
 ) -> None:
     """Note the problems of fields; joints with the same problem of a field share a message."""
@@ -149,7 +149,7 @@ def _joints_with_problem(joints: Sequence[str], members: Sequence[str]) -> str:
 
 
 def _note_record_problems(
-    problems: Iterable[FieldProblem], node: tree.Mapping, prefix: str, scope: Scope
+    problems: Iterable[FieldProblem], node: tree.MapNode, prefix: str, scope: Scope
 ) -> None:
     """Note the problems of a record whose fields are valid."""
     for problem in problems:
@@ -161,12 +161,12 @@ def _note_record_problems(
 def line_along(path: FieldPath, node: Node, scope: Scope) -> int:
     """Return the line of the deepest node along a path; a scalar counts for all entries of its value."""
     for step in path:
-        if isinstance(node, tree.Mapping):
+        if isinstance(node, tree.MapNode):
             key = list(scope.members)[step] if isinstance(step, int) else step
             if key not in node.entries:
                 break
             node = node.entries[key]
-        elif isinstance(node, tree.Sequence) and isinstance(step, int):
+        elif isinstance(node, tree.ListNode) and isinstance(step, int):
             node = node.items[step]
     return node.line
 
@@ -181,13 +181,13 @@ def read_value(kind: Kind, node: Node, label: str, scope: Scope) -> Any:
 def _read_number(kind: Number, node: Node, label: str, scope: Scope) -> Any:
     """Return the number in SI units; an unknown variant, itself a problem, counts as revolute."""
     if (
-        isinstance(node, Scalar)
+        isinstance(node, TextNode)
         and DECIMAL.fullmatch(node.text)
         and math.isfinite(decimal := float(node.text))
     ):
         return decimal
     unit = kind.unit.unit(scope.variant or "revolute")
-    if not isinstance(node, Scalar) or node.is_null:
+    if not isinstance(node, TextNode) or node.is_null:
         return scope.unexpected(node, expected_number(unit), label)
     try:
         return evaluate(node.text, unit)
@@ -197,10 +197,10 @@ def _read_number(kind: Number, node: Node, label: str, scope: Scope) -> Any:
 
 
 def _read_share(kind: Share, node: Node, label: str, scope: Scope) -> Any:
-    share = PER_CENT.fullmatch(node.text) if isinstance(node, Scalar) else None
+    share = PER_CENT.fullmatch(node.text) if isinstance(node, TextNode) else None
     if share is None:
         return _read_number(kind, node, label, scope)
-    number = _read_number(kind, Scalar(node.line, share["number"], plain=True), label, scope)
+    number = _read_number(kind, TextNode(node.line, share["number"], plain=True), label, scope)
     return number if number is INVALID else number / 100
 
 
@@ -212,23 +212,23 @@ def _read_integer(_kind: Integer, node: Node, label: str, scope: Scope) -> Any:
 
 
 def _read_boolean(_kind: Boolean, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, Scalar) and node.plain and node.text in TRUTHS:
+    if isinstance(node, TextNode) and node.plain and node.text in TRUTHS:
         return node.text == "true"
     return scope.unexpected(node, "true or false", label)
 
 
 def read_text(_kind: Kind, node: Node, label: str, scope: Scope) -> Any:
     """Return a text as written, unless YAML reads it as another type; see `read_value`."""
-    if isinstance(node, Scalar) and not (node.plain and node.text.lower() in NOT_TEXTS):
+    if isinstance(node, TextNode) and not (node.plain and node.text.lower() in NOT_TEXTS):
         return node.text
-    is_boolean = isinstance(node, Scalar) and not node.is_null
+    is_boolean = isinstance(node, TextNode) and not node.is_null
     reason = ", a boolean in YAML; put it in quotes" if is_boolean else ""
     return scope.unexpected(node, "a text", label, reason)
 
 
 def _read_choice(kind: Choice, node: Node, label: str, scope: Scope) -> Any:
     """Return the word, which the check of the field compares with the options."""
-    if isinstance(node, Scalar) and (node.text in kind.options or not node.is_null):
+    if isinstance(node, TextNode) and (node.text in kind.options or not node.is_null):
         return node.text
     return scope.unexpected(node, f"one of {', '.join(kind.options)}", label)
 
@@ -253,22 +253,22 @@ def _read_table_file(kind: TableFile, node: Node, label: str, scope: Scope) -> A
 
 def _read_vector(kind: Vector, node: Node, label: str, scope: Scope) -> Any:
     """Return the numbers, which the check of the field counts."""
-    if not isinstance(node, tree.Sequence):
+    if not isinstance(node, tree.ListNode):
         return scope.unexpected(node, f"a list of {kind.length} numbers in {kind.unit}", label)
     return all_valid(_read_number(kind.item, item, label, scope) for item in node.items)
 
 
 def _read_interval(kind: Interval, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, Scalar):
+    if isinstance(node, TextNode):
         upper = _read_number(kind.item, node, label, scope)
         return upper if upper is INVALID else (-upper if kind.lowest is None else kind.lowest, upper)
-    if isinstance(node, tree.Sequence) and len(node.items) == 2:
+    if isinstance(node, tree.ListNode) and len(node.items) == 2:
         return all_valid(_read_number(kind.item, item, label, scope) for item in node.items)
     return scope.unexpected(node, "[lower, upper] or one number", label)
 
 
 def _read_named_numbers(kind: NamedNumbers, node: Node, label: str, scope: Scope) -> Any:
-    if not isinstance(node, tree.Mapping):
+    if not isinstance(node, tree.MapNode):
         return scope.unexpected(node, "a mapping from names to numbers", label)
     numbers = all_valid(
         _read_number(kind.number, entry, f"{label}.{name}", scope) for name, entry in node.entries.items()
@@ -277,13 +277,13 @@ def _read_named_numbers(kind: NamedNumbers, node: Node, label: str, scope: Scope
 
 
 def _read_items(kind: Items, node: Node, label: str, scope: Scope) -> Any:
-    if not isinstance(node, tree.Sequence) or not node.items:
+    if not isinstance(node, tree.ListNode) or not node.items:
         return scope.unexpected(node, "a list with at least one entry", label)
     values = all_valid([read_value(kind.item, item, label, scope) for item in node.items])
     return INVALID if kind.unique and _note_repeated(kind.unique, node, label, scope) else values
 
 
-def _note_repeated(key: str, node: tree.Sequence, label: str, scope: Scope) -> bool:
+def _note_repeated(key: str, node: tree.ListNode, label: str, scope: Scope) -> bool:
     """Note the entries of a list whose text under a key occurred before; return whether there are any."""
     entries = [_scalar_entry(item, key) for item in node.items]
     repeated = list(repetitions(entry.text if entry else None for entry in entries))
@@ -295,19 +295,19 @@ def _note_repeated(key: str, node: tree.Sequence, label: str, scope: Scope) -> b
 
 
 def _read_one_or_more(kind: OneOrMore, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, tree.Sequence):
+    if isinstance(node, tree.ListNode):
         return _read_items(kind, node, label, scope)
     one = read_value(kind.item, node, label, scope)
     return one if one is INVALID else (one,)
 
 
 def _read_pair(kind: Pair, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, tree.Mapping) and _names_sides(kind, node):
+    if isinstance(node, tree.MapNode) and _names_sides(kind, node):
         keys = ", ".join(map(quoted, node.entries))
         expected = "one mapping for both sides or a list of two"
         scope.problems.add(node.line, f"{label}: expected {expected}, found the keys {keys}")
         return INVALID
-    if not isinstance(node, tree.Sequence):
+    if not isinstance(node, tree.ListNode):
         both = read_value(kind.item, node, label, scope)
         return both if both is INVALID else (both, both)
     if len(node.items) != 2:
@@ -315,9 +315,9 @@ def _read_pair(kind: Pair, node: Node, label: str, scope: Scope) -> Any:
     return all_valid([read_value(kind.item, item, label, scope) for item in node.items])
 
 
-def _names_sides(kind: Pair, node: tree.Mapping) -> bool:
+def _names_sides(kind: Pair, node: tree.MapNode) -> bool:
     """Return whether mappings stand under unknown keys, as in `{flexor: {...}, extensor: {...}}`."""
-    if not node.entries or not all(isinstance(value, tree.Mapping) for value in node.entries.values()):
+    if not node.entries or not all(isinstance(value, tree.MapNode) for value in node.entries.values()):
         return False
     known = {"type", *(name for cls in kind.records.values() for name in declared(cls))}
     return known.isdisjoint(node.entries)
@@ -342,7 +342,7 @@ def _read_per_joint(kind: PerJoint, node: Node, label: str, scope: Scope) -> Any
 
 def _refuse_number(node: Node | None, name: str, reason: str, label: str, scope: Scope) -> Any:
     """Return None for an exempt joint; note a problem if it has a value."""
-    if node is None or (isinstance(node, Scalar) and node.is_null):
+    if node is None or (isinstance(node, TextNode) and node.is_null):
         return None
     return scope.unexpected(node, f"no value for {name}", label, f": {reason}")
 
@@ -353,20 +353,20 @@ def _nodes_by_joint(
     """Return the node for each joint (a scalar for all except exempt ones); None if joints are wrong."""
     names = scope.members
     match node:
-        case tree.Scalar():
+        case tree.TextNode():
             return {name: node for name in names if name not in exempt}
-        case tree.Sequence(items=items) if len(items) != len(names):
+        case tree.ListNode(items=items) if len(items) != len(names):
             expected = f"{counted(len(names), 'value')}, one for each joint ({', '.join(names)})"
             found = f"found {len(items)}; is the file for another robot?"
             scope.problems.add(node.line, f"{label}: expected {expected}, {found}")
             return None
-        case tree.Sequence(items=items):
+        case tree.ListNode(items=items):
             return dict(zip(names, items, strict=True))
-        case tree.Mapping(entries=entries):
+        case tree.MapNode(entries=entries):
             return entries if _check_names(node, label, scope, exempt) else None
 
 
-def _check_names(node: tree.Mapping, label: str, scope: Scope, exempt: Mapping[str, str]) -> bool:
+def _check_names(node: tree.MapNode, label: str, scope: Scope, exempt: Mapping[str, str]) -> bool:
     """Note names of unknown joints, and joints without a value."""
     names = scope.members
     unknown = [name for name in node.entries if name not in names]
@@ -380,7 +380,7 @@ def _check_names(node: tree.Mapping, label: str, scope: Scope, exempt: Mapping[s
 
 
 def _read_mapping(kind: Record, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, tree.Mapping):
+    if isinstance(node, tree.MapNode):
         return read_record(kind.cls, node, label, scope)
     keys = [name for name, (_, default) in declared(kind.cls).items() if default is REQUIRED]
     needed = f" with the {'key' if len(keys) == 1 else 'keys'} {', '.join(keys)}" if keys else ""
@@ -388,13 +388,13 @@ def _read_mapping(kind: Record, node: Node, label: str, scope: Scope) -> Any:
 
 
 def _read_one_of(kind: OneOf, node: Node, label: str, scope: Scope) -> Any:
-    if not isinstance(node, tree.Mapping):
+    if not isinstance(node, tree.MapNode):
         return scope.unexpected(node, "a mapping with the key 'type'", label)
     selector = node.entries.get("type")
     if selector is None:
         scope.problems.add(node.line, f"{label}: missing key 'type', one of {', '.join(kind.records)}")
         return INVALID
-    if not isinstance(selector, Scalar) or (selector.text not in kind.records and selector.is_null):
+    if not isinstance(selector, TextNode) or (selector.text not in kind.records and selector.is_null):
         return scope.unexpected(selector, f"one of {', '.join(kind.records)}", f"{label}.type")
     if selector.text not in kind.records:
         reason = unknown_word(selector.text, kind.records, kind.not_yet)

@@ -157,7 +157,7 @@ def _read_row(
         scope.problems.add(line, f"{wrong_count(columns.width, len(cells))}{hint}")
         return None
     given = {
-        field: tree.Scalar(line, _in_si(cells[index], columns.factors[field]), plain=False)
+        field: tree.TextNode(line, _in_si(cells[index], columns.factors[field]), plain=False)
         for field, index in columns.places.items()
         if cells[index]
     }
@@ -169,7 +169,7 @@ def _read_row(
     if missing:
         return None
     problems = Problems(scope.problems.file)
-    mapping = tree.Mapping(line, given, dict.fromkeys(given, line))
+    mapping = tree.MapNode(line, given, dict.fromkeys(given, line))
     record = read_record(cls, mapping, "", scope._replace(problems=problems))
     try:
         problems.check()

@@ -41,8 +41,8 @@ def _as_written(root: tree.Node, path: NumberPath) -> NumberPath:
 
     The standard row i has a and alpha of the modified row i+1; those of the first one are in the base.
     """
-    convention = root.entries.get("convention") if isinstance(root, tree.Mapping) else None
-    if not (isinstance(convention, tree.Scalar) and convention.text == "modified"):
+    convention = root.entries.get("convention") if isinstance(root, tree.MapNode) else None
+    if not (isinstance(convention, tree.TextNode) and convention.text == "modified"):
         return path
     match path:
         case ("joints", Entry(number=number), "dh", "a" | "alpha" as word):

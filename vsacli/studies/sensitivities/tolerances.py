@@ -130,10 +130,10 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
     source, text = read_source(path)
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
-    if not isinstance(root, tree.Mapping):
+    if not isinstance(root, tree.MapNode):
         problems.fail(root.line, f"expected {CONTENT}, found {root}")
     stated = root.entries.get("format")
-    if isinstance(stated, tree.Scalar):
+    if isinstance(stated, tree.TextNode):
         kind = stated.text.removeprefix("vsacli-").partition("/")[0]
         raise InputError.one(f"is a {kind}; expected {CONTENT}", source.path)
     found: list[Tolerance | None] = [None] * len(chosen)
@@ -163,10 +163,10 @@ def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
     Raises:
         InputError: the entry is invalid.
     """
-    if not isinstance(node, tree.Mapping) or len(node.entries) != 1:
+    if not isinstance(node, tree.MapNode) or len(node.entries) != 1:
         raise InputError.one(f"expected a distribution, {FORM}, found {node}")
     ((shape, size),) = node.entries.items()
-    if shape not in SHAPES or not isinstance(size, tree.Scalar):
+    if shape not in SHAPES or not isinstance(size, tree.TextNode):
         raise InputError.one(f"expected a distribution, {FORM}, found {shape}: {size}")
     share = PER_CENT.fullmatch(size.text)
     if share is None:

@@ -23,7 +23,7 @@ from vsacli.base.version import __version__
 from vsacli.compute.engine import Settled, settle
 from vsacli.documents.reading import Changes, read_document
 from vsacli.documents.source import Problems, Source
-from vsacli.documents.tree import Mapping, parse_yaml
+from vsacli.documents.tree import MapNode, parse_yaml
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.results.store.study_table import TEXTS
 from vsacli.robot.file import ReadRobot, read_robot
@@ -291,7 +291,7 @@ def _check_named(source: Source, key: str, name: str) -> None:
 
 def _line_of(source: Source, key: str) -> int:
     root = parse_yaml(source.text or "", Problems(source.path))
-    return root.key_lines.get(key, 0) if isinstance(root, Mapping) else 0
+    return root.key_lines.get(key, 0) if isinstance(root, MapNode) else 0
 
 
 def _trajectories(file: StudyFile, folder: Path, source: Source) -> tuple[str, ...]:

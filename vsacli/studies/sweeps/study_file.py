@@ -105,7 +105,7 @@ class Ways(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return a tuple of `Varied`."""
-        if not isinstance(node, tree.Mapping):
+        if not isinstance(node, tree.MapNode):
             return scope.unexpected(node, "a mapping from paths to values", label)
         found = []
         for path, entry in node.entries.items():
@@ -130,14 +130,14 @@ class Ways(OwnKind):
 
 def _way(node: Node) -> Way:
     match node:
-        case tree.Sequence(items=items) if items:
+        case tree.ListNode(items=items) if items:
             return Listed(tuple(map(tree.plain, items)))
-        case tree.Mapping(entries=entries) if entries:
+        case tree.MapNode(entries=entries) if entries:
             return _mapped(node, dict(entries))
     raise InputError.one(f"expected {FORMS}, found {node}")
 
 
-def _mapped(node: tree.Mapping, entries: Mapping[str, Node]) -> Way:
+def _mapped(node: tree.MapNode, entries: Mapping[str, Node]) -> Way:
     key = next(iter(entries))
     if LINKED in entries:
         texts = {word: _text(entry, word) for word, entry in entries.items() if word in (LINKED, FACTOR)}
@@ -146,7 +146,7 @@ def _mapped(node: tree.Mapping, entries: Mapping[str, Node]) -> Way:
     elif len(entries) == 1 and key in SPACED:
         return Spaced(key, *_texts(entries[key], 3, f"{key}: [first, last, count]"))
     elif len(entries) == 1 and key in SHAPES:
-        if key == "uniform" and isinstance(entries[key], tree.Sequence):
+        if key == "uniform" and isinstance(entries[key], tree.ListNode):
             return Ranged(*_texts(entries[key], 2, "uniform: [least, largest]"))
         return Drawn(node)
     hint = did_you_mean(key, [*SPACED, *SHAPES, LINKED]) if len(entries) == 1 else ""
@@ -154,13 +154,13 @@ def _mapped(node: tree.Mapping, entries: Mapping[str, Node]) -> Way:
 
 
 def _texts(node: Node, count: int, form: str) -> list[str]:
-    if not isinstance(node, tree.Sequence) or len(node.items) != count:
+    if not isinstance(node, tree.ListNode) or len(node.items) != count:
         raise InputError.one(f"expected {form}, found {node}")
     return [_text(item, form) for item in node.items]
 
 
 def _text(node: Node, form: str) -> str:
-    if not isinstance(node, tree.Scalar):
+    if not isinstance(node, tree.TextNode):
         raise InputError.one(f"expected a single value in {form}, found {node}")
     return node.text
 
