@@ -6,7 +6,7 @@ import pytest
 
 from vsacli.base.errors import InputError
 from vsacli.documents.source import Problems
-from vsacli.documents.tree import MAX_LEVELS, MAX_NODES, MapNode, TextNode, ListNode, parse_yaml
+from vsacli.documents.tree import MAX_LEVELS, MAX_NODES, ListNode, MapNode, TextNode, parse_yaml
 
 
 def parse(text):

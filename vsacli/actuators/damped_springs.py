@@ -24,7 +24,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import Components, ElasticState, MotorMatrix
-from vsacli.actuators.reach import OfJoint, Reach, reach
+from vsacli.actuators.reach import OfJoint, Reach, classify_stiffness
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, marked
@@ -197,7 +197,7 @@ class DampedSprings:
             return none, none, Reach(lost, never, never, never)
         stiffness = command.commanded[STIFFNESS.key]
         solution = self._actuator.solve(springs.state.tau_e, stiffness, command.q)
-        reached = reach(stiffness, solution, min_margin)
+        reached = classify_stiffness(stiffness, solution, min_margin)
         margin = self._margin(springs, stiffness)
         return (
             solution.lower,

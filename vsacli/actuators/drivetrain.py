@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, SpringTorques
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import Windings
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
@@ -167,10 +167,10 @@ class Drivetrain:
         parts = [each.ranged(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
-    def torques(self, q: FloatArray, theta: FloatArray) -> Torques:
+    def torques(self, q: FloatArray, theta: FloatArray) -> SpringTorques:
         """Return the torques of the springs: on links, (..., joints), and against motors, (..., springs)."""
         parts = [elasticity.torques(at) for elasticity, at in self.at(q, theta)]
-        return Torques(
+        return SpringTorques(
             self.by_joint([part.tau_e for part in parts], q),
             self.of_springs([part.tau_transmission for part in parts], theta),
         )

@@ -21,7 +21,7 @@ from vsacli.documents.fields import (
     NON_ZERO,
     POSITIVE,
     POSITIVE_OR_INFINITE,
-    Record,
+    RecordOf,
     choice,
     number,
     value,
@@ -74,7 +74,9 @@ class JointMotor:
         "ratio of the motion of the motor shaft to the motion on the joint side",
         default=None,
     )
-    friction: Friction | None = value(Record(Friction), "dry friction, joint side of the gear", default=None)
+    friction: Friction | None = value(
+        RecordOf(Friction), "dry friction, joint side of the gear", default=None
+    )
     torque_constant: float | None = number(
         units.JOINT_TORQUE_CONSTANT,
         "ratio of the torque on the joint side of the gear to the current",
@@ -117,7 +119,7 @@ class Motor(DeclaredRecord):
         "N m, rad/s at any joint",
         default=None,
     )
-    friction: Friction | None = value(Record(Friction), f"dry friction, {_ON_SIDE}", default=None)
+    friction: Friction | None = value(RecordOf(Friction), f"dry friction, {_ON_SIDE}", default=None)
     torque_constant: float | None = number(
         units.TORQUE_CONSTANT,
         "ratio of torque to current, and so of voltage to velocity, on the motor shaft; requires "

@@ -13,7 +13,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import PlaceholderConstants
 from vsacli.actuators.drivetrain import largest_coupling
-from vsacli.actuators.elasticity import Components, Elasticity, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, SpringTorques
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.mechanisms.mechanism import Mechanism, MechanismState
@@ -24,7 +24,7 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.variables import Variable
-from vsacli.documents.fields import OneOf, Pair, Record, number, value
+from vsacli.documents.fields import OneOf, PairOf, RecordOf, number, value
 from vsacli.documents.source import Source
 
 
@@ -33,7 +33,7 @@ class Serial(VariableStiffness):
     """Motor 1 moves the link through springs that motor 2 adjusts."""
 
     motor: tuple[Motor, Motor] = value(
-        Pair(Record(Motor)), "motor 1, which carries the load, and motor 2, which adjusts the springs"
+        PairOf(RecordOf(Motor)), "motor 1, which carries the load, and motor 2, which adjusts the springs"
     )
     coupled_inertia: float = number(
         units.MOTOR_INERTIA,
@@ -173,10 +173,10 @@ class _MechanismElasticity(Elasticity):
         """Return phi, theta_2 and q."""
         return np.stack((theta[..., 0] - q, theta[..., 1], q), axis=-1)
 
-    def torques(self, coordinates: FloatArray) -> Torques:
+    def torques(self, coordinates: FloatArray) -> SpringTorques:
         """Return the derivatives of the potential."""
         state = self.state(coordinates)
-        return Torques(state.tau_e, np.stack(state.tau_transmission, axis=-1))
+        return SpringTorques(state.tau_e, np.stack(state.tau_transmission, axis=-1))
 
     def energy(self, coordinates: FloatArray) -> FloatArray:
         """Return the potential."""

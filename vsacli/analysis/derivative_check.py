@@ -17,7 +17,7 @@ import numpy as np
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, evenly, of_joint
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.json_records import Stored, named
 from vsacli.base.signals import COMMANDED
 from vsacli.base.variables import VARIABLES, Block
@@ -241,7 +241,7 @@ def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
     No sample is infeasible, singular or near-singular, and the margin changes by less than a tenth: motor
     motion has features as short as the distance to the end of the attainable range.
     """
-    troubled = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
+    troubled = has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
     gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max).reshape(*shape, -1)
     hasty = np.ptp(gap, axis=1) > gap[:, MIDDLE] / 10
     smooth: BoolArray = ~(np.any(troubled, axis=1) | hasty)

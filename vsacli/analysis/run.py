@@ -22,7 +22,7 @@ from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
-from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has
+from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has_flag
 from vsacli.base.progress import Tell, unheard
 from vsacli.base.signals import POSITION
 from vsacli.base.units import time_text
@@ -157,7 +157,7 @@ class Run:
         for minima in between:
             minima.mark(block.flags)
         if self._stop_on_infeasible:
-            infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
+            infeasible = has_flag(block.flags, Flag.INFEASIBLE).any(axis=1)
             self._stopped = bool(infeasible.any())
         if self._stopped:
             last = int(infeasible.argmax())

@@ -199,7 +199,7 @@ def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
     )
 
 
-def checked_rate(given: Any) -> float:
+def parse_rate(given: Any) -> float:
     """Return rows per second, given as a number or as a text in the form used in files.
 
     Raises:

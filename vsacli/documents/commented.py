@@ -12,15 +12,15 @@ from vsacli.base.texts import on_one_line
 from vsacli.base.units import DIMENSIONLESS
 from vsacli.documents.fields import (
     REQUIRED,
-    Choice,
     Field,
     Interval,
     Items,
-    Kind,
     OneOf,
-    Pair,
-    Record,
-    declared,
+    PairOf,
+    RecordOf,
+    ValueKind,
+    WordChoice,
+    declared_fields,
     variant_inside,
 )
 
@@ -92,7 +92,7 @@ class _Commented:
     def record(self, cls: type, values: Values, variant: str) -> Iterator[_YamlLine]:
         """Yield all fields of a record; fields without a value are inactive and show their defaults."""
         variant = variant_inside(cls, values.get(getattr(cls, "unit_variant", "")), variant) or variant
-        for name, (field, default) in declared(cls).items():
+        for name, (field, default) in declared_fields(cls).items():
             known = self._again and (cls, name) in self._explained
             self._explained.add((cls, name))
             comment = "" if known else self._comment(cls, name, field, variant)
@@ -103,7 +103,9 @@ class _Commented:
             elif not known:
                 yield from self._optional(field, name, default, comment, variant)
 
-    def _given(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_YamlLine]:
+    def _given(
+        self, kind: ValueKind, name: str, value: Any, comment: str, variant: str
+    ) -> Iterator[_YamlLine]:
         """Yield a field with a value, in one line if all inside is explained already."""
         first, *inside = self._field(kind, name, value, comment, variant)
         if inside and self._again and all(line.active and not line.comment for line in inside):
@@ -116,19 +118,21 @@ class _Commented:
         self, field: Field, name: str, default: Any, comment: str, variant: str
     ) -> Iterator[_YamlLine]:
         """Yield a field without a value, inactive; of a record its example."""
-        if not isinstance(field.kind, Record):
+        if not isinstance(field.kind, RecordOf):
             yield _YamlLine(f"{name}: {_format_default(default)}".rstrip(), comment, active=False)
             return
         example: Values = {} if default is not None else field.kind.records[""].example(variant)  # type: ignore[attr-defined]
         lines = self._given(field.kind, name, example, comment, variant)
         yield from (line._replace(active=False) for line in lines)
 
-    def _field(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_YamlLine]:
+    def _field(
+        self, kind: ValueKind, name: str, value: Any, comment: str, variant: str
+    ) -> Iterator[_YamlLine]:
         """Yield a field for a value in the form used in files; nested fields are indented."""
         match kind:
-            case Pair(item):
+            case PairOf(item):
                 yield from self._field(item, name, value, comment, variant)
-            case Record(cls):
+            case RecordOf(cls):
                 yield _YamlLine(f"{name}:", comment)
                 yield from (line.inside() for line in self.record(cls, value, variant))
             case OneOf(variants):
@@ -160,7 +164,7 @@ class _Commented:
         """Return unit and meaning of a field, its forms where they are not obvious, and its source."""
         unit = field.quantity.unit(variant) if variant else str(field.quantity)
         match field.kind:
-            case Choice(options=options):
+            case WordChoice(options=options):
                 forms = f" ({' or '.join(options)})"
             case Interval():
                 forms = " ([lower, upper] or one number)"

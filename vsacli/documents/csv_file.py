@@ -142,7 +142,7 @@ def header_of(
     file.detach()
     text = line.partition(COMMENT)[0]
     separator = separator_of(text)
-    columns = tuple(cell.strip() for cell in cells_of(text.rstrip("\r\n"), separator))
+    columns = tuple(cell.strip() for cell in split_cells(text.rstrip("\r\n"), separator))
     numbers = [is_number(cell.replace(",", "," if separator == "," else ".")) for cell in columns]
     if numbered and all(numbers[place - 1] for place in numbered if place <= len(columns)):
         return Header(0, separator, ("",) * len(columns), frozenset(skipped))
@@ -161,7 +161,7 @@ def separator_of(line: str) -> str:
     return next((mark for mark in SEPARATORS if mark in bare), blanks)
 
 
-def cells_of(line: str, separator: str) -> list[str]:
+def split_cells(line: str, separator: str) -> list[str]:
     """Return the cells of a line, without quotes."""
     if separator == BLANKS:
         return [cell.replace(QUOTE, "") for cell in _BETWEEN_BLANKS.findall(line)]
@@ -206,7 +206,7 @@ def _advise_on_numeric_header(comment: int) -> str:
     return "; without one, columns are given by their numbers, as in columns: {time: 1, elbow.q: 2}"
 
 
-class Rows(NamedTuple):
+class RowsToRead(NamedTuple):
     """The part of a file to read.
 
     Attributes:
@@ -238,7 +238,7 @@ class Rows(NamedTuple):
         """
         count = len(self.header.columns)
         for number, line in self.lines():
-            cells = cells_of(line, self.header.separator)
+            cells = split_cells(line, self.header.separator)
             if len(cells) != count:
                 raise InputError.one(wrong_count(count, len(cells)), self.path, number)
             yield number, cells
@@ -254,7 +254,7 @@ def wrong_count(expected: int, found: int) -> str:
     return f"expected {counted(expected, 'value')}, one for each column of the header, found {found}"
 
 
-def of_columns(problems: Iterable[tuple[str, str]]) -> Iterator[str]:
+def group_column_problems(problems: Iterable[tuple[str, str]]) -> Iterator[str]:
     """Yield each problem once, after the names of all columns that have it.
 
     Args:
@@ -276,7 +276,7 @@ def filled_lines(file: Iterable[str], header: Header) -> Iterator[tuple[int, str
             yield number, content
 
 
-def read_numbers(rows: Rows) -> FloatArray:
+def read_numbers(rows: RowsToRead) -> FloatArray:
     """Return the numbers of the columns used, (rows, columns).
 
     NumPy's C reader is used; only if it fails, or meets anything unusual, each line is parsed.
@@ -295,14 +295,14 @@ def read_numbers(rows: Rows) -> FloatArray:
     raise InputError(_row_problems(rows) or [Problem(rows.path, 0, f"cannot be read: {reason}")])
 
 
-def read_integers(rows: Rows) -> npt.NDArray[np.int64] | None:
+def read_integers(rows: RowsToRead) -> npt.NDArray[np.int64] | None:
     """Return the columns used as 64-bit integers, (rows, columns); None if they are not whole numbers."""
     integers, _ = _load_with_numpy(rows, np.int64, _normalized_rows(rows))
     return integers if integers.size else None
 
 
 def _load_with_numpy(
-    rows: Rows, kind: npt.DTypeLike, cleaned: Iterable[str] | None = None
+    rows: RowsToRead, kind: npt.DTypeLike, cleaned: Iterable[str] | None = None
 ) -> tuple[npt.NDArray[Any], object]:
     """Return the rows of the file, or of cleaned lines, and the reason if there are none."""
     header, used = rows.header, None if rows.all_used else rows.used
@@ -328,7 +328,7 @@ def _load_with_numpy(
     return values, "its rows are not those of a table"
 
 
-def _is_regular(rows: Rows) -> bool:
+def _is_regular(rows: RowsToRead) -> bool:
     """Return whether each line has as many cells as the header, so that columns can be picked by position.
 
     NumPy's reader does not count the cells that it skips. Lines with quotes or comments are parsed one by
@@ -361,11 +361,11 @@ class _IrregularError(Exception):
     """A row that does not belong to the table."""
 
 
-def _normalized_rows(rows: Rows) -> Iterator[str]:
+def _normalized_rows(rows: RowsToRead) -> Iterator[str]:
     """Yield rows of the cells used, with points for decimal commas, and `nan` in empty cells."""
     header, decimals = rows.header, _Decimals(rows.header.separator)
     for _, line in rows.lines():
-        cells = cells_of(line, header.separator)
+        cells = split_cells(line, header.separator)
         if len(cells) != len(header.columns):
             raise _IrregularError(line)
         used = [cells[place].strip() for place in rows.used]  # also tabs, the separator of the result
@@ -392,7 +392,7 @@ class _Decimals:
         return cell.replace(",", ".")
 
 
-def _row_problems(rows: Rows) -> list[Problem]:
+def _row_problems(rows: RowsToRead) -> list[Problem]:
     """Return the first problem of each kind, with the number of similar problems."""
     alike: dict[str, list[Problem]] = {}
     empty, decimals = True, _Decimals(rows.header.separator)
@@ -420,10 +420,12 @@ def _first_with_count(found: list[Problem]) -> Problem:
     return Problem(first.file, first.line, f"{first.message} (the first of {number} such lines)")
 
 
-def _cell_problems(rows: Rows, line: str, with_point: Callable[[str], str]) -> Iterator[tuple[str, str]]:
+def _cell_problems(
+    rows: RowsToRead, line: str, with_point: Callable[[str], str]
+) -> Iterator[tuple[str, str]]:
     """Yield kind and message of each problem of a row."""
     separator, count = rows.header.separator, len(rows.header.columns)
-    cells = cells_of(line, separator)
+    cells = split_cells(line, separator)
     if len(cells) != count:
         doubled = separator == "," and len(cells) == 2 * count
         hint = "; with decimal commas, semicolons or tabs stand between the columns" if doubled else ""

@@ -78,7 +78,7 @@ class Grammar(NamedTuple):
     of_units: bool = False
 
 
-class Step(NamedTuple):
+class ExpressionStep(NamedTuple):
     """An operation.
 
     Attributes:
@@ -97,7 +97,7 @@ class Expression(NamedTuple):
     Equal parts of the text share one step.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[ExpressionStep, ...]
 
     @property
     def names(self) -> set[str]:
@@ -248,7 +248,7 @@ class _Parser:
 
     def _step(self, operation: str, *operands: Any) -> int:
         """Return the index of a step; equal steps are stored once."""
-        return self._steps.setdefault(Step(operation, operands), len(self._steps))
+        return self._steps.setdefault(ExpressionStep(operation, operands), len(self._steps))
 
     def _take(self) -> _Token:
         token, self._next = self._next, next(self._tokens, self._next)

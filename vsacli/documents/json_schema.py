@@ -19,26 +19,26 @@ from vsacli.documents.fields import (
     REQUIRED,
     Boolean,
     Check,
-    Choice,
     Field,
     Integer,
     Interval,
     Items,
-    Kind,
     Name,
     NamedNumbers,
-    Number,
+    NumberList,
+    NumberWithUnit,
     OneOf,
     OneOrMore,
     OwnKind,
-    Pair,
+    PairOf,
     PerJoint,
-    Record,
+    RecordOf,
     Schema,
     Share,
     Text,
-    Vector,
-    declared,
+    ValueKind,
+    WordChoice,
+    declared_fields,
 )
 from vsacli.documents.number import ANGLES, MAX_LENGTH
 
@@ -67,7 +67,7 @@ class _SchemaBuilder:
 
     def record(self, cls: type, beside: Mapping[str, Schema], required: tuple[str, ...] = ()) -> Schema:
         """Return the schema of a mapping with a record class's fields and the further keys `beside`."""
-        fields = declared(cls)
+        fields = declared_fields(cls)
         return {
             "type": "object",
             "properties": {
@@ -85,12 +85,12 @@ class _SchemaBuilder:
         schema = self._value(field.kind, field.check)
         return {"description": described, **schema, **({} if shown is None else {"default": shown})}
 
-    def _value(self, kind: Kind, check: Check | None) -> Schema:
+    def _value(self, kind: ValueKind, check: Check | None) -> Schema:
         """Return the schema of values of a kind; their numbers must meet the condition."""
         match kind:
             case OwnKind():
                 return kind.schema(self._reference)
-            case Record(cls):
+            case RecordOf(cls):
                 return self._reference(cls)
             case OneOf(variants):
                 return self._selected(variants)
@@ -98,7 +98,7 @@ class _SchemaBuilder:
                 return {"anyOf": [self._value(item, check), _list_schema(self._value(item, check))]}
             case Items(item=item):
                 return _list_schema(self._value(item, check))
-            case Pair(item):
+            case PairOf(item):
                 one = self._value(item, check)
                 return {"if": {"type": "array"}, "then": _list_schema(one, 2), "else": one}
         return _single_value_schema(kind, check) or _numbers_schema(kind, check)
@@ -145,13 +145,13 @@ def _list_schema(item: Schema, length: int | None = None) -> Schema:
     return {"type": "array", "items": item, "minItems": length, "maxItems": length}
 
 
-def _single_value_schema(kind: Kind, check: Check | None) -> Schema:
+def _single_value_schema(kind: ValueKind, check: Check | None) -> Schema:
     """Return the schema of a single value; empty if the kind has several numbers."""
     match kind:
         case Share():
             per_cent = {"type": "string", "pattern": EXPRESSION[:-1] + "%$"}
             return {"anyOf": [*_number_schema(kind.unit, check)["anyOf"], per_cent]}
-        case Number():
+        case NumberWithUnit():
             return _number_schema(kind.unit, check)
         case Integer():
             keywords = {} if check is None else check.keywords
@@ -165,15 +165,15 @@ def _single_value_schema(kind: Kind, check: Check | None) -> Schema:
             return {"type": "string", "pattern": f"^{IDENTIFIER.pattern}$"}
         case Text():
             return {"type": ["string", "number"]}  # YAML may read a text as a number
-        case Choice():
+        case WordChoice():
             return {"enum": list(kind.options)}
     return {}
 
 
-def _numbers_schema(kind: Kind, check: Check | None) -> Schema:
+def _numbers_schema(kind: ValueKind, check: Check | None) -> Schema:
     """Return the schema of several numbers, or of the path of a file with numbers."""
     match kind:
-        case Vector():
+        case NumberList():
             return _list_schema(_number_schema(kind.item.unit, check), kind.length)
         case Interval():
             bound = _number_schema(kind.item.unit, None)

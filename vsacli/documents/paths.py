@@ -14,7 +14,7 @@ from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.base.texts import on_one_line
 from vsacli.documents import tree
-from vsacli.documents.fields import Items, Kind, Pair, declared, variant_inside
+from vsacli.documents.fields import Items, PairOf, ValueKind, declared_fields, variant_inside
 from vsacli.documents.record_reader import read_value
 from vsacli.documents.record_values import entry_names
 from vsacli.documents.source import Problems
@@ -100,7 +100,7 @@ def declared_paths(cls: type) -> Iterator[str]:
 
     Pairs of sides have none, since a path without a side changes both.
     """
-    for name, (field, _) in declared(cls).items():
+    for name, (field, _) in declared_fields(cls).items():
         yield name
         place = f"{name}.{ALL}" if isinstance(field.kind, Items) else name
         for inner in field.kind.records.values():
@@ -197,7 +197,7 @@ class _Replacement(NamedTuple):
         """Return a record with the replacement in it."""
         word, *rest = words
         cls: type = type(record)
-        fields = declared(cls)
+        fields = declared_fields(cls)
         if word not in fields:
             raise _missing_word_error(word, fields, place)
         kind = fields[word][0].kind
@@ -211,13 +211,13 @@ class _Replacement(NamedTuple):
             problems = [str(problem.in_units(variant).inside(*place)) for problem in error.fields]
             raise InputError(Problem("", 0, message) for message in problems) from None
 
-    def in_value(self, kind: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+    def in_value(self, kind: ValueKind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """Return a value with the replacement in it, or the replacement itself at the end of the path."""
         if not words:
             return self._read(kind, place)
         if content is None:
             raise InputError.one(f"there is nothing at {_dotted_path(place)}; replace it as a whole")
-        if isinstance(kind, Pair) and words[0] not in SIDES:
+        if isinstance(kind, PairOf) and words[0] not in SIDES:
             return self._in_pair(kind, content, words, place)
         if kind.item is not None:
             return self._in_list(kind, kind.item, content, words, place)
@@ -229,10 +229,10 @@ class _Replacement(NamedTuple):
             return self.in_record(content, words, place)
         raise _missing_word_error(words[0], (), place)
 
-    def _read(self, kind: Kind, place: tuple[str, ...]) -> Any:
+    def _read(self, kind: ValueKind, place: tuple[str, ...]) -> Any:
         label, problems = _dotted_path(place), Problems(self.scope.problems.file)
-        if kind.records and not isinstance(kind, Items | Pair) and isinstance(self.node, tree.TextNode):
-            keys = dict.fromkeys(key for cls in kind.records.values() for key in declared(cls))
+        if kind.records and not isinstance(kind, Items | PairOf) and isinstance(self.node, tree.TextNode):
+            keys = dict.fromkeys(key for cls in kind.records.values() for key in declared_fields(cls))
             raise InputError.one(f"{label} is a mapping; set one of its keys: {', '.join(keys)}")
         content = read_value(kind, self.node, label, self.scope._replace(problems=problems))
         try:
@@ -242,7 +242,7 @@ class _Replacement(NamedTuple):
             raise InputError(Problem("", 0, f"{label}: {message}") for message in messages) from None
         return content
 
-    def _in_pair(self, kind: Pair, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+    def _in_pair(self, kind: PairOf, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """Return both sides of a joint; equal sides stay one object."""
         word, *rest = words
         if content[0] == content[1]:
@@ -253,7 +253,9 @@ class _Replacement(NamedTuple):
             raise InputError.one(f"{_dotted_path(place)}: its two sides differ; say which by {choices}")
         return self._in_list(kind, kind.item, content, words, place)
 
-    def _in_list(self, kind: Kind, each: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+    def _in_list(
+        self, kind: ValueKind, each: ValueKind, content: Any, words: list[str], place: tuple[str, ...]
+    ) -> Any:
         """Return a list with the replacement in the entry that a word names, or in all entries."""
         word, *rest = words
         names = entry_names(kind, content, self.scope.members)

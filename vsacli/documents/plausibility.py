@@ -20,7 +20,7 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import ANGLES, evaluate
-from vsacli.documents.record_values import Entry, NumberPath
+from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.documents.source import Problems, Source
 from vsacli.documents.tree import parse_yaml
 
@@ -133,7 +133,7 @@ class Rule(NamedTuple, Generic[_Subject]):
 
 def _component_name(path: NumberPath) -> str:
     """Return the name of a component that a path gives by its index only; empty if it has none."""
-    if len(path) < 3 or not isinstance(path[-1], Entry) or path[-1].name:
+    if len(path) < 3 or not isinstance(path[-1], PathIndex) or path[-1].name:
         return ""
     field = "limits" if path[-3] == "limits" else path[-2]
     words = _COMPONENTS.get(str(field), ())
@@ -151,14 +151,14 @@ def _path_to_report(path: NumberPath, other: OtherUnit | None) -> NumberPath:
     return (*path[:-1], *other.field) if other and other.field else path
 
 
-Moved: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
+TranslatePath: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
 """Function that returns the path in a file for its root and the path in the record made of it."""
 
 
-class Written:
+class ValuesInFile:
     """Values and lines of a YAML file, by the path to a number."""
 
-    def __init__(self, source: Source, moved: Moved | None = None) -> None:
+    def __init__(self, source: Source, moved: TranslatePath | None = None) -> None:
         """Store the file, and the function that translates paths of the record into paths of the file."""
         self.path = source.path
         self._text = source.text or ""
@@ -207,19 +207,19 @@ class Written:
         return bool(_EXPRESSION_OF_ANGLE.search(node.text))
 
 
-def _child_node(node: tree.Node, step: str | Entry) -> tree.Node | None:
+def _child_node(node: tree.Node, step: str | PathIndex) -> tree.Node | None:
     match node, step:
         case tree.MapNode(entries=entries), _:
             return entries.get(str(step))
-        case tree.ListNode(items=items), Entry(number=number) if number < len(items):
+        case tree.ListNode(items=items), PathIndex(number=number) if number < len(items):
             return items[number]
     return None
 
 
-def strange(
+def implausible_measurements(
     rules: Sequence[Rule[_Subject]],
     subject: _Subject,
-    written: Written | None = None,
+    written: ValuesInFile | None = None,
     known: Collection[str] = (),
 ) -> dict[str, list[Measured]]:
     """Return the implausible numbers by rule name; rules without findings have no entry.
@@ -241,22 +241,22 @@ def strange(
     return found
 
 
-def findings(
+def implausible_values(
     rules: Sequence[Rule[_Subject]],
     subject: _Subject,
-    written: Written | None = None,
+    written: ValuesInFile | None = None,
     known: Collection[str] = (),
 ) -> tuple[Problem, ...]:
     """Return the warnings about implausible values, with file and line if the file has the same value."""
     named = {rule.name: rule for rule in rules}
-    found = strange(rules, subject, written, known)
+    found = implausible_measurements(rules, subject, written, known)
     problems = (
         _warning_about(named[name], each, written) for name, several in found.items() for each in several
     )
     return tuple(dict.fromkeys(problems))
 
 
-def _warning_about(rule: Rule[Any], measured: Measured, written: Written | None) -> Problem:
+def _warning_about(rule: Rule[Any], measured: Measured, written: ValuesInFile | None) -> Problem:
     """Return the warning about a number."""
     other = rule.other_unit(measured)
     said = written.said(measured) if written is not None else None

@@ -117,16 +117,16 @@ def read_changes(texts: Iterable[str]) -> dict[str, Any]:
     changes: dict[str, Any] = {}
     given: dict[str, str] = {}
     for text in texts:
-        path, equals, written = (part.strip() for part in text.partition("="))
-        if not (path and equals and written):
+        path, equals, value_text = (part.strip() for part in text.partition("="))
+        if not (path and equals and value_text):
             raise ChangeError.of(text, "expected PATH=VALUE, e.g. joints.*.link.mass=2.5")
         if path in given:
             raise ChangeError.of(text, f"{path} is also set to {quoted(given[path])}; set it once")
-        given[path], changes[path] = written, _parse_change_value(text, written)
+        given[path], changes[path] = value_text, _parse_change_value(text, value_text)
     return changes
 
 
-def written(changes: Changes) -> list[str]:
+def format_changes(changes: Changes) -> list[str]:
     """Return changes as texts that `read_changes` accepts."""
     return [f"{path}={_format_change_value(value)}" for path, value in changes.items()]
 
@@ -156,7 +156,7 @@ def check_path_of_change(path: str, change: str = "") -> None:
         raise ChangeError.of(change, f"the {key} of a file cannot be changed here; edit the file")
 
 
-def changed(
+def apply_changes(
     document: _Document,
     source: Source,
     changes: Changes,
@@ -177,11 +177,11 @@ def changed(
     """
     from vsacli.documents.paths import ReplacementError, replace_all
 
-    for path, change in zip(changes, written(changes), strict=True):
+    for path, change in zip(changes, format_changes(changes), strict=True):
         check_path_of_change(path, change)
     try:
         document = replace_all(document, changes, members, exempt, source.path)
     except ReplacementError as error:
-        (change,) = written({error.path: changes[error.path]})
+        (change,) = format_changes({error.path: changes[error.path]})
         raise ChangeError(error.problems, change) from None
     return document, source._replace(changes=json.dumps(changes)) if changes else source

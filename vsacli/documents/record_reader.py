@@ -20,27 +20,27 @@ from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import (
     REQUIRED,
     Boolean,
-    Choice,
     Field,
     FieldPath,
     Integer,
     Interval,
     Items,
-    Kind,
     Name,
     NamedNumbers,
-    Number,
+    NumberList,
+    NumberWithUnit,
     OneOf,
     OneOrMore,
     OwnKind,
-    Pair,
+    PairOf,
     PerJoint,
-    Record,
+    RecordOf,
     Share,
-    TableFile,
+    TablePath,
     Text,
-    Vector,
-    declared,
+    ValueKind,
+    WordChoice,
+    declared_fields,
     variant_inside,
 )
 from vsacli.documents.number import BOOLEANS, DECIMAL, PER_CENT, evaluate, expected_number
@@ -51,10 +51,10 @@ from vsacli.documents.record_checks import (
     repetitions,
     unknown_word,
 )
-from vsacli.documents.tree import INVALID, NULLS, Node, TextNode, Scope, all_valid, quoted
+from vsacli.documents.tree import INVALID, NULLS, Node, Scope, TextNode, all_valid, quoted
 
 TRUTHS = ("true", "false")
-WITHOUT_UNIT = Number(DIMENSIONLESS)
+WITHOUT_UNIT = NumberWithUnit(DIMENSIONLESS)
 NOT_TEXTS = BOOLEANS | NULLS
 """Words without quotes that are no texts in YAML, in lower case."""
 
@@ -65,7 +65,7 @@ def read_record(
     """Return a mapping as a record, or INVALID; the additional keys `beside` are left to the caller."""
     prefix = f"{label}: " if label else ""
     scope = scope_inside(scope, cls, node)
-    fields = declared(cls)
+    fields = declared_fields(cls)
     mistyped = _refuse_unknown_keys(cls, node, (*fields, *beside), scope)
     values: dict[str, Any] = {}
     for name, (field, default) in fields.items():
@@ -171,14 +171,14 @@ def line_along(path: FieldPath, node: Node, scope: Scope) -> int:
     return node.line
 
 
-def read_value(kind: Kind, node: Node, label: str, scope: Scope) -> Any:
+def read_value(kind: ValueKind, node: Node, label: str, scope: Scope) -> Any:
     """Return the value of a node, named `label` in messages; INVALID after noting a problem."""
     if isinstance(kind, OwnKind):
         return kind.read(node, label, scope)
     return _READERS[type(kind)](kind, node, label, scope)
 
 
-def _read_number(kind: Number, node: Node, label: str, scope: Scope) -> Any:
+def _read_number(kind: NumberWithUnit, node: Node, label: str, scope: Scope) -> Any:
     """Return the number in SI units; an unknown variant, itself a problem, counts as revolute."""
     if (
         isinstance(node, TextNode)
@@ -217,7 +217,7 @@ def _read_boolean(_kind: Boolean, node: Node, label: str, scope: Scope) -> Any:
     return scope.unexpected(node, "true or false", label)
 
 
-def read_text(_kind: Kind, node: Node, label: str, scope: Scope) -> Any:
+def read_text(_kind: ValueKind, node: Node, label: str, scope: Scope) -> Any:
     """Return a text as written, unless YAML reads it as another type; see `read_value`."""
     if isinstance(node, TextNode) and not (node.plain and node.text.lower() in NOT_TEXTS):
         return node.text
@@ -226,14 +226,14 @@ def read_text(_kind: Kind, node: Node, label: str, scope: Scope) -> Any:
     return scope.unexpected(node, "a text", label, reason)
 
 
-def _read_choice(kind: Choice, node: Node, label: str, scope: Scope) -> Any:
+def _read_choice(kind: WordChoice, node: Node, label: str, scope: Scope) -> Any:
     """Return the word, which the check of the field compares with the options."""
     if isinstance(node, TextNode) and (node.text in kind.options or not node.is_null):
         return node.text
     return scope.unexpected(node, f"one of {', '.join(kind.options)}", label)
 
 
-def _read_table_file(kind: TableFile, node: Node, label: str, scope: Scope) -> Any:
+def _read_table_file(kind: TablePath, node: Node, label: str, scope: Scope) -> Any:
     """Return the table in a file, whose problems are noted under the name of that file."""
     name = read_text(kind, node, label, scope)
     if name is INVALID:
@@ -251,7 +251,7 @@ def _read_table_file(kind: TableFile, node: Node, label: str, scope: Scope) -> A
     return table
 
 
-def _read_vector(kind: Vector, node: Node, label: str, scope: Scope) -> Any:
+def _read_vector(kind: NumberList, node: Node, label: str, scope: Scope) -> Any:
     """Return the numbers, which the check of the field counts."""
     if not isinstance(node, tree.ListNode):
         return scope.unexpected(node, f"a list of {kind.length} numbers in {kind.unit}", label)
@@ -301,7 +301,7 @@ def _read_one_or_more(kind: OneOrMore, node: Node, label: str, scope: Scope) -> 
     return one if one is INVALID else (one,)
 
 
-def _read_pair(kind: Pair, node: Node, label: str, scope: Scope) -> Any:
+def _read_pair(kind: PairOf, node: Node, label: str, scope: Scope) -> Any:
     if isinstance(node, tree.MapNode) and _names_sides(kind, node):
         keys = ", ".join(map(quoted, node.entries))
         expected = "one mapping for both sides or a list of two"
@@ -315,11 +315,11 @@ def _read_pair(kind: Pair, node: Node, label: str, scope: Scope) -> Any:
     return all_valid([read_value(kind.item, item, label, scope) for item in node.items])
 
 
-def _names_sides(kind: Pair, node: tree.MapNode) -> bool:
+def _names_sides(kind: PairOf, node: tree.MapNode) -> bool:
     """Return whether mappings stand under unknown keys, as in `{flexor: {...}, extensor: {...}}`."""
     if not node.entries or not all(isinstance(value, tree.MapNode) for value in node.entries.values()):
         return False
-    known = {"type", *(name for cls in kind.records.values() for name in declared(cls))}
+    known = {"type", *(name for cls in kind.records.values() for name in declared_fields(cls))}
     return known.isdisjoint(node.entries)
 
 
@@ -379,10 +379,10 @@ def _check_names(node: tree.MapNode, label: str, scope: Scope, exempt: Mapping[s
     return not unknown and not missing
 
 
-def _read_mapping(kind: Record, node: Node, label: str, scope: Scope) -> Any:
+def _read_mapping(kind: RecordOf, node: Node, label: str, scope: Scope) -> Any:
     if isinstance(node, tree.MapNode):
         return read_record(kind.cls, node, label, scope)
-    keys = [name for name, (_, default) in declared(kind.cls).items() if default is REQUIRED]
+    keys = [name for name, (_, default) in declared_fields(kind.cls).items() if default is REQUIRED]
     needed = f" with the {'key' if len(keys) == 1 else 'keys'} {', '.join(keys)}" if keys else ""
     return scope.unexpected(node, f"a mapping{needed}", label)
 
@@ -403,23 +403,23 @@ def _read_one_of(kind: OneOf, node: Node, label: str, scope: Scope) -> Any:
     return read_record(kind.records[selector.text], node, label, scope, beside=("type",))
 
 
-_READERS: Mapping[type[Kind], Callable[[Any, Node, str, Scope], Any]] = {
-    Number: _read_number,
+_READERS: Mapping[type[ValueKind], Callable[[Any, Node, str, Scope], Any]] = {
+    NumberWithUnit: _read_number,
     Share: _read_share,
     Integer: _read_integer,
     Boolean: _read_boolean,
     Text: read_text,
     Name: read_text,
-    Choice: _read_choice,
-    TableFile: _read_table_file,
-    Vector: _read_vector,
+    WordChoice: _read_choice,
+    TablePath: _read_table_file,
+    NumberList: _read_vector,
     Interval: _read_interval,
     NamedNumbers: _read_named_numbers,
     Items: _read_items,
     OneOrMore: _read_one_or_more,
-    Pair: _read_pair,
+    PairOf: _read_pair,
     PerJoint: _read_per_joint,
-    Record: _read_mapping,
+    RecordOf: _read_mapping,
     OneOf: _read_one_of,
 }
 """The reader of each kind that more than one module declares."""

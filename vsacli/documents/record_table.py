@@ -14,14 +14,14 @@ from vsacli.documents import tree
 from vsacli.documents.csv_file import (
     HEADER,
     Header,
-    cells_of,
     filled_lines,
     header_of,
+    split_cells,
     split_heading,
     wrong_count,
 )
 from vsacli.documents.expression import conversion_factor
-from vsacli.documents.fields import REQUIRED, Kind, Number, declared
+from vsacli.documents.fields import REQUIRED, NumberWithUnit, ValueKind, declared_fields
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_reader import read_record
 from vsacli.documents.source import Problems, Source, read_source
@@ -90,7 +90,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     records: dict[int, _Record] = {}
     first: dict[Any, int] = {}
     for number, content in filled_lines(text.splitlines(), header):
-        cells = [cell.strip() for cell in cells_of(content, header.separator)]
+        cells = [cell.strip() for cell in split_cells(content, header.separator)]
         if not any(cells):
             continue
         record = _read_row(cells, columns, cls, Scope(problems, {}, {}), number)
@@ -107,7 +107,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
 
 def _assign_columns(header: Header, cls: type, problems: Problems) -> _ColumnsByField:
     """Return the columns of a header by field; refuse an unknown name that is close to a field's."""
-    fields = declared(cls)
+    fields = declared_fields(cls)
     columns = _ColumnsByField(len(header.columns), {}, {}, {}, [])
     meant = set()
     for index, (name, unit) in enumerate(map(split_heading, header.columns)):
@@ -136,11 +136,11 @@ def _assign_columns(header: Header, cls: type, problems: Problems) -> _ColumnsBy
     return columns
 
 
-def _factor_to_si(name: str, unit: str | None, kind: Kind, line: int, problems: Problems) -> float:
+def _factor_to_si(name: str, unit: str | None, kind: ValueKind, line: int, problems: Problems) -> float:
     if unit is None:
         return 1.0
     try:
-        if not isinstance(kind, Number):
+        if not isinstance(kind, NumberWithUnit):
             raise InputError.one("holds texts, which have no unit")
         return 1.0 if unit == kind.unit.revolute else conversion_factor(unit, kind.unit.revolute)
     except InputError as error:
@@ -162,7 +162,9 @@ def _read_row(
         if cells[index]
     }
     missing = [
-        name for name, (_, default) in declared(cls).items() if default is REQUIRED and name not in given
+        name
+        for name, (_, default) in declared_fields(cls).items()
+        if default is REQUIRED and name not in given
     ]
     for name in missing:
         scope.problems.add(line, f"column {name!r} is empty")

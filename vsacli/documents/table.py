@@ -19,7 +19,7 @@ from vsacli.documents.csv_file import (
     CHUNK,
     MAX_BYTES,
     Header,
-    Rows,
+    RowsToRead,
     filled_lines,
     header_of,
     read_numbers,
@@ -42,7 +42,7 @@ it if there are 100 rows in a second."""
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class CsvTable:
     """A table read from a file.
 
     Attributes:
@@ -74,15 +74,15 @@ class Table:
     joined: int = 0
 
     @cached_property
-    def lines(self) -> Lines:
+    def lines(self) -> RowLines:
         """Line numbers of the rows in the file."""
-        return Lines(self.source.path, self.header, self.kept)
+        return RowLines(self.source.path, self.header, self.kept)
 
     def line_of(self, row: int) -> int:
         """Return the line number of a row counted from 0; 0 if the file no longer exists."""
         return self.lines.of(row)
 
-    def without_empty_rows(self, *, stamped: bool = False) -> Table:
+    def without_empty_rows(self, *, stamped: bool = False) -> CsvTable:
         """Return the rows with a number in any column but the time; others are of other topics of a log.
 
         Args:
@@ -94,7 +94,7 @@ class Table:
             return self
         return replace(self, values=self.values[there], kept=np.flatnonzero(there))
 
-    def without_hollow_columns(self) -> Table:
+    def without_hollow_columns(self) -> CsvTable:
         """Return the columns that hold a number; the others become `hollow`."""
         empty = np.isnan(self.values).all(axis=0) & (len(self.values) > 0)
         if not empty.any():
@@ -105,7 +105,7 @@ class Table:
             self, columns=tuple(self.columns[at] for at in full), values=self.values[:, full], hollow=hollow
         )
 
-    def with_joined_rows(self) -> Table:
+    def with_joined_rows(self) -> CsvTable:
         """Return the table with rows joined whose stamps are nearly equal, and that fill different columns.
 
         Some loggers write one row for each signal of a message, a nanosecond apart. Nothing is joined if two
@@ -137,7 +137,7 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class RowLines:
     """Line numbers of the rows of a table, found by reading the file once more.
 
     Attributes:
@@ -171,7 +171,7 @@ def read_table(
     known: Collection[str] | None = None,
     *,
     empty_cells: bool = False,
-) -> Table:
+) -> CsvTable:
     """Read a CSV file, at about the cost in time and memory of `numpy.loadtxt`.
 
     The first line names the columns, quoted or not; a tab, semicolon or comma in it is the separator, else
@@ -211,7 +211,7 @@ def read_table(
         raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None
     if not chosen.places:
         refuse_other_formats(name)
-    return Table(
+    return CsvTable(
         headings,
         values,
         source,
@@ -247,7 +247,7 @@ def _read_values(
     """Return headings and numbers of the columns, and the first stamp if it was subtracted from the times."""
     if not chosen.places:
         return chosen.headings, np.empty((0, 0)), None
-    rows = Rows(name, header, chosen.places, empty_cells)
+    rows = RowsToRead(name, header, chosen.places, empty_cells)
     if chosen.time is None:
         return chosen.headings, _apply_factors(read_numbers(rows), chosen), None
     headings, column = chosen.headings, chosen.places.index(chosen.time)

@@ -20,7 +20,7 @@ from vsacli.actuators.motor import ELECTRICAL, JointMotor
 from vsacli.actuators.reach import OfJoint
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.variables import VARIABLES, Block, Variable
 from vsacli.compute.control_flow import call
 from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
@@ -277,7 +277,7 @@ def _balance(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray | None, ...]:
 
     With a parallel damper the torque error is in N m, and its size is returned, which is None otherwise.
     """
-    regular = ~has(of_joint["flags"], Flag.INFEASIBLE | Flag.SINGULAR)
+    regular = ~has_flag(of_joint["flags"], Flag.INFEASIBLE | Flag.SINGULAR)
     tau_e, stiffness = of_joint["tau_e"], of_joint["stiffness"]
     if not joint.actuator.sprung:
         return None, None, None, shaft_error(joint, of_joint, tau_e[None], regular)

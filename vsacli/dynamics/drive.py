@@ -17,7 +17,7 @@ from vsacli.actuators.motor import ELECTRICAL, Windings
 from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import MIN_MARGIN, Flag, finite, has, not_finite_flags
+from vsacli.base.flags import MIN_MARGIN, Flag, finite, has_flag, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
@@ -148,7 +148,7 @@ def _not_finite(joint: Joint, of_joint: OfJoint) -> BoolArray:
         finite(of_joint[name][: joint.actuator.motor_count])
         for name in ("theta", "tau_transmission", "motor_power")
     )
-    infeasible, singular = (has(of_joint["flags"], flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
+    infeasible, singular = (has_flag(of_joint["flags"], flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
     explained = infeasible | (theta & tau_transmission & (singular | power))
     demand = finite([of_joint["tau_e"], *(of_joint[key] for key in joint.commanded)])
     return ~(demand & explained)

@@ -21,7 +21,7 @@ from vsacli.documents.fields import (
     NON_NEGATIVE,
     SMALLEST,
     OneOf,
-    Record,
+    RecordOf,
     choice,
     interval,
     number,
@@ -101,7 +101,7 @@ class Link(DeclaredRecord):
 
     mass: float = number(units.MASS, "mass of the link with the motors mounted on it", check=NON_NEGATIVE)
     com: tuple[float, float, float] = vector(3, units.LENGTH, "center of mass in the link frame (DH frame i)")
-    inertia: Inertia = value(Record(Inertia), "inertia tensor about the center of mass, link axes")
+    inertia: Inertia = value(RecordOf(Inertia), "inertia tensor about the center of mass, link axes")
 
 
 @dataclass(frozen=True)
@@ -121,17 +121,17 @@ class Joint(DeclaredRecord):
 
     name: str = text("name of the joint, used in reports and CSV headers", identifier=True)
     type: str = choice(("revolute", "prismatic"), "kind of joint")
-    dh: DenavitHartenberg = value(Record(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")
-    link: Link = value(Record(Link), "link that the joint moves")
+    dh: DenavitHartenberg = value(RecordOf(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")
+    link: Link = value(RecordOf(Link), "link that the joint moves")
     damping: float = number(
         units.DAMPING, "viscous damping between the links", check=NON_NEGATIVE, default=0.0
     )
     friction: Friction | None = value(
-        Record(Friction), "dry friction between the links, smooth: with a width", default=None
+        RecordOf(Friction), "dry friction between the links, smooth: with a width", default=None
     )
     actuator: Actuator = value(OneOf(ACTUATORS), "actuator that drives the joint")
-    damper: Damper | None = value(Record(Damper), "damper whose damping is commanded", default=None)
-    limits: Limits = value(Record(Limits), "limits of the commanded motion", default=Limits())
+    damper: Damper | None = value(RecordOf(Damper), "damper whose damping is commanded", default=None)
+    limits: Limits = value(RecordOf(Limits), "limits of the commanded motion", default=Limits())
 
     unit_variant = "type"
 
@@ -226,7 +226,7 @@ class Joint(DeclaredRecord):
         yield from (f"spring of joint {self.name}: {warning}" for warning in self.actuator.warnings)
 
 
-def existing(variable: Variable, kinds: Iterable[str]) -> list[list[bool]]:
+def existing_columns(variable: Variable, kinds: Iterable[str]) -> list[list[bool]]:
     """Return a mask of the columns of a variable that exist, for each joint by its kind of actuator.
 
     All columns count as existing for an unknown kind.

@@ -13,7 +13,7 @@ from vsacli.base.units import Quantity
 from vsacli.compute.duals import seeds
 from vsacli.compute.vector import Scalar
 from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
-from vsacli.documents.record_values import Entry, Number, NumberPath, numbers
+from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex, numbers_in_record
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
@@ -51,7 +51,7 @@ class Parameter(NamedTuple):
     @property
     def by_index(self) -> tuple[str, ...]:
         """Words of the path, with entries of lists by their index."""
-        return tuple(str(step.number) if isinstance(step, Entry) else step for step in self.path)
+        return tuple(str(step.number) if isinstance(step, PathIndex) else step for step in self.path)
 
     @property
     def of_every_joint(self) -> str:
@@ -87,7 +87,9 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
     Raises:
         InputError: a pattern matches no parameter.
     """
-    found = [_parameter_at(robot, number) for number in numbers(robot) if _affects_results(number.path)]
+    found = [
+        _parameter_at(robot, number) for number in numbers_in_record(robot) if _affects_results(number.path)
+    ]
     chosen = [
         each for each in found if not patterns or any(_matches_pattern(each, pattern) for pattern in patterns)
     ]
@@ -134,9 +136,9 @@ def _matches_pattern(parameter: Parameter, pattern: str) -> bool:
     return any(fnmatchcase(path, pattern) for path in words)
 
 
-def _parameter_at(robot: Robot, number: Number) -> Parameter:
+def _parameter_at(robot: Robot, number: NumberAtPath) -> Parameter:
     entry = number.path[1] if number.path[0] == JOINTS else None
-    if not isinstance(entry, Entry):
+    if not isinstance(entry, PathIndex):
         return Parameter(*number, None, "")
     return Parameter(*number, entry.number, robot.joints[entry.number].type)
 
@@ -160,7 +162,7 @@ def _with_number(content: Any, path: NumberPath, scalar: Scalar) -> Any:
     """Return a record or list with another number at a path, or at both sides of an equal pair."""
     if isinstance(content, tuple):
         chosen = path[0] if path else ""
-        if not isinstance(chosen, Entry):
+        if not isinstance(chosen, PathIndex):
             return (_with_number(content[0], path, scalar),) * len(content)
         return tuple(
             _with_number(entry, path[1:], scalar) if index == chosen.number else entry
@@ -172,7 +174,7 @@ def _with_number(content: Any, path: NumberPath, scalar: Scalar) -> Any:
     return _replace_unchecked(content, {word: _with_number(getattr(content, word), path[1:], scalar)})
 
 
-def apart(joint: Joint) -> Joint:
+def with_copied_actuator(joint: Joint) -> Joint:
     """Return the joint with its own copy of the actuator, which several robots may share."""
     return _replace_unchecked(joint, {"actuator": _replace_unchecked(joint.actuator, {})})
 

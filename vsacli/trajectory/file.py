@@ -17,9 +17,9 @@ from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, number, value
-from vsacli.documents.reading import ChangeError, Changes, changed, read_document, written
+from vsacli.documents.reading import ChangeError, Changes, apply_changes, format_changes, read_document
 from vsacli.documents.record_checks import DeclaredRecord
-from vsacli.documents.record_values import numbers
+from vsacli.documents.record_values import numbers_in_record
 from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
@@ -41,7 +41,7 @@ DEFAULT_RATE = 1000.0
 class TrajectoryFile(DeclaredRecord):
     """The content of a trajectory file.
 
-    The declaration of each signal is an attribute named by its key; see `content`.
+    The declaration of each signal is an attribute named by its key; see `trajectory_file_class`.
     """
 
     name: str = value(Name(), "name of the trajectory")
@@ -131,7 +131,9 @@ class TrajectoryFile(DeclaredRecord):
 
 
 @cache
-def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] = ()) -> type[TrajectoryFile]:
+def trajectory_file_class(
+    taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] = ()
+) -> type[TrajectoryFile]:
     """Return the class of trajectory files for joints that need these signals.
 
     Args:
@@ -150,7 +152,7 @@ def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] =
     return make_dataclass("TrajectoryFile", signals, bases=(TrajectoryFile,), namespace=further, frozen=True)
 
 
-OF_ANY_ROBOT = content(frozenset(), rigid=True)
+OF_ANY_ROBOT = trajectory_file_class(frozenset(), rigid=True)
 """Class of trajectory files for an unknown robot: accepts a file that some robot accepts."""
 
 
@@ -186,7 +188,7 @@ def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tu
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    cls = content(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
+    cls = trajectory_file_class(joints.taken, rigid=joints.rigid, untaken=joints.untaken_devices)
     return read_document(path, cls, file_formats.TRAJECTORY, joints.types, joints.exempt)
 
 
@@ -214,7 +216,7 @@ def declared_trajectory(
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 
         return recorded_trajectory(path, joints, progress, _rate_of_table(path, changes))
-    document, source = changed(*read_trajectory(path, joints), changes, joints.types, joints.exempt)
+    document, source = apply_changes(*read_trajectory(path, joints), changes, joints.types, joints.exempt)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
     with _blaming_change(changes, "rate"):
         declared = _declared_times(document, recordings, source.path)
@@ -225,7 +227,7 @@ def declared_trajectory(
     )
     wrench = document.declared.get(WRENCH)
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
-    checked = CheckedTrajectory(robot, tuple(numbers(document, joints.types)), times, motion)
+    checked = CheckedTrajectory(robot, tuple(numbers_in_record(document, joints.types)), times, motion)
     return Trajectory(
         times,
         profiles[POSITION.key],
@@ -253,13 +255,15 @@ def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | No
     """
     if others := {key: value for key, value in changes.items() if key != "rate"}:
         reason = f"{os.fspath(path)} is a CSV table, whose rate alone can be set"
-        raise ChangeError.of(written(others)[0], f"{reason}; name it in a YAML trajectory and set its keys")
+        raise ChangeError.of(
+            format_changes(others)[0], f"{reason}; name it in a YAML trajectory and set its keys"
+        )
     if not changes:
         return None
-    from vsacli.documents.columns_file import checked_rate
+    from vsacli.documents.columns_file import parse_rate
 
     with _blaming_change(changes, "rate"):
-        return checked_rate(changes["rate"])
+        return parse_rate(changes["rate"])
 
 
 @contextmanager
@@ -271,7 +275,7 @@ def _blaming_change(changes: Changes, path: str) -> Iterator[None]:
         if path not in changes:
             raise
         problems = [each._replace(file="", line=0) for each in error.problems]
-        raise ChangeError(problems, written({path: changes[path]})[0]) from None
+        raise ChangeError(problems, format_changes({path: changes[path]})[0]) from None
 
 
 def _add_device_signals(trajectory: Trajectory, robot: Robot) -> Trajectory:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from vsacli.base.errors import Problem
 from vsacli.documents import tree
-from vsacli.documents.plausibility import Written, findings, strange
-from vsacli.documents.record_values import Entry, NumberPath
+from vsacli.documents.plausibility import ValuesInFile, implausible_measurements, implausible_values
+from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.documents.source import Source
 from vsacli.robot.plausibility.bodies import BODY_RULES
 from vsacli.robot.plausibility.checked_robot import CheckedRobot
@@ -24,16 +24,16 @@ def implausible(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Probl
     The robot file is the first of the sources.
     """
     written = _written(sources)
-    return (*impossible_links(checked.joints, written), *findings(ROBOT_RULES, checked, written))
+    return (*impossible_links(checked.joints, written), *implausible_values(ROBOT_RULES, checked, written))
 
 
 def strange_of_robot(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
     """Return the names of the rules that have findings."""
-    return frozenset(strange(ROBOT_RULES, checked, _written(sources)))
+    return frozenset(implausible_measurements(ROBOT_RULES, checked, _written(sources)))
 
 
-def _written(sources: Sequence[Source]) -> Written | None:
-    return Written(sources[0], _as_written) if sources else None
+def _written(sources: Sequence[Source]) -> ValuesInFile | None:
+    return ValuesInFile(sources[0], _as_written) if sources else None
 
 
 def _as_written(root: tree.Node, path: NumberPath) -> NumberPath:
@@ -45,8 +45,8 @@ def _as_written(root: tree.Node, path: NumberPath) -> NumberPath:
     if not (isinstance(convention, tree.TextNode) and convention.text == "modified"):
         return path
     match path:
-        case ("joints", Entry(number=number), "dh", "a" | "alpha" as word):
-            return ("joints", Entry(number + 1), "dh", word)
-        case ("base", "rpy", Entry(number=0)):
-            return ("joints", Entry(0), "dh", "alpha")
+        case ("joints", PathIndex(number=number), "dh", "a" | "alpha" as word):
+            return ("joints", PathIndex(number + 1), "dh", word)
+        case ("base", "rpy", PathIndex(number=0)):
+            return ("joints", PathIndex(0), "dh", "alpha")
     return path

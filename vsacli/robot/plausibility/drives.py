@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from vsacli.actuators.motor import SHAFT, JointMotor, Motor
 from vsacli.base.variables import VARIABLES
-from vsacli.documents.fields import declared
+from vsacli.documents.fields import declared_fields
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
-from vsacli.documents.record_values import Entry, NumberPath
+from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, RPM, SIZES, Measure
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors, ratio
@@ -43,7 +43,9 @@ class _Driven(NamedTuple):
     def carries(self) -> bool:
         """Whether the motor carries the load; one that only sets the springs may be small and fast."""
         last = self.at[-1]
-        return bool(self.joint.actuator.has(VARIABLES["phi"])[last.number if isinstance(last, Entry) else 0])
+        return bool(
+            self.joint.actuator.has(VARIABLES["phi"])[last.number if isinstance(last, PathIndex) else 0]
+        )
 
     @property
     def torque(self) -> float:
@@ -78,7 +80,7 @@ class _Driven(NamedTuple):
     def unit(self, name: str) -> str:
         """Return the unit of a field; a shaft is rotational at any joint."""
         variant = "revolute" if self.motor.side == SHAFT else None
-        return declared(Motor)[name][0].quantity.inside(variant).unit(self.joint.type)
+        return declared_fields(Motor)[name][0].quantity.inside(variant).unit(self.joint.type)
 
     def path(self, name: str) -> NumberPath:
         """Return the path of a field."""
@@ -142,7 +144,9 @@ def _dry_friction(checked: CheckedRobot) -> Iterator[Measured]:
     for driven in _all_motors(checked):
         if driven.motor.friction is not None:
             backward, forward = driven.motor.friction.coulomb
-            directions = {Entry(0): backward, Entry(1): forward} if backward != forward else {None: forward}
+            directions = (
+                {PathIndex(0): backward, PathIndex(1): forward} if backward != forward else {None: forward}
+            )
             for direction, torque in directions.items():
                 path = (*driven.path("friction"), "coulomb", *(() if direction is None else (direction,)))
                 size = torque / _bounded(driven.motor.max_torque)

@@ -13,7 +13,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.base import units
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
-from vsacli.documents.record_values import Entry, NumberPath
+from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, TURN
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, Corridor, joint_path, ratio, written_once
@@ -126,7 +126,7 @@ def _stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
         for side, limit in enumerate(joint.limits.stiffness):
             size = ratio(limit, found.lower)
             if math.isfinite(limit) and (side or limit > found.upper or size > 1):
-                path = joint_path(index, joint, "limits", "stiffness", Entry(side))
+                path = joint_path(index, joint, "limits", "stiffness", PathIndex(side))
                 yield Measured(path, limit, _unit(joint), size, beside)
 
 
@@ -145,7 +145,7 @@ def _largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
             product = float(checked.sizes.moved[number]) * _least_stiffness(joint, checked.corridors[number])
             damping = joint.damper.range[1]
             size = damping / (2 * math.sqrt(product)) if product > 0 else math.nan
-            path = joint_path(number, joint, "damper", "range", Entry(1))
+            path = joint_path(number, joint, "damper", "range", PathIndex(1))
             yield Measured(path, damping, units.DAMPING.unit(joint.type), size)
 
 

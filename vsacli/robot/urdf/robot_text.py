@@ -10,7 +10,17 @@ from typing import Any
 from vsacli.base import file_formats
 from vsacli.base.texts import for_yaml
 from vsacli.base.units import TORQUE
-from vsacli.documents.fields import Choice, Interval, Kind, Number, OneOf, Pair, Record, Vector, declared
+from vsacli.documents.fields import (
+    Interval,
+    NumberList,
+    NumberWithUnit,
+    OneOf,
+    PairOf,
+    RecordOf,
+    ValueKind,
+    WordChoice,
+    declared_fields,
+)
 from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Limits, Link, Pose
 from vsacli.robot.urdf.conversion import Conversion
 from vsacli.robot.urdf.link_tree import UrdfJoint
@@ -97,29 +107,29 @@ def _known(joint: UrdfJoint) -> Iterator[str]:
 
 def _written(record: Any) -> dict[str, str]:
     """Return the text of each field of a record, without fields at their default."""
-    values = {name: getattr(record, name) for name in declared(type(record))}
+    values = {name: getattr(record, name) for name in declared_fields(type(record))}
     return {
         name: _value(field.kind, values[name])
-        for name, (field, default) in declared(type(record)).items()
+        for name, (field, default) in declared_fields(type(record)).items()
         if values[name] != default
     }
 
 
-def _value(kind: Kind, content: Any) -> str:
+def _value(kind: ValueKind, content: Any) -> str:
     match kind:
-        case Pair(item):
+        case PairOf(item):
             sides = [_value(item, side) for side in content]
             return sides[0] if sides[0] == sides[1] else f"[{', '.join(sides)}]"
-        case Record():
+        case RecordOf():
             return _mapping(_written(content))
         case OneOf(variants):
             word = next(word for word, variant in variants.items() if type(content) is variant)
             return _mapping({"type": word, **_written(content)})
-        case Number():
+        case NumberWithUnit():
             return _number(content)
-        case Choice():
+        case WordChoice():
             return str(content)
-        case Interval() | Vector():
+        case Interval() | NumberList():
             return _numbers(content)
     return json.dumps(content)
 

@@ -16,7 +16,7 @@ from vsacli.base.texts import counted, listed
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.documents.column_mapping import ColumnMapping
 from vsacli.documents.csv_file import split_heading
-from vsacli.documents.table import Table, read_table
+from vsacli.documents.table import CsvTable, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
 from vsacli.trajectory.recorded.disorder import replace_stamps
@@ -104,7 +104,7 @@ class Recording(NamedTuple):
 
     time: FloatArray
     signals: tuple[Measured, ...]
-    table: Table
+    table: CsvTable
     stranger: str
 
 
@@ -273,7 +273,7 @@ def _scaled(values: FloatArray, factor: float) -> FloatArray:
     return np.asarray(values * factor)
 
 
-def _elapsed(table: Table, at: int, factors: Mapping[int, float], rate: float | None) -> FloatArray:
+def _elapsed(table: CsvTable, at: int, factors: Mapping[int, float], rate: float | None) -> FloatArray:
     """Return the times since the first sample, s; with a stated rate it stands in place of wrong stamps."""
     stamps = table.values[:, at]
     if len(stamps) < 2:

@@ -22,7 +22,7 @@ from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import drive
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import apart
+from vsacli.robot.parameters import with_copied_actuator
 from vsacli.studies.search.interior_point import (
     FIRST_GAP,
     WARM_GAP,
@@ -366,7 +366,7 @@ def made_to_carry(joint: Joint, directions: int, *, moving_corridor: bool) -> Jo
         directions: number of derivatives that the stiffness carries; each motor adds one for phi.
         moving_corridor: whether the ends of the attainable range carry derivatives as well.
     """
-    carrying = apart(joint)
+    carrying = with_copied_actuator(joint)
     implicit = ImplicitSolution(joint.actuator, carrying.actuator, directions + joint.actuator.motor_count)
     solve = implicit.solve if moving_corridor else implicit.solve_within
     object.__setattr__(carrying.actuator, "solve", solve)

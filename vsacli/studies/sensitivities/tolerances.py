@@ -16,7 +16,7 @@ import scipy
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.json_records import Published, named
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
@@ -271,7 +271,9 @@ def _run(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:
         compute_block(robot, trajectory.block(start, start + size))
         for start in range(0, trajectory.samples, size)
     ]
-    lost = np.any([has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=0) for block in blocks], axis=0)
+    lost = np.any(
+        [has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=0) for block in blocks], axis=0
+    )
     return np.concatenate([block.tau_motor for block in blocks]), lost
 
 

@@ -26,7 +26,7 @@ from vsacli.documents.source import Problems, Source
 from vsacli.documents.tree import MapNode, parse_yaml
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.results.store.study_table import TEXTS
-from vsacli.robot.file import ReadRobot, read_robot
+from vsacli.robot.file import RobotFileWithSource, read_robot_file
 from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.columns import KEPT, Column, over_time
 from vsacli.studies.sweeps.dimensions import Design, Dimension, Entries
@@ -108,7 +108,7 @@ class Study:
 
     file: StudyFile
     source: Source
-    read: ReadRobot
+    read: RobotFileWithSource
     robot: Robot
     trajectories: tuple[str, ...]
     trajectory_sources: tuple[tuple[Source, ...], ...]
@@ -259,7 +259,7 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     file, source = read_document(path, StudyFile, file_formats.STUDY)
     folder = Path(source.path).parent
     _check_named(source, "robot", file.robot)
-    read = read_robot(folder / file.robot)
+    read = read_robot_file(folder / file.robot)
     robot = read.robot()
     for each in over_time(file.variables or ()):
         if not robot.has(VARIABLES[each.name]):

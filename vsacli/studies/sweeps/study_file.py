@@ -17,16 +17,16 @@ from vsacli.base.units import Quantity
 from vsacli.documents import tree
 from vsacli.documents.fields import (
     Check,
-    Choice,
     Items,
     Name,
     OneOrMore,
     OwnKind,
-    Record,
+    RecordOf,
     Refer,
     Schema,
     Share,
     Text,
+    WordChoice,
     choice,
     integer,
     text,
@@ -283,17 +283,17 @@ class StudyFile(DeclaredRecord):
     )
     seed: int = integer("seed of the random samples", check=_SEED, default=0)
     optimize: Optimized | None = value(
-        Record(Optimized),
+        RecordOf(Optimized),
         "optimization of each run; all kept values are then those of the optimum",
         default=None,
     )
     keep: tuple[str, ...] | None = value(
-        Items(Choice(tuple(KEPT), words="name of a column")),
+        Items(WordChoice(tuple(KEPT), words="name of a column")),
         "values that are kept of each run in addition to its verdict; all by default",
         default=None,
     )
     variables: tuple[str, ...] | None = value(
-        Items(Choice(tuple(OVER_TIME), words="name of a variable")),
+        Items(WordChoice(tuple(OVER_TIME), words="name of a variable")),
         "variables of results that are kept over time",
         default=None,
     )

@@ -21,7 +21,7 @@ from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.reading import ChangeError
 from vsacli.documents.source import Source
-from vsacli.documents.table import Lines, Table, read_table
+from vsacli.documents.table import CsvTable, RowLines, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints, takers
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
@@ -52,8 +52,8 @@ class Recording:
         notes: unused parts of the file, and jumps removed.
         source: file that was read.
         lines: lines of its rows.
-        first_stamp: stamp that was subtracted from its times, see `Table`.
-        rated: whether its times follow from a rate, see `Table`.
+        first_stamp: stamp that was subtracted from its times, see `CsvTable`.
+        rated: whether its times follow from a rate, see `CsvTable`.
     """
 
     times: RecordedTimes
@@ -61,7 +61,7 @@ class Recording:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     source: Source
-    lines: Lines
+    lines: RowLines
     first_stamp: int | str | None = None
     rated: bool = False
 
@@ -159,7 +159,7 @@ class _ReadSamples(NamedTuple):
         replaced: failure of the stamps to increase, if the rate of the rows stands in their place.
     """
 
-    table: Table
+    table: CsvTable
     layout: ColumnLayout
     time: FloatArray
     records: list[Samples]
@@ -195,7 +195,7 @@ def read_samples(
     return _ReadSamples(table, layout, time, records, replaced)
 
 
-def _check_hollow(table: Table, signals: Sequence[Signal]) -> None:
+def _check_hollow(table: CsvTable, signals: Sequence[Signal]) -> None:
     """Raise an error if a column of required values holds no number; derivatives may be left out."""
     values = {signal.names[0] for signal in signals}
     needed = [
@@ -206,7 +206,7 @@ def _check_hollow(table: Table, signals: Sequence[Signal]) -> None:
         raise InputError.one(message, table.source.path, table.header.line)
 
 
-def _check_filled(table: Table) -> None:
+def _check_filled(table: CsvTable) -> None:
     """Raise an error for empty cells in rows with numbers, since all signals use the same rows."""
     empty = np.isnan(table.values)
     if not empty.any():
@@ -228,7 +228,7 @@ def _check_filled(table: Table) -> None:
     raise InputError.one(message, table.source.path, table.line_of(row))
 
 
-def _understood(table: Table, disorder: Disorder | None) -> Iterator[str]:
+def _understood(table: CsvTable, disorder: Disorder | None) -> Iterator[str]:
     if table.hollow:
         holds = "it holds" if len(table.hollow) == 1 else "they hold"
         yield f"left out, as {holds} no number: {', '.join(table.hollow)}"
@@ -259,7 +259,7 @@ def _unused(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:
 
 
 def _samples(
-    signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: Table, layout: ColumnLayout
+    signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: CsvTable, layout: ColumnLayout
 ) -> Samples:
     labels = WRENCH_AXES if signal is WRENCH else joint_names
     values, *derivatives = (
@@ -282,7 +282,7 @@ def _unwrapped(records: Sequence[Samples], joints: CommandedJoints) -> Iterator[
                 yield f"{'a jump' if jumps == 1 else f'{jumps} jumps'} by 2 pi taken out of {joint}.q"
 
 
-def _without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoints) -> dict[int, str]:
+def _without_unit(table: CsvTable, layout: ColumnLayout, joints: CommandedJoints) -> dict[int, str]:
     """Return the types of joints whose position has no unit in the header, by index."""
     headings = {
         index: table.columns[column.index]
@@ -292,7 +292,7 @@ def _without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoints) -
     return {index: types[index] for index, heading in headings.items() if "[" not in heading}
 
 
-def _rows(table: Table, columns: Mapping[int, Column], components: int) -> FloatArray:
+def _rows(table: CsvTable, columns: Mapping[int, Column], components: int) -> FloatArray:
     """Return columns in SI units, (components, samples); NaN for components without a column."""
     rows = np.full((components, len(table.values)), np.nan)
     for component, column in columns.items():
@@ -300,7 +300,7 @@ def _rows(table: Table, columns: Mapping[int, Column], components: int) -> Float
     return rows
 
 
-def _si(table: Table, column: Column) -> FloatArray:
+def _si(table: CsvTable, column: Column) -> FloatArray:
     """Return a column in SI units; by division if that is exact, so that 3 ms are 0.003 s."""
     values = np.ascontiguousarray(table.values[:, column.index])
     divisor = round(1 / column.factor)
@@ -310,7 +310,7 @@ def _si(table: Table, column: Column) -> FloatArray:
         return values * column.factor
 
 
-def _located(problem: SampleProblem, table: Table, layout: ColumnLayout) -> Problem:
+def _located(problem: SampleProblem, table: CsvTable, layout: ColumnLayout) -> Problem:
     line = 0 if problem.sample is None else table.line_of(problem.sample)
     column = (
         problem.quantity if problem.joint is None else layout.quantities[problem.quantity][problem.joint].name
