@@ -48,7 +48,7 @@ class Result:
     def limits(self, name: str) -> np.ndarray:
         return self.bounds.get(name, np.full((len(self.joint_names), 1, 2), np.nan))
 
-    def has(self, variable: Variable) -> bool:
+    def has_variable(self, variable: Variable) -> bool:
         return variable.requires in OF_ANY_ROBOT
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> np.ndarray:

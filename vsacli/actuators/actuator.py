@@ -79,7 +79,7 @@ class Actuator(DeclaredRecord, ABC):
     sprung: ClassVar[bool] = True
 
     @classmethod
-    def has(cls, variable: Variable) -> list[bool]:
+    def has_columns(cls, variable: Variable) -> list[bool]:
         """Return whether joints of this kind have each column of a result variable: one, or one per motor."""
         of_kind = {None: True, SPRINGS: cls.sprung}
         there = of_kind.get(variable.requires, variable.requires in cls.commanded)

@@ -94,7 +94,7 @@ class DampedSprings:
         self._actuator = actuator
         self._motors = actuator.motor_count
         self._settable = STIFFNESS.key in actuator.commanded
-        self._behind = np.array(actuator.has(VARIABLES["phi"])[: self._motors], dtype=float)
+        self._behind = np.array(actuator.has_columns(VARIABLES["phi"])[: self._motors], dtype=float)
 
     def spread(self, phi: FloatArray) -> FloatArray:
         """Return the spread: the sum of the deflections parallel to the damper."""

@@ -105,7 +105,7 @@ class Drivetrain:
         counts = [len(actuator.motors) for actuator in actuators]
         self.present = np.arange(SIDES) < np.array(counts)[:, None]
         self.joint = np.array([index for index, _ in motors])
-        self.deflected = np.array([actuator.has(VARIABLES["phi"]) for actuator in actuators])
+        self.deflected = np.array([actuator.has_columns(VARIABLES["phi"]) for actuator in actuators])
         self.rigid = np.array([not actuator.sprung for actuator in actuators])
         self.sprung = ~self.rigid[self.joint]
         self.inertia, self.damping, self.max_torque = (

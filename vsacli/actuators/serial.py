@@ -58,9 +58,9 @@ class Serial(VariableStiffness):
             yield FieldProblem(("coupled_inertia",), reason)
 
     @classmethod
-    def has(cls, variable: Variable) -> list[bool]:
-        """See `Actuator.has`; motor 2 has no deflection."""
-        return [True, False] if variable.name in {"phi", "dphi"} else super().has(variable)
+    def has_columns(cls, variable: Variable) -> list[bool]:
+        """See `Actuator.has_columns`; motor 2 has no deflection."""
+        return [True, False] if variable.name in {"phi", "dphi"} else super().has_columns(variable)
 
     @classmethod
     def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:

@@ -232,7 +232,7 @@ def _on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> F
 def _compared(actuator: Actuator, name: str) -> list[bool]:
     """Return whether each column of a variable is computed, not commanded, for this actuator."""
     commanded = {name for key in actuator.commanded for name in COMMANDED[key].names}
-    return [False] if name in commanded else actuator.has(VARIABLES[name])
+    return [False] if name in commanded else actuator.has_columns(VARIABLES[name])
 
 
 def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:

@@ -147,7 +147,7 @@ def _damper_velocities(joint: Joint, of_joint: OfJoint) -> dict[int | None, Floa
         return {}
     if joint.damper_at("link"):
         return {None: of_joint["dq"]}
-    behind = joint.actuator.has(VARIABLES["phi"])
+    behind = joint.actuator.has_columns(VARIABLES["phi"])
     return {motor: of_joint["dphi"][motor] for motor, there in enumerate(behind) if there}
 
 

@@ -41,7 +41,9 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
     """Return the velocity of each damper of a joint from dq and dphi; or accelerations."""
     if joint.damper_at("link"):
         return [dq]
-    return [rate for rate, there in zip(dphi, joint.actuator.has(VARIABLES["phi"]), strict=True) if there]
+    return [
+        rate for rate, there in zip(dphi, joint.actuator.has_columns(VARIABLES["phi"]), strict=True) if there
+    ]
 
 
 def motor_torques(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArray]:
@@ -50,7 +52,7 @@ def motor_torques(joint: Joint, of_joint: OfJoint) -> tuple[FloatArray, FloatArr
         of_joint[name] for name in ("damping", "ddamping", "dphi", "ddtheta")
     )
     torque, rate = np.zeros_like(dphi), np.zeros_like(dphi)
-    for motor, there in enumerate(joint.actuator.has(VARIABLES["phi"])):
+    for motor, there in enumerate(joint.actuator.has_columns(VARIABLES["phi"])):
         if there:
             torque[motor] = damping * dphi[motor]
             rate[motor] = d_damping * dphi[motor] + damping * (ddtheta[motor] - of_joint["ddq"])

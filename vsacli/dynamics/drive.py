@@ -125,7 +125,7 @@ def _damper_torques(
     damping = command.commanded[DAMPING.key]
     if joint.damper_at("link"):
         return damping * command.dq, None
-    behind = joint.actuator.has(VARIABLES["phi"])
+    behind = joint.actuator.has_columns(VARIABLES["phi"])
     passed = [damping * rate if there else 0 * damping for rate, there in zip(dphi, behind, strict=True)]
     return passed[0] + passed[1], np.stack(passed)
 

@@ -100,7 +100,7 @@ class InverseDynamics(RowKernel):
     @cached_property
     def variables(self) -> frozenset[str]:
         """Names of the variables that results of the robot have."""
-        return frozenset(name for name, variable in VARIABLES.items() if self.robot.has(variable))
+        return frozenset(name for name, variable in VARIABLES.items() if self.robot.has_variable(variable))
 
     @cached_property
     def arguments(self) -> RowLayout:
@@ -125,7 +125,7 @@ class InverseDynamics(RowKernel):
         return {
             variable.name: (joints, SIDES) if "motor" in variable.dims else (joints,)
             for variable in declared
-            if self.robot.has(variable)
+            if self.robot.has_variable(variable)
         }
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
@@ -150,7 +150,7 @@ class InverseDynamics(RowKernel):
             driven = call(rows[0], driving, command, self.min_margin, phi, internal)
             found.append({**command.arrays(), **driven})
             _check_limits(joint, found[-1])
-        if self.robot.has(VARIABLES["dissipated_power"]):
+        if self.robot.has_variable(VARIABLES["dissipated_power"]):
             for joint, of_joint in zip(self.robot.joints, found, strict=True):
                 of_joint["dissipated_power"] = call(rows[0], behind_link(dissipated_power, joint), of_joint)
         return found
@@ -163,7 +163,7 @@ class InverseDynamics(RowKernel):
                 [of_joint.get(name, absent[len(VARIABLES[name].dims)]) for of_joint in of_joints]
             )
             for name in COMPUTED
-            if self.robot.has(VARIABLES[name])
+            if self.robot.has_variable(VARIABLES[name])
         }
 
     def _internal(self, index: int, given: Mapping[str, Sequence[Scalar]]) -> InternalMotion | None:

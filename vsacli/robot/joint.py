@@ -182,11 +182,11 @@ class Joint(DeclaredRecord):
             return f"it has no {signal.device}"
         return self.actuator.uncommanded.get(signal.key, f"its actuator takes no {signal.key}")
 
-    def has(self, variable: Variable) -> list[bool]:
+    def has_columns(self, variable: Variable) -> list[bool]:
         """Return a mask of the columns that a result variable has: of motors 1 and 2, or of the joint."""
         if variable.requires in OF_ANY_ROBOT:
-            return self.actuator.has(variable)
-        of_kind = self.actuator.has(variable._replace(requires=None))
+            return self.actuator.has_columns(variable)
+        of_kind = self.actuator.has_columns(variable._replace(requires=None))
         if variable.requires in MOTOR_CONSTANTS:
             given = [getattr(side, variable.requires, None) is not None for side in self.actuator.sides]
             return [kind and motor for kind, motor in zip(of_kind, given, strict=True)]
@@ -232,4 +232,4 @@ def existing_columns(variable: Variable, kinds: Iterable[str]) -> list[list[bool
     All columns count as existing for an unknown kind.
     """
     every = [True] * (2 if "motor" in variable.dims else 1)
-    return [ACTUATORS[kind].has(variable) if kind in ACTUATORS else every for kind in kinds]
+    return [ACTUATORS[kind].has_columns(variable) if kind in ACTUATORS else every for kind in kinds]

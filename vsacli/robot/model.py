@@ -109,17 +109,17 @@ class Robot(DeclaredRecord):
         """Actuator of each joint."""
         return tuple(joint.actuator for joint in self.joints)
 
-    def has(self, variable: Variable) -> bool:
+    def has_variable(self, variable: Variable) -> bool:
         """Return whether results of the robot contain a variable of joints."""
         if variable.requires == LOSSES:
             return any(joint.has_friction or joint.damper is not None for joint in self.joints)
         required_of_none = variable.requires in OF_ANY_ROBOT
-        return required_of_none or any(any(joint.has(variable)) for joint in self.joints)
+        return required_of_none or any(any(joint.has_columns(variable)) for joint in self.joints)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
         """Commanded signals in results, in addition to the motion; each commands at least one joint."""
-        return tuple(each for each in COMMANDED.values() if self.has(VARIABLES[each.key]))
+        return tuple(each for each in COMMANDED.values() if self.has_variable(VARIABLES[each.key]))
 
     @property
     def spring_sources(self) -> tuple[Source, ...]:

@@ -222,7 +222,7 @@ def declared_trajectory(
         declared = _declared_times(document, recordings, source.path)
     if recordings:
         _check_lasting(document, declared, source.path, joints.names)
-    times, profiles = _slow_down(
+    times, profiles = _stretch_profiles(
         document.slow_down, declared, _declared_profiles(document, declared, recordings)
     )
     wrench = document.declared.get(WRENCH)
@@ -329,7 +329,9 @@ def _declared_profiles(
     return {**formulas, **{each.signal.key: each for one in recordings for each in one.profiles}}
 
 
-def _slow_down(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[Times, dict[str, Profile]]:
+def _stretch_profiles(
+    factor: float, times: Times, profiles: dict[str, Profile]
+) -> tuple[Times, dict[str, Profile]]:
     if factor == 1:
         return times, profiles
     return times.stretched(factor), {key: each.stretched(factor) for key, each in profiles.items()}

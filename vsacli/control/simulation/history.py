@@ -202,7 +202,7 @@ def _history(
     reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in TRACKED}
     found = _simulated(loop, integrated, work)
-    if robot.has(VARIABLES["dissipated_power"]):
+    if robot.has_variable(VARIABLES["dissipated_power"]):
         of_joints = (of_joint(found, index) for index in range(len(robot.joints)))
         found["dissipated_power"] = np.stack(list(map(dissipated_power, robot.joints, of_joints)), axis=1)
     chosen = np.isin(np.arange(len(robot.joints)), loop.plant.drivetrain.chosen)

@@ -159,7 +159,7 @@ def _create_variable(
     )
     dataset.attrs.update(variable_attributes(variable, robot.joint_types))
     if variable.requires not in OF_ANY_ROBOT:
-        there = [joint.has(variable) for joint in robot.joints]
+        there = [joint.has_columns(variable) for joint in robot.joints]
         dataset.attrs[EXISTING] = np.array(there, dtype=np.uint8)
     return dataset
 

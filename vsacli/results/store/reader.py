@@ -280,7 +280,7 @@ class StoredResult(StoredFile):
         with reporting_damage(self.path):
             return np.asarray(self._dataset("inputs/robot/gravity")[...], dtype=np.float64).reshape(3)
 
-    def has(self, variable: Variable) -> bool:
+    def has_variable(self, variable: Variable) -> bool:
         """Return whether runs of this robot have a variable, as far as that depends on the robot file."""
         if variable.requires in MOTOR_CONSTANTS:
             return not np.isnan(self.motor_constant(variable.requires)).all()

@@ -265,7 +265,7 @@ def add_dampers(sections: Sections, joints: Iterable[Joint]) -> None:
         if joint.damper_at("link"):
             _add_damper(sections.actuators, f"{joint.name}.damping", joint=joint.name)
         if joint.damper_at("transmission"):
-            for number, there in enumerate(joint.actuator.has(VARIABLES["phi"]), 1):
+            for number, there in enumerate(joint.actuator.has_columns(VARIABLES["phi"]), 1):
                 if there:
                     name = f"{joint.name}.damper_{number}"
                     add_sum(sections.tendons, name, {motor_name(joint, number): 1.0, joint.name: -1.0})

@@ -44,7 +44,9 @@ class _Driven(NamedTuple):
         """Whether the motor carries the load; one that only sets the springs may be small and fast."""
         last = self.at[-1]
         return bool(
-            self.joint.actuator.has(VARIABLES["phi"])[last.number if isinstance(last, PathIndex) else 0]
+            self.joint.actuator.has_columns(VARIABLES["phi"])[
+                last.number if isinstance(last, PathIndex) else 0
+            ]
         )
 
     @property

@@ -71,7 +71,7 @@ class _RobotColumns(NamedTuple):
 
     def existing(self, variable: Variable) -> BoolArray:
         """Return the existing columns of a variable of joints."""
-        return np.array([joint.has(variable) for joint in self.robot.joints])
+        return np.array([joint.has_columns(variable) for joint in self.robot.joints])
 
 
 def recorded_columns(

@@ -221,7 +221,7 @@ class CopperLoss(Criterion):
 
     def check(self, joint: Joint) -> None:
         """Check that the motors have a resistance."""
-        if not all(joint.has(VARIABLES["copper_loss"])[: joint.actuator.motor_count]):
+        if not all(joint.has_columns(VARIABLES["copper_loss"])[: joint.actuator.motor_count]):
             raise InputError.one(
                 f"the motors of {joint.name} have no resistance, which copper loss requires; add "
                 "torque_constant and resistance to the robot file, or use --minimize torque"

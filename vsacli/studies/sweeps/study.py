@@ -262,7 +262,7 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     read = read_robot_file(folder / file.robot)
     robot = read.robot()
     for each in over_time(file.variables or ()):
-        if not robot.has(VARIABLES[each.name]):
+        if not robot.has_variable(VARIABLES[each.name]):
             raise InputError.one(f"variables: no joint of {robot.name} has a {each.name}", source.path)
     trajectories = _trajectories(file, folder, source)
     loaded = [load_trajectory(each, robot) for each in trajectories]
