@@ -53,10 +53,10 @@ class Rotors:
         """Return theta'' = B^-1 of the torques that accelerate the rotors."""
         accelerations: FloatArray = torques / self._inertia
         if self._coupled.size:
-            here, other = self._coupled, self._other
-            share = self._coupling[here] / self._inertia[other]
-            effective = self._inertia[here] - share * self._coupling[here]
-            accelerations[..., here] = (torques[..., here] - share * torques[..., other]) / effective
+            coupled, other = self._coupled, self._other
+            share = self._coupling[coupled] / self._inertia[other]
+            effective = self._inertia[coupled] - share * self._coupling[coupled]
+            accelerations[..., coupled] = (torques[..., coupled] - share * torques[..., other]) / effective
         return accelerations
 
     def held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
@@ -185,8 +185,8 @@ class Drivetrain:
 
     def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return det A (67), (..., joints), NaN where no stiffness is commanded."""
-        found = self.by_joint([each.state(at).determinant for each, at in self.at(q, theta)], q)
-        return np.where(self.rigid, np.nan, found)
+        determinants = self.by_joint([each.state(at).determinant for each, at in self.at(q, theta)], q)
+        return np.where(self.rigid, np.nan, determinants)
 
     def state(self, q: FloatArray, theta: FloatArray, dq: FloatArray, dtheta: FloatArray) -> DrivetrainState:
         """Return the springs with their derivatives, at positions and velocities of joints and motors."""

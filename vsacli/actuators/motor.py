@@ -265,8 +265,8 @@ class Windings(NamedTuple):
         rows = [[getattr(motor, name, None) for name in cls._fields] for motor in motors]
         if all(constant is None for constant, _ in rows):
             return None
-        known = [[math.nan if value is None else value for value in row] for row in rows]
-        return cls(*map(np.stack, zip(*known, strict=True)))
+        filled_rows = [[math.nan if value is None else value for value in row] for row in rows]
+        return cls(*map(np.stack, zip(*filled_rows, strict=True)))
 
     def with_axis_behind(self) -> Windings:
         """Return the constants with a further last axis, for samples."""

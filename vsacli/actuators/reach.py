@@ -124,8 +124,8 @@ class Reach(NamedTuple):
     def flags(self) -> FlagArray:
         """The bits of the same names."""
         bits = (Flag.INFEASIBLE, Flag.SLACK, Flag.SINGULAR, Flag.NEAR_SINGULAR)
-        first, *others = (marked(flag, where) for flag, where in zip(bits, self, strict=True))
-        return reduce(operator.or_, others, first)
+        first, *further_bits = (marked(flag, where) for flag, where in zip(bits, self, strict=True))
+        return reduce(operator.or_, further_bits, first)
 
 
 def classify_stiffness(

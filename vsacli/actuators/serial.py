@@ -84,8 +84,8 @@ class Serial(VariableStiffness):
         """Return the mechanism as the problem, if it rotates and the joint does not."""
         if joint_type in self.mechanism.joint_types:
             return None
-        others = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
-        reason = f"turns about an axis, and drives no {joint_type} joint; {' or '.join(others)} can"
+        alternatives = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
+        reason = f"turns about an axis, and drives no {joint_type} joint; {' or '.join(alternatives)} can"
         return FieldProblem(("mechanism", "type"), reason)
 
     @property

@@ -96,14 +96,16 @@ class Columns(OwnKind):
         """Return `ColumnSource` records by name."""
         if not isinstance(node, tree.MapNode) or not node.entries:
             return scope.unexpected(node, "a mapping such as {time: stamp, elbow.q: position}", label)
-        found = {name: self._source(entry, f"{label}.{name}", scope) for name, entry in node.entries.items()}
-        if INVALID in found.values():
+        sources = {
+            name: self._source(entry, f"{label}.{name}", scope) for name, entry in node.entries.items()
+        }
+        if INVALID in sources.values():
             return INVALID
         return {
             name: construct_unchecked(
                 ColumnSource, {**vars(source), "place": (scope.problems.file, node.key_lines[name])}
             )
-            for name, source in found.items()
+            for name, source in sources.items()
         }
 
     def _source(self, node: Node, label: str, scope: Scope) -> Any:
@@ -199,17 +201,17 @@ def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
     )
 
 
-def parse_rate(given: Any) -> float:
+def parse_rate(rate_or_text: Any) -> float:
     """Return rows per second, given as a number or as a text in the form used in files.
 
     Raises:
         InputError: the rate is not a positive number.
     """
     try:
-        rate = evaluate(given, "1/s") if isinstance(given, str) else float(given)
+        rate = evaluate(rate_or_text, "1/s") if isinstance(rate_or_text, str) else float(rate_or_text)
     except (ExpressionError, TypeError, ValueError):
         rate = math.nan
     if not 0 < rate <= LARGEST:
-        shown = f"{given:g}" if isinstance(given, float) else given
+        shown = f"{rate_or_text:g}" if isinstance(rate_or_text, float) else rate_or_text
         raise InputError.one(f"rate: must be a positive number of samples per second, not {shown}")
     return rate

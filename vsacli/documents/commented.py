@@ -85,36 +85,36 @@ class _Commented:
 
     def __init__(self, sources: Mapping[str, str]) -> None:
         self._sources = sources
-        self._said: set[str] = set()
+        self._stated_sources: set[str] = set()
         self._explained: set[tuple[type, str]] = set()
-        self._again = False
+        self._in_later_entry = False
 
     def record(self, cls: type, values: Values, variant: str) -> Iterator[_YamlLine]:
         """Yield all fields of a record; fields without a value are inactive and show their defaults."""
         variant = variant_inside(cls, values.get(getattr(cls, "unit_variant", "")), variant) or variant
         for name, (field, default) in declared_fields(cls).items():
-            known = self._again and (cls, name) in self._explained
+            explained_before = self._in_later_entry and (cls, name) in self._explained
             self._explained.add((cls, name))
-            comment = "" if known else self._comment(cls, name, field, variant)
+            comment = "" if explained_before else self._comment(cls, name, field, variant)
             if name in values:
-                yield from self._given(field.kind, name, values[name], comment, variant)
+                yield from self._field_with_value(field.kind, name, values[name], comment, variant)
             elif default is REQUIRED:
                 raise KeyError(f"{cls.__name__} needs a value of {name}")
-            elif not known:
-                yield from self._optional(field, name, default, comment, variant)
+            elif not explained_before:
+                yield from self._field_without_value(field, name, default, comment, variant)
 
-    def _given(
+    def _field_with_value(
         self, kind: ValueKind, name: str, value: Any, comment: str, variant: str
     ) -> Iterator[_YamlLine]:
         """Yield a field with a value, in one line if all inside is explained already."""
         first, *inside = self._field(kind, name, value, comment, variant)
-        if inside and self._again and all(line.active and not line.comment for line in inside):
+        if inside and self._in_later_entry and all(line.active and not line.comment for line in inside):
             yield _YamlLine(f"{name}: {on_one_line(value)}", comment)
         else:
             yield first
             yield from inside
 
-    def _optional(
+    def _field_without_value(
         self, field: Field, name: str, default: Any, comment: str, variant: str
     ) -> Iterator[_YamlLine]:
         """Yield a field without a value, inactive; of a record its example."""
@@ -122,7 +122,7 @@ class _Commented:
             yield _YamlLine(f"{name}: {_format_default(default)}".rstrip(), comment, active=False)
             return
         example: Values = {} if default is not None else field.kind.records[""].example(variant)  # type: ignore[attr-defined]
-        lines = self._given(field.kind, name, example, comment, variant)
+        lines = self._field_with_value(field.kind, name, example, comment, variant)
         yield from (line._replace(active=False) for line in lines)
 
     def _field(
@@ -137,9 +137,11 @@ class _Commented:
                 yield from (line.inside() for line in self.record(cls, value, variant))
             case OneOf(variants):
                 chosen = value["type"]
-                others = ", ".join(word for word in variants if word != chosen)
+                other_types = ", ".join(word for word in variants if word != chosen)
                 yield _YamlLine(f"{name}:", comment)
-                yield _YamlLine(f"type: {chosen}", f"or {others}" if others and comment else "").inside()
+                yield _YamlLine(
+                    f"type: {chosen}", f"or {other_types}" if other_types and comment else ""
+                ).inside()
                 yield from (line.inside() for line in self.record(variants[chosen], value, variant))
             case Items() if kind.records or isinstance(value[0], list):
                 yield _YamlLine(f"{name}:", comment)
@@ -152,13 +154,13 @@ class _Commented:
         if not kind.records:
             yield from (_YamlLine(f"- {on_one_line(entry)}").inside() for entry in values)
             return
-        outside = self._again
+        outside = self._in_later_entry
         for value in values:
             head, *rest = self.record(kind.records[""], value, variant)
             yield head.inside("- ").inside()
             yield from (line.inside().inside() for line in rest)
-            self._again = True
-        self._again = outside
+            self._in_later_entry = True
+        self._in_later_entry = outside
 
     def _comment(self, cls: type, name: str, field: Field, variant: str) -> str:
         """Return unit and meaning of a field, its forms where they are not obvious, and its source."""
@@ -172,9 +174,9 @@ class _Commented:
                 forms = ""
         meaning = f"{field.doc}{forms}" if unit == str(DIMENSIONLESS) else f"{unit}; {field.doc}{forms}"
         source = self._sources.get(f"{cls.__name__}.{name}", "")
-        if not source or source in self._said:
+        if not source or source in self._stated_sources:
             return meaning
-        self._said.add(source)
+        self._stated_sources.add(source)
         return f"{meaning}. {source}"
 
 

@@ -147,8 +147,8 @@ def header_of(
     if numbered and all(numbers[place - 1] for place in numbered if place <= len(columns)):
         return Header(0, separator, ("",) * len(columns), frozenset(skipped))
     number = number if line else 0
-    found = _header_problems(line, columns, comment, strict)
-    problems = [Problem(name, number, message) for message in found]
+    messages = _header_problems(line, columns, comment, strict)
+    problems = [Problem(name, number, message) for message in messages]
     if problems:
         raise InputError(problems)
     return Header(number, separator, columns, frozenset(skipped))
@@ -249,9 +249,9 @@ class RowsToRead(NamedTuple):
             yield from filled_lines(file, self.header)
 
 
-def wrong_count(expected: int, found: int) -> str:
+def wrong_count(expected: int, count: int) -> str:
     """Return the problem of a row with another number of values than the header."""
-    return f"expected {counted(expected, 'value')}, one for each column of the header, found {found}"
+    return f"expected {counted(expected, 'value')}, one for each column of the header, found {count}"
 
 
 def group_column_problems(problems: Iterable[tuple[str, str]]) -> Iterator[str]:
@@ -394,26 +394,28 @@ class _Decimals:
 
 def _row_problems(rows: RowsToRead) -> list[Problem]:
     """Return the first problem of each kind, with the number of similar problems."""
-    alike: dict[str, list[Problem]] = {}
+    problems_by_kind: dict[str, list[Problem]] = {}
     empty, decimals = True, _Decimals(rows.header.separator)
     for number, line in rows.lines():
         empty = False
         for kind, message in _cell_problems(rows, line, decimals.with_points):
-            alike.setdefault(kind, []).append(Problem(rows.path, number, message))
-        if len(alike) > MAX_KINDS or any(len(found) >= MAX_ALIKE for found in alike.values()):
+            problems_by_kind.setdefault(kind, []).append(Problem(rows.path, number, message))
+        if len(problems_by_kind) > MAX_KINDS or any(
+            len(similar) >= MAX_ALIKE for similar in problems_by_kind.values()
+        ):
             break
     if empty:
         return [Problem(rows.path, 0, "has a header but no rows of values")]
-    problems = [_first_with_count(found) for found in list(alike.values())[:MAX_KINDS]]
-    if len(alike) > MAX_KINDS:
+    problems = [_first_with_count(similar) for similar in list(problems_by_kind.values())[:MAX_KINDS]]
+    if len(problems_by_kind) > MAX_KINDS:
         problems.append(
             Problem(rows.path, 0, f"more than {MAX_KINDS} kinds of problems; reading stopped there")
         )
     return problems
 
 
-def _first_with_count(found: list[Problem]) -> Problem:
-    first, count = found[0], len(found)
+def _first_with_count(similar: list[Problem]) -> Problem:
+    first, count = similar[0], len(similar)
     if count == 1:
         return first
     number = f"{count}" if count < MAX_ALIKE else f"{count} or more"

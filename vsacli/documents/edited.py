@@ -103,30 +103,30 @@ def _children_by_word(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
 
 def _locate_edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
     """Return start and end of a span of the text, and its replacement."""
-    *way, key = words
+    *parent_words, key = words
     node = root
-    for word in way:
-        found = dict(_children_by_word(node)).get(word)
-        if found is None:
+    for word in parent_words:
+        child = dict(_children_by_word(node)).get(word)
+        if child is None:
             raise InputError.one(f"{'.'.join(words)}: there is no {word!r}")
-        if not node.start_mark.index <= found.start_mark.index < node.end_mark.index:
+        if not node.start_mark.index <= child.start_mark.index < node.end_mark.index:
             raise InputError.one(f"{'.'.join(words)}: {word!r} is an alias, which others share")
-        node = found
-    here = dict(_children_by_word(node)).get(key)
-    if here is not None:
-        return _replacement(node, here, _format_on_one_line(value))
+        node = child
+    entry = dict(_children_by_word(node)).get(key)
+    if entry is not None:
+        return _replacement(node, entry, _format_on_one_line(value))
     if not isinstance(node, yaml.MappingNode):
         raise InputError.one(f"{'.'.join(words)}: there is no {key!r}")
     return _insertion(node, f"{key}: {_format_on_one_line(value)}")
 
 
-def _replacement(node: yaml.Node, here: yaml.Node, written: str) -> tuple[int, int, str]:
+def _replacement(node: yaml.Node, replaced: yaml.Node, written: str) -> tuple[int, int, str]:
     """Return the edit that replaces an entry of a node; a block value is replaced from its key on."""
-    block = isinstance(here, yaml.CollectionNode) and not here.flow_style
+    block = isinstance(replaced, yaml.CollectionNode) and not replaced.flow_style
     if block and isinstance(node, yaml.MappingNode):
-        key = next(key for key, entry in node.value if entry is here)
-        return key.end_mark.index, _end_of_text(here), f": {written}"
-    return here.start_mark.index, _end_of_text(here), written
+        key = next(key for key, entry in node.value if entry is replaced)
+        return key.end_mark.index, _end_of_text(replaced), f": {written}"
+    return replaced.start_mark.index, _end_of_text(replaced), written
 
 
 def _end_of_text(node: yaml.Node) -> int:
@@ -163,28 +163,28 @@ def unaliased(text: str, paths: Iterable[str]) -> str:
         text: valid YAML document.
         paths: words joined by dots, entries of lists by index; paths that do not exist are ignored.
     """
-    ways = [tuple(path.split(".")) for path in paths]
+    paths_in_words = [tuple(path.split(".")) for path in paths]
     while True:
-        shared = _aliases_along(text, ways)
+        shared = _aliases_along(text, paths_in_words)
         if not shared:
             return text
         for start, end, node in sorted(shared, key=lambda alias: alias[0], reverse=True):
             text = text[:start] + _flow_style(text, node) + text[end:]
 
 
-def _aliases_along(text: str, ways: Iterable[tuple[str, ...]]) -> list[tuple[int, int, yaml.Node]]:
+def _aliases_along(text: str, paths: Iterable[tuple[str, ...]]) -> list[tuple[int, int, yaml.Node]]:
     """Return start, end and node of each alias whose node lies on one of the paths."""
     root = root_of(text)
-    nodes = {node.start_mark.index: node for way in ways for node in _nodes_along(root, way)}
+    nodes = {node.start_mark.index: node for path in paths for node in _nodes_along(root, path)}
     anchors: dict[str, yaml.Node] = {}
-    found = []
+    aliases = []
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
             if event.anchor in anchors:
-                found.append((*_event_span(event), anchors[event.anchor]))
+                aliases.append((*_event_span(event), anchors[event.anchor]))
         elif isinstance(event, yaml.NodeEvent) and event.anchor and _event_span(event)[0] in nodes:
             anchors[event.anchor] = nodes[_event_span(event)[0]]
-    return found
+    return aliases
 
 
 def _event_span(event: yaml.Event) -> tuple[int, int]:
@@ -200,8 +200,8 @@ def _flow_style(text: str, node: yaml.Node) -> str:
         return "{" + ", ".join(f"{key.value}: {_flow_style(text, value)}" for key, value in node.value) + "}"
     if isinstance(node, yaml.SequenceNode):
         return "[" + ", ".join(_flow_style(text, value) for value in node.value) + "]"
-    own = text[node.start_mark.index : node.end_mark.index]
-    return own.partition(" ")[2] if own.startswith("&") else own
+    node_text = text[node.start_mark.index : node.end_mark.index]
+    return node_text.partition(" ")[2] if node_text.startswith("&") else node_text
 
 
 def with_errors(text: str, errors: Mapping[str, str]) -> str:

@@ -149,15 +149,15 @@ class _Token(NamedTuple):
 def _tokens(text: str, token: re.Pattern[str]) -> list[_Token]:
     tokens, position = [], 0
     while position < len(text):
-        found = token.match(text, position)
-        if not found:
+        match = token.match(text, position)
+        if not match:
             raise ExpressionError(f"unexpected character {text[position]!r}", position + 1)
-        if found["number"] and re.match(r"0\d", found["number"]):
+        if match["number"] and re.match(r"0\d", match["number"]):
             reason = "a leading zero, which would mean an octal number elsewhere"
             raise ExpressionError(reason, position + 1)
-        if found.lastgroup and not found["space"]:
-            tokens.append(_Token(found.lastgroup, found[0], position + 1))
-        position = found.end()
+        if match.lastgroup and not match["space"]:
+            tokens.append(_Token(match.lastgroup, match[0], position + 1))
+        position = match.end()
     return [*tokens, _Token("end", "", len(text) + 1)]
 
 
@@ -232,8 +232,8 @@ class _Parser:
         if word in self._grammar.functions:
             return self._step(word, self._parentheses(f"( behind {word!r}"))
         if word not in self._grammar.names:
-            known = (*self._grammar.names, *self._grammar.functions)
-            raise ExpressionError(f"unknown word {word!r}", place, did_you_mean(word, known))
+            valid_words = (*self._grammar.names, *self._grammar.functions)
+            raise ExpressionError(f"unknown word {word!r}", place, did_you_mean(word, valid_words))
         return self._step("name", word)
 
     def _parentheses(self, otherwise: str) -> int:
@@ -369,15 +369,15 @@ def conversion_factor(text: str, expected: str) -> float:
     Raises:
         InputError: the unit is not understood, or has other dimensions.
     """
-    wanted = _parsed(expected)
-    found = size_of_unit(text)
-    if found is None:
-        near = nearest(text, _similar_to(wanted))
+    expected_unit = _parsed(expected)
+    written_unit = size_of_unit(text)
+    if written_unit is None:
+        near = nearest(text, _similar_to(expected_unit))
         advice = f"did you mean [{near}]?" if near else _expected(expected)
         raise InputError.one(f"unknown unit [{text[: _UNITS.max_length]}]; {advice}")
-    if found.dimensions != wanted.dimensions:
+    if written_unit.dimensions != expected_unit.dimensions:
         raise InputError.one(_other_kind(text, expected))
-    return found.size / wanted.size
+    return written_unit.size / expected_unit.size
 
 
 def size_of_unit(text: str) -> Unit | None:
@@ -414,8 +414,8 @@ def _expected(unit: str) -> str:
 def _other_kind(text: str, expected: str) -> str:
     """Return the problem of a unit with other dimensions than the expected one."""
     product = text.replace("/", " ")  # g/cm^2 for g cm^2
-    found = size_of_unit(product)
-    if found is not None and found.dimensions == _parsed(expected).dimensions:
+    product_unit = size_of_unit(product)
+    if product_unit is not None and product_unit.dimensions == _parsed(expected).dimensions:
         return f"[{text}] is not {kind_of_unit(expected) or 'of this kind'}; did you mean [{product}]?"
     kind = kind_of_unit(text)
     return (

@@ -296,8 +296,8 @@ def variant_inside(cls: type, word: Any, variant: str | None) -> str | None:
         return variant
     variants = getattr(cls, "unit_variants", None)
     if variants is not None:
-        known: str | None = variants.get(word, variant)
-        return known
+        inner_variant: str | None = variants.get(word, variant)
+        return inner_variant
     kind = declared_fields(cls)[selector][0].kind
     return str(word) if isinstance(kind, WordChoice) and word in kind.options else None
 

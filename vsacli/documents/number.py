@@ -97,8 +97,8 @@ def _evaluate_expression(text: str) -> float:
 
 def _describe_invalid_number(text: str, unit: str, error: ExpressionError) -> str:
     """Return the message about a text that is no number."""
-    if found := _describe_written_unit(text.strip(), unit):
-        return f"{quoted(text)} {found}"
+    if unit_problem := _describe_written_unit(text.strip(), unit):
+        return f"{quoted(text)} {unit_problem}"
     expected = f"expected {expected_number(unit)}, found {quoted(text)}"
     for form, advice in _REFUSED_FORMS.items():
         if re.fullmatch(form, text.strip(), re.IGNORECASE):
@@ -115,15 +115,15 @@ def _describe_invalid_number(text: str, unit: str, error: ExpressionError) -> st
 def _describe_written_unit(text: str, unit: str) -> str:
     """Return the problem of a number with a known unit after it; empty if the text is no such number."""
     parts = _WITH_UNIT.fullmatch(text)
-    found = None if parts is None else size_of_unit(parts["unit"])
-    if parts is None or found is None or (unit in ANGLES and text.endswith("deg")):
+    written_unit = None if parts is None else size_of_unit(parts["unit"])
+    if parts is None or written_unit is None or (unit in ANGLES and text.endswith("deg")):
         return ""
     if unit in ("", str(DIMENSIONLESS)):
         return "has a unit; write the number alone"
-    wanted = size_of_unit("Hz" if unit == str(RATE) else unit)
-    if wanted is None:  # SI units, or a unit for each of several components
+    expected_unit = size_of_unit("Hz" if unit == str(RATE) else unit)
+    if expected_unit is None:  # SI units, or a unit for each of several components
         return f"has a unit; write the number alone, in {unit}"
-    if found.dimensions != wanted.dimensions:
+    if written_unit.dimensions != expected_unit.dimensions:
         return f"is {kind_of_unit(parts['unit']) or 'in another unit'}; expected {expected_number(unit)}"
-    converted = float(parts["number"]) * found.size / wanted.size
+    converted = float(parts["number"]) * written_unit.size / expected_unit.size
     return f"has a unit; write the number alone, in {unit}: {converted:.10g}"

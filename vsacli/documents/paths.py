@@ -76,9 +76,9 @@ class ReplacementError(InputError):
         self.path = path
 
 
-def _missing_word_error(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputError:
+def _missing_word_error(word: str, valid_words: Iterable[str], place: tuple[str, ...]) -> InputError:
     """Return the error for a word that is not among the valid words at a place."""
-    words = list(there)
+    words = list(valid_words)
     where = f"{_dotted_path(place)} has" if place else "there is"
     names = [each for each in words if not each.isdecimal()]
     if not words:
@@ -134,8 +134,8 @@ def replace(
             and the path to it.
     """
     scope = Scope(Problems(file), members or {}, exempt or {})
-    found: _Record = _Replacement(_node_of_value(value), scope).in_record(record, path.split("."), ())
-    return found
+    replaced: _Record = _Replacement(_node_of_value(value), scope).in_record(record, path.split("."), ())
+    return replaced
 
 
 def replace_all(
@@ -238,7 +238,7 @@ class _Replacement(NamedTuple):
         try:
             problems.check()
         except InputError as error:
-            messages = [found.message.removeprefix(f"{label}: ") for found in error.problems]
+            messages = [problem.message.removeprefix(f"{label}: ") for problem in error.problems]
             raise InputError(Problem("", 0, f"{label}: {message}") for message in messages) from None
         return content
 
@@ -254,7 +254,7 @@ class _Replacement(NamedTuple):
         return self._in_list(kind, kind.item, content, words, place)
 
     def _in_list(
-        self, kind: ValueKind, each: ValueKind, content: Any, words: list[str], place: tuple[str, ...]
+        self, kind: ValueKind, entry_kind: ValueKind, content: Any, words: list[str], place: tuple[str, ...]
     ) -> Any:
         """Return a list with the replacement in the entry that a word names, or in all entries."""
         word, *rest = words
@@ -267,9 +267,9 @@ class _Replacement(NamedTuple):
             exempt = self.scope.exempt.get(getattr(kind, "purpose", ""), {})
             reason = exempt.get(names[indices[word]], "it has none")
             raise InputError.one(f"{_dotted_path((*place, word))}: no value goes there: {reason}")
-        there = [index for index, entry in enumerate(entries) if entry is not None]
-        for index in there if word == ALL else [indices[word]]:
+        nonempty_indices = [index for index, entry in enumerate(entries) if entry is not None]
+        for index in nonempty_indices if word == ALL else [indices[word]]:
             inside = self._replace(scope=self.scope.of_member(names[index]))
-            here = (*place, names[index] or str(index))
-            entries[index] = inside.in_value(each, content[index], rest, here)
+            entry_place = (*place, names[index] or str(index))
+            entries[index] = inside.in_value(entry_kind, content[index], rest, entry_place)
         return tuple(entries)

@@ -121,14 +121,14 @@ class Rule(NamedTuple, Generic[_Subject]):
     def sentence(self, measured: Measured, other: OtherUnit | None) -> str:
         """Return the warning: field, value, finding, and the likely unit."""
         path = _path_to_report(measured.path, other)
-        known = path == measured.path and not math.isnan(measured.value)
-        value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if known else ""
+        has_value = path == measured.path and not math.isnan(measured.value)
+        value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if has_value else ""
         # Three digits, with a power of ten only where there would be many zeros.
-        found = self.finding.format(size=f"{float(f'{measured.size:.3g}'):.6g}", **measured.beside)
+        finding = self.finding.format(size=f"{float(f'{measured.size:.3g}'):.6g}", **measured.beside)
         advice = self.advice
         if other is not None:
-            advice = _guess_unit(measured, other) if known else f"is it in {other.unit}?"
-        return f"{'.'.join(map(str, path))}{_component_name(path)}{value} {found}; {advice}"
+            advice = _guess_unit(measured, other) if has_value else f"is it in {other.unit}?"
+        return f"{'.'.join(map(str, path))}{_component_name(path)}{value} {finding}; {advice}"
 
 
 def _component_name(path: NumberPath) -> str:
@@ -186,7 +186,7 @@ class ValuesInFile:
         """Return the line of the deepest node along a path."""
         return self.at(path)[0].line
 
-    def said(self, measured: Measured) -> Measured | None:
+    def as_in_file(self, measured: Measured) -> Measured | None:
         """Return the number with the path to its scalar, which all joints may share; None if it differs."""
         node, left = self.at(measured.path)
         if not isinstance(node, tree.TextNode) or math.isnan(measured.value):
@@ -202,7 +202,7 @@ class ValuesInFile:
     def in_angles(self, measured: Measured) -> bool:
         """Return whether the file has this number as an expression with `deg` or `pi`."""
         node, _ = self.at(measured.path)
-        if not isinstance(node, tree.TextNode) or self.said(measured) is None:
+        if not isinstance(node, tree.TextNode) or self.as_in_file(measured) is None:
             return False
         return bool(_EXPRESSION_OF_ANGLE.search(node.text))
 
@@ -220,7 +220,7 @@ def implausible_measurements(
     rules: Sequence[Rule[_Subject]],
     subject: _Subject,
     written: ValuesInFile | None = None,
-    known: Collection[str] = (),
+    rules_with_findings: Collection[str] = (),
 ) -> dict[str, list[Measured]]:
     """Return the implausible numbers by rule name; rules without findings have no entry.
 
@@ -228,30 +228,32 @@ def implausible_measurements(
         rules: rules in an order in which each follows the rules that explain its findings.
         subject: robot or trajectory.
         written: file of the subject, if any.
-        known: names of rules with findings elsewhere.
+        rules_with_findings: names of rules with findings elsewhere.
     """
-    found: dict[str, list[Measured]] = {}
+    outside_by_rule: dict[str, list[Measured]] = {}
     with np.errstate(all="ignore"):  # extreme values may have an infinite size
         for rule in rules:
-            if {*found, *known}.isdisjoint(rule.explained_by):
+            if {*outside_by_rule, *rules_with_findings}.isdisjoint(rule.explained_by):
                 outside = [measured for measured in rule.measure(subject) if not rule.admits(measured.size)]
                 if rule.in_angles and written is not None:
                     outside = [measured for measured in outside if not written.in_angles(measured)]
-                found |= {rule.name: outside} if outside else {}
-    return found
+                outside_by_rule |= {rule.name: outside} if outside else {}
+    return outside_by_rule
 
 
 def implausible_values(
     rules: Sequence[Rule[_Subject]],
     subject: _Subject,
     written: ValuesInFile | None = None,
-    known: Collection[str] = (),
+    rules_with_findings: Collection[str] = (),
 ) -> tuple[Problem, ...]:
     """Return the warnings about implausible values, with file and line if the file has the same value."""
     named = {rule.name: rule for rule in rules}
-    found = implausible_measurements(rules, subject, written, known)
+    outside_by_rule = implausible_measurements(rules, subject, written, rules_with_findings)
     problems = (
-        _warning_about(named[name], each, written) for name, several in found.items() for each in several
+        _warning_about(named[name], each, written)
+        for name, several in outside_by_rule.items()
+        for each in several
     )
     return tuple(dict.fromkeys(problems))
 
@@ -259,8 +261,8 @@ def implausible_values(
 def _warning_about(rule: Rule[Any], measured: Measured, written: ValuesInFile | None) -> Problem:
     """Return the warning about a number."""
     other = rule.other_unit(measured)
-    said = written.said(measured) if written is not None else None
-    if written is None or said is None:
+    in_file = written.as_in_file(measured) if written is not None else None
+    if written is None or in_file is None:
         return Problem("", 0, rule.sentence(measured, other))
     line = written.line(_path_to_report(measured.path, other))
-    return Problem(written.path, line, rule.sentence(said, other))
+    return Problem(written.path, line, rule.sentence(in_file, other))

@@ -115,14 +115,14 @@ def read_changes(texts: Iterable[str]) -> dict[str, Any]:
         ChangeError: a text has no `=`, a value is not YAML, or a path is changed twice.
     """
     changes: dict[str, Any] = {}
-    given: dict[str, str] = {}
+    texts_by_path: dict[str, str] = {}
     for text in texts:
         path, equals, value_text = (part.strip() for part in text.partition("="))
         if not (path and equals and value_text):
             raise ChangeError.of(text, "expected PATH=VALUE, e.g. joints.*.link.mass=2.5")
-        if path in given:
-            raise ChangeError.of(text, f"{path} is also set to {quoted(given[path])}; set it once")
-        given[path], changes[path] = value_text, _parse_change_value(text, value_text)
+        if path in texts_by_path:
+            raise ChangeError.of(text, f"{path} is also set to {quoted(texts_by_path[path])}; set it once")
+        texts_by_path[path], changes[path] = value_text, _parse_change_value(text, value_text)
     return changes
 
 

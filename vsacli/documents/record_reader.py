@@ -102,17 +102,19 @@ def _scalar_entry(node: Node, key: str) -> TextNode | None:
     return entry if isinstance(entry, TextNode) else None
 
 
-def _refuse_unknown_keys(cls: type, node: tree.MapNode, known: Collection[str], scope: Scope) -> set[str]:
+def _refuse_unknown_keys(
+    cls: type, node: tree.MapNode, valid_keys: Collection[str], scope: Scope
+) -> set[str]:
     """Note unknown keys; return the known keys probably meant, which are then not reported as missing."""
     meant: set[str] = set()
     for key, line in node.key_lines.items():
-        if key in known:
+        if key in valid_keys:
             continue
         if key in getattr(cls, "not_yet", ()):
             scope.problems.add(line, f"{key!r} is not supported yet")
         else:
-            scope.problems.add(line, f"unknown key {quoted(key)}{did_you_mean(key, known)}")
-            meant.update(filter(None, [nearest(key, known)]))
+            scope.problems.add(line, f"unknown key {quoted(key)}{did_you_mean(key, valid_keys)}")
+            meant.update(filter(None, [nearest(key, valid_keys)]))
     return meant - node.entries.keys()
 
 
@@ -319,8 +321,8 @@ def _names_sides(kind: PairOf, node: tree.MapNode) -> bool:
     """Return whether mappings stand under unknown keys, as in `{flexor: {...}, extensor: {...}}`."""
     if not node.entries or not all(isinstance(value, tree.MapNode) for value in node.entries.values()):
         return False
-    known = {"type", *(name for cls in kind.records.values() for name in declared_fields(cls))}
-    return known.isdisjoint(node.entries)
+    item_keys = {"type", *(name for cls in kind.records.values() for name in declared_fields(cls))}
+    return item_keys.isdisjoint(node.entries)
 
 
 def _read_per_joint(kind: PerJoint, node: Node, label: str, scope: Scope) -> Any:
@@ -357,8 +359,8 @@ def _nodes_by_joint(
             return {name: node for name in names if name not in exempt}
         case tree.ListNode(items=items) if len(items) != len(names):
             expected = f"{counted(len(names), 'value')}, one for each joint ({', '.join(names)})"
-            found = f"found {len(items)}; is the file for another robot?"
-            scope.problems.add(node.line, f"{label}: expected {expected}, {found}")
+            mismatch = f"found {len(items)}; is the file for another robot?"
+            scope.problems.add(node.line, f"{label}: expected {expected}, {mismatch}")
             return None
         case tree.ListNode(items=items):
             return dict(zip(names, items, strict=True))

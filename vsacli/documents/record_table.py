@@ -39,13 +39,13 @@ class RecordTable(NamedTuple, Generic[_Record]):
     Attributes:
         records: one record a row.
         lines: line numbers of the rows in the file.
-        others: names of columns without a field, which were not read.
+        unknown_columns: names of columns without a field, which were not read.
         source: file that was read.
     """
 
     records: tuple[_Record, ...]
     lines: tuple[int, ...]
-    others: tuple[str, ...]
+    unknown_columns: tuple[str, ...]
     source: Source
 
 
@@ -57,14 +57,14 @@ class _ColumnsByField(NamedTuple):
         places: index of the column of each field that has one.
         factors: factors that convert the numbers of a field to SI units.
         units: units of the numbers of a field, as written and SI, where they differ.
-        others: names of columns without a field.
+        unknown_columns: names of columns without a field.
     """
 
     width: int
     places: dict[str, int]
     factors: dict[str, float]
     units: dict[str, tuple[str, str]]
-    others: list[str]
+    unknown_columns: list[str]
 
 
 def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) -> RecordTable[_Record]:
@@ -102,7 +102,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     problems.check()
     if not records:
         raise InputError.one("has a header but no rows of values", source.path)
-    return RecordTable(tuple(records.values()), tuple(records), tuple(columns.others), source)
+    return RecordTable(tuple(records.values()), tuple(records), tuple(columns.unknown_columns), source)
 
 
 def _assign_columns(header: Header, cls: type, problems: Problems) -> _ColumnsByField:
@@ -119,7 +119,7 @@ def _assign_columns(header: Header, cls: type, problems: Problems) -> _ColumnsBy
             if columns.factors[name] != 1 and unit is not None:
                 columns.units[name] = unit, fields[name][0].quantity.revolute
         else:
-            columns.others.append(name)
+            columns.unknown_columns.append(name)
             near = nearest(name, fields)
             if near is not None:
                 problems.add(header.line, f"unknown column {tree.quoted(name)}; did you mean {near!r}?")
@@ -156,7 +156,7 @@ def _read_row(
         hint = "; names with the separator in them go in double quotes" if len(cells) > columns.width else ""
         scope.problems.add(line, f"{wrong_count(columns.width, len(cells))}{hint}")
         return None
-    given = {
+    cell_nodes = {
         field: tree.TextNode(line, _in_si(cells[index], columns.factors[field]), plain=False)
         for field, index in columns.places.items()
         if cells[index]
@@ -164,14 +164,14 @@ def _read_row(
     missing = [
         name
         for name, (_, default) in declared_fields(cls).items()
-        if default is REQUIRED and name not in given
+        if default is REQUIRED and name not in cell_nodes
     ]
     for name in missing:
         scope.problems.add(line, f"column {name!r} is empty")
     if missing:
         return None
     problems = Problems(scope.problems.file)
-    mapping = tree.MapNode(line, given, dict.fromkeys(given, line))
+    mapping = tree.MapNode(line, cell_nodes, dict.fromkeys(cell_nodes, line))
     record = read_record(cls, mapping, "", scope._replace(problems=problems))
     try:
         problems.check()

@@ -166,7 +166,7 @@ class Problems:
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self._found: list[Problem] = []
+        self._problems: list[Problem] = []
         self._faults: set[tuple[int, str]] = set()
 
     def add(self, line: int, message: str, fault: str = "") -> None:
@@ -184,16 +184,16 @@ class Problems:
         if fault and (line, fault) in self._faults:
             return
         self._faults.add((line, fault))
-        if len(self._found) == MAX_PROBLEMS:
-            self._found.append(
+        if len(self._problems) == MAX_PROBLEMS:
+            self._problems.append(
                 Problem(self.file, line, f"more than {MAX_PROBLEMS} problems; reading stopped here")
             )
             self.check()
-        self._found.append(Problem(self.file, line, message))
+        self._problems.append(Problem(self.file, line, message))
 
     def include(self, error: InputError) -> None:
         """Note the problems of another file that this file refers to."""
-        self._found.extend(error.problems)
+        self._problems.extend(error.problems)
 
     def fail(self, line: int, message: str) -> NoReturn:
         """Raise this problem, after which nothing can be read, with all problems found so far."""
@@ -205,12 +205,12 @@ class Problems:
         Raises:
             InputError: with every problem once, ordered by line.
         """
-        if self._found:
+        if self._problems:
             raise InputError(self._in_order())
 
     def _in_order(self, *last: Problem) -> list[Problem]:
         return sorted(
-            dict.fromkeys([*self._found, *last]), key=lambda problem: (problem.file != self.file, problem)
+            dict.fromkeys([*self._problems, *last]), key=lambda problem: (problem.file != self.file, problem)
         )
 
 
@@ -333,10 +333,12 @@ def _recognize_format(name: str) -> str:
             beginning = file.read(BEGINNING_BYTES)
     except (OSError, ValueError):
         return ""  # reported before
-    found = next((known for signature, known in SIGNATURES.items() if beginning.startswith(signature)), "")
+    by_content = next(
+        (format_name for signature, format_name in SIGNATURES.items() if beginning.startswith(signature)), ""
+    )
     by_name = ENDINGS.get(ending, ending)
-    if found:  # spreadsheets and the like are ZIP archives
-        return by_name if found == "zip" and by_name in SENTENCES else found
+    if by_content:  # spreadsheets and the like are ZIP archives
+        return by_name if by_content == "zip" and by_name in SENTENCES else by_content
     text = beginning.decode("latin-1").lstrip("\ufeffï»¿ \t\r\n")
     if text.startswith("<"):
         return _recognize_xml(text, ending)

@@ -51,7 +51,7 @@ class CsvTable:
             cells, if these are allowed.
         source: file that was read.
         header: header of the file.
-        others: names of columns that were not read because they are unknown.
+        unknown_columns: names of columns that were not read because they are unknown.
         ignored: names of columns that the mapping leaves out.
         first_stamp: first time, which was subtracted, if times were too large for floating point or clock
             texts.
@@ -65,7 +65,7 @@ class CsvTable:
     values: FloatArray = field(repr=False)
     source: Source
     header: Header = NO_HEADER
-    others: tuple[str, ...] = ()
+    unknown_columns: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     first_stamp: int | str | None = None
     kept: IndexArray | None = field(repr=False, default=None)
@@ -89,10 +89,10 @@ class CsvTable:
             stamped: whether to keep rows with no number but the time, which may be the beginning of the log.
         """
         cells = self.values if stamped else self.values[:, self._signals]
-        there = ~np.isnan(cells).all(axis=1)
-        if there.all() or not there.any():
+        has_number = ~np.isnan(cells).all(axis=1)
+        if has_number.all() or not has_number.any():
             return self
-        return replace(self, values=self.values[there], kept=np.flatnonzero(there))
+        return replace(self, values=self.values[has_number], kept=np.flatnonzero(has_number))
 
     def without_hollow_columns(self) -> CsvTable:
         """Return the columns that hold a number; the others become `hollow`."""
@@ -111,22 +111,22 @@ class CsvTable:
         Some loggers write one row for each signal of a message, a nanosecond apart. Nothing is joined if two
         of such rows hold numbers in the same column.
         """
-        there = ~np.isnan(self.values[:, self._signals])
-        at = next((index for index in range(len(self.columns)) if index not in self._signals), None)
-        if at is None or there.all() or not there.any():
+        has_number = ~np.isnan(self.values[:, self._signals])
+        time_column = next((index for index in range(len(self.columns)) if index not in self._signals), None)
+        if time_column is None or has_number.all() or not has_number.any():
             return self
-        stamps = self.values[:, at]
-        intervals = np.abs(np.diff(stamps[there[:, int(np.argmax(there.sum(axis=0)))]]))
+        stamps = self.values[:, time_column]
+        intervals = np.abs(np.diff(stamps[has_number[:, int(np.argmax(has_number.sum(axis=0)))]]))
         # seconds since 1970 have 7 decimals in floating point
         rounding = 2 * float(np.spacing(np.abs(stamps).max()))
         near = max(rounding, SAME_STAMP * float(np.median(intervals)) if intervals.size else 0.0)
         starts = np.append(0, np.flatnonzero(~(np.abs(np.diff(stamps)) <= near)) + 1)
-        filled = np.add.reduceat(there.astype(int), starts, axis=0)
+        filled = np.add.reduceat(has_number.astype(int), starts, axis=0)
         if len(starts) == len(stamps) or filled.max() > 1:
             return self
         values = np.add.reduceat(np.nan_to_num(self.values), starts, axis=0)
         values[:, self._signals] = np.where(filled > 0, values[:, self._signals], np.nan)
-        values[:, at] = stamps[starts]
+        values[:, time_column] = stamps[starts]
         kept = starts if self.kept is None else self.kept[starts]
         return replace(self, values=values, kept=kept, joined=len(stamps) - len(starts))
 
@@ -168,7 +168,7 @@ class RowLines:
 def read_table(
     path: str | os.PathLike[str],
     mapping: ColumnMapping = AS_NAMED,
-    known: Collection[str] | None = None,
+    readable_names: Collection[str] | None = None,
     *,
     empty_cells: bool = False,
 ) -> CsvTable:
@@ -181,7 +181,7 @@ def read_table(
     Args:
         path: path of the file; UTF-8, with or without a byte order mark.
         mapping: names of foreign columns, and columns to leave out.
-        known: names of columns to read, if present; all if None.
+        readable_names: names of columns to read, if present; all if None.
         empty_cells: whether cells may be empty, or hold `nan`, `NA` or the like.
 
     Raises:
@@ -200,7 +200,7 @@ def read_table(
                     skipped=mapping.skip_rows,
                 )
                 digest, text = _digest_and_text(content, name)
-            chosen = mapping.applied(header, known, name)
+            chosen = mapping.choose_columns(header, readable_names, name)
             headings, values, first_stamp = _read_values(name, header, chosen, empty_cells)
             rated = mapping.rate is not None and chosen.time is None and len(values) > 0
             if rated:
@@ -216,7 +216,7 @@ def read_table(
         values,
         source,
         header,
-        chosen.others,
+        chosen.unknown_columns,
         chosen.ignored,
         first_stamp=first_stamp,
         rated=rated,
@@ -253,10 +253,10 @@ def _read_values(
     headings, column = chosen.headings, chosen.places.index(chosen.time)
     times = rows._replace(used=(chosen.time,))
     if shows_a_clock(times._replace(empty_cells=True)):
-        others = [place for place in chosen.places if place != chosen.time]
-        numbers = read_numbers(rows._replace(used=others)) if others else np.empty((0, 0))
+        other_places = [place for place in chosen.places if place != chosen.time]
+        numbers = read_numbers(rows._replace(used=other_places)) if other_places else np.empty((0, 0))
         first, stamps = read_clocks(times)
-        values = np.insert(numbers, column, stamps, axis=1) if others else stamps[:, None]
+        values = np.insert(numbers, column, stamps, axis=1) if other_places else stamps[:, None]
         heading = f"{split_heading(headings[column])[0]} [ns]"
         headings = (*headings[:column], heading, *headings[column + 1 :])
         return headings, _apply_factors(values, chosen), first

@@ -94,23 +94,23 @@ class ClockTime(NamedTuple):
 
 def read_clock(text: str) -> ClockTime | None:
     """Return the time of a clock text; None if the text has no supported form."""
-    found = _CLOCK.fullmatch(text.strip())
-    if found is None:
+    match = _CLOCK.fullmatch(text.strip())
+    if match is None:
         return None
-    hours = int(found["hours"])
-    if hours > (12 if found["half"] else 23):
+    hours = int(match["hours"])
+    if hours > (12 if match["half"] else 23):
         return None
-    if found["half"]:
-        hours = hours % 12 + 12 * (found["half"].upper() == "PM")
-    fraction = (found["fraction"] or found["after_colon"] or "").ljust(DIGITS, "0")[:DIGITS]
-    whole = hours * 3600 + int(found["minutes"]) * 60 + int(found["seconds"]) - _zone_offset(found["zone"])
-    if found["year"] is not None:
+    if match["half"]:
+        hours = hours % 12 + 12 * (match["half"].upper() == "PM")
+    fraction = (match["fraction"] or match["after_colon"] or "").ljust(DIGITS, "0")[:DIGITS]
+    whole = hours * 3600 + int(match["minutes"]) * 60 + int(match["seconds"]) - _zone_offset(match["zone"])
+    if match["year"] is not None:
         try:
-            day = date(int(found["year"]), int(found["month"]), int(found["day"]))
+            day = date(int(match["year"]), int(match["month"]), int(match["day"]))
         except ValueError:
             return None
         whole += (day.toordinal() - date(1970, 1, 1).toordinal()) * 86400
-    return ClockTime(whole * NANOSECONDS + int(fraction), found["year"] is not None)
+    return ClockTime(whole * NANOSECONDS + int(fraction), match["year"] is not None)
 
 
 def _zone_offset(zone: str | None) -> int:

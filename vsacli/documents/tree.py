@@ -292,8 +292,10 @@ class _TreeBuilder:
             self._problems.add(line, f"the alias *{name} is inside the value of its own anchor &{name}")
         else:
             near = nearest(name, self._anchors)
-            known = f" (line {self._anchors[near].node.line})" if near else ""
-            hint = f"; did you mean *{near}{known}?" if near else f"; write &{name} before a value above"
+            anchor_line = f" (line {self._anchors[near].node.line})" if near else ""
+            hint = (
+                f"; did you mean *{near}{anchor_line}?" if near else f"; write &{name} before a value above"
+            )
             self._problems.add(line, f"the alias *{name} has no anchor{hint}")
         return _Anchored(TextNode(line, "", plain=True, noted=True), 1, 0)
 

@@ -188,10 +188,12 @@ class Joint(DeclaredRecord):
             return self.actuator.has_columns(variable)
         of_kind = self.actuator.has_columns(variable._replace(requires=None))
         if variable.requires in MOTOR_CONSTANTS:
-            given = [getattr(side, variable.requires, None) is not None for side in self.actuator.sides]
-            return [kind and motor for kind, motor in zip(of_kind, given, strict=True)]
-        there = variable.requires == LOSSES or variable.requires in self.commanded
-        return [there and column for column in of_kind]
+            has_constant = [
+                getattr(side, variable.requires, None) is not None for side in self.actuator.sides
+            ]
+            return [kind and motor for kind, motor in zip(of_kind, has_constant, strict=True)]
+        is_commanded = variable.requires == LOSSES or variable.requires in self.commanded
+        return [is_commanded and column for column in of_kind]
 
     @property
     def has_friction(self) -> bool:
@@ -231,5 +233,5 @@ def existing_columns(variable: Variable, kinds: Iterable[str]) -> list[list[bool
 
     All columns count as existing for an unknown kind.
     """
-    every = [True] * (2 if "motor" in variable.dims else 1)
-    return [ACTUATORS[kind].has_columns(variable) if kind in ACTUATORS else every for kind in kinds]
+    all_columns = [True] * (2 if "motor" in variable.dims else 1)
+    return [ACTUATORS[kind].has_columns(variable) if kind in ACTUATORS else all_columns for kind in kinds]

@@ -87,34 +87,38 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
     Raises:
         InputError: a pattern matches no parameter.
     """
-    found = [
+    available = [
         _parameter_at(robot, number) for number in numbers_in_record(robot) if _affects_results(number.path)
     ]
     chosen = [
-        each for each in found if not patterns or any(_matches_pattern(each, pattern) for pattern in patterns)
+        each
+        for each in available
+        if not patterns or any(_matches_pattern(each, pattern) for pattern in patterns)
     ]
     for pattern in patterns:
-        if not any(_matches_pattern(each, pattern) for each in found):
-            raise InputError.one(no_match(pattern, found))
+        if not any(_matches_pattern(each, pattern) for each in available):
+            raise InputError.one(no_match(pattern, available))
     return tuple(chosen)
 
 
-def no_match(pattern: str, found: Sequence[Parameter]) -> str:
+def no_match(pattern: str, available: Sequence[Parameter]) -> str:
     """Return the problem of a pattern that no parameter matches, with patterns that do.
 
     A path is compared word by word. Of a pattern with `*` only the last word counts, since `*` also stands
     for several words.
     """
     near = (
-        [] if "*" in pattern else [path for path in map(str, found) if _are_similar_paths(pattern, path)][:1]
+        []
+        if "*" in pattern
+        else [path for path in map(str, available) if _are_similar_paths(pattern, path)][:1]
     )
-    patterns = list(dict.fromkeys(each.of_every_joint for each in found))
+    patterns = list(dict.fromkeys(each.of_every_joint for each in available))
     word = nearest(_last_word(pattern), dict.fromkeys(map(_last_word, patterns)))
     near = near or [each for each in patterns if _last_word(each) == word]
     problem = f"no parameter of the robot matches {pattern!r}"
     if 0 < len(near) <= MOST_NEAR:
         return f"{problem}; did you mean {' or '.join(map(repr, near))}?"
-    return f"{problem}; valid: {', '.join(dict.fromkeys(each.of_its_part for each in found))}"
+    return f"{problem}; valid: {', '.join(dict.fromkeys(each.of_its_part for each in available))}"
 
 
 def _last_word(path: str) -> str:
@@ -122,8 +126,8 @@ def _last_word(path: str) -> str:
 
 
 def _are_similar_paths(one: str, other: str) -> bool:
-    words, others = one.split("."), other.split(".")
-    return len(words) == len(others) and all(map(nearest, words, ([each] for each in others)))
+    words, other_words = one.split("."), other.split(".")
+    return len(words) == len(other_words) and all(map(nearest, words, ([each] for each in other_words)))
 
 
 def _affects_results(path: NumberPath) -> bool:

@@ -77,8 +77,10 @@ class TrajectoryFile(DeclaredRecord):
     def declared(self) -> dict[Signal, Declaration]:
         """Declarations of the signals that have one."""
         signals = (POSITION, *COMMANDED.values(), WRENCH)
-        found = {signal: getattr(self, signal.key) for signal in signals}
-        return {signal: declaration for signal, declaration in found.items() if declaration is not None}
+        declarations = {signal: getattr(self, signal.key) for signal in signals}
+        return {
+            signal: declaration for signal, declaration in declarations.items() if declaration is not None
+        }
 
     @property
     def recorded(self) -> dict[Signal, Recorded]:
@@ -253,10 +255,10 @@ def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | No
     Raises:
         ChangeError: something else is changed, or the rate is not valid.
     """
-    if others := {key: value for key, value in changes.items() if key != "rate"}:
+    if other_changes := {key: value for key, value in changes.items() if key != "rate"}:
         reason = f"{os.fspath(path)} is a CSV table, whose rate alone can be set"
         raise ChangeError.of(
-            format_changes(others)[0], f"{reason}; name it in a YAML trajectory and set its keys"
+            format_changes(other_changes)[0], f"{reason}; name it in a YAML trajectory and set its keys"
         )
     if not changes:
         return None
@@ -299,7 +301,7 @@ def _read_recordings(
     for signal, declared in document.recorded.items():
         file = folder / declared.file
         wanted[file][signal] = declared.chosen
-        mappings[file] = mappings[file].joined(declared.mapping)
+        mappings[file] = mappings[file].combined_with(declared.mapping)
 
     resampled, unwrap = document.rate is not None, getattr(document.recorded.get(POSITION), "unwrap", False)
     recordings = [

@@ -220,7 +220,7 @@ def _described(rows: FirstRows, place: int, reason: str) -> TimeColumn:
     column = rows.called(place)
     if rows.clocks(place):
         return TimeColumn(place, MappedColumn(column=column), "as a clock shows it")
-    own = rows.unit(place) or MappedColumn(column=column).doubt(rows.columns[place])
+    own = rows.unit(place) or MappedColumn(column=column).undeclared_unit(rows.columns[place])
     unit, why = guessed_unit(rows.numbers(place)) if own is None else (own, "")
     by_steps = unit is not None and STEPS in why
     why = f"unit {GUESSED}: {why}" if by_steps else why

@@ -58,7 +58,7 @@ def _excess(path: NumberPath, inertia: Inertia, written: ValuesInFile | None) ->
 
 
 def _is_written(path: NumberPath, value: float, written: ValuesInFile) -> bool:
-    return written.said(Measured(path, value, UNIT, math.nan)) is not None
+    return written.as_in_file(Measured(path, value, UNIT, math.nan)) is not None
 
 
 def _problem(path: NumberPath, message: str, written: ValuesInFile | None) -> Problem:

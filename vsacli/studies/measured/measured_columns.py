@@ -98,7 +98,7 @@ class Recording(NamedTuple):
     Attributes:
         time: times, (samples,) in s since the first sample.
         signals: signals in the order of the variables, then of the joints.
-        table: table of the file; its `others` are not among these variables.
+        table: table of the file; its `unknown_columns` are not among these variables.
         stranger: sentence on joints that the subject of the recording does not have; otherwise empty.
     """
 
@@ -134,7 +134,7 @@ def read_recording(
     table = table.without_empty_rows(stamped=True).with_joined_rows()
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
-    unknown = [name for name, _ in map(split_heading, table.others) if role_of(name)[0] != COMMANDED]
+    unknown = [name for name, _ in map(split_heading, table.unknown_columns) if role_of(name)[0] != COMMANDED]
     expected = (TIME,) if any(name in places for name in names) else (TIME, *places)
     header = ColumnNames(
         (*names, *unknown), {TIME, *places}, expected, jointed.joint_names, table.source.path, "use --columns"

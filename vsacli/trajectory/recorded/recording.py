@@ -181,7 +181,7 @@ def read_samples(
     table = table.without_hollow_columns().without_empty_rows().with_joined_rows()
     signals = NEEDED if wanted is None else tuple(wanted)
     _check_hollow(table, signals)
-    headings = (*table.columns, *table.others)
+    headings = (*table.columns, *table.unknown_columns)
     layout = column_layout(headings, joints, signals, table.source.path, table.header.line)
     _check_filled(table)
     if wanted is None:
