@@ -59,11 +59,11 @@ class Rotors:
             accelerations[..., coupled] = (torques[..., coupled] - share * torques[..., other]) / effective
         return accelerations
 
-    def held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
+    def accelerations_with_held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Return theta'' with some motors held, and the holding torques, 0 for others; (..., motors)."""
-        apart = held.copy()
-        apart[..., self._coupled] |= held[..., self._other]
-        moving = np.where(apart, torques / self._inertia, self.accelerations(torques))
+        held_or_coupled = held.copy()
+        held_or_coupled[..., self._coupled] |= held[..., self._other]
+        moving = np.where(held_or_coupled, torques / self._inertia, self.accelerations(torques))
         accelerations = np.where(held, 0.0, moving)
         return accelerations, np.where(held, torques - self.torques(accelerations), 0.0)
 
@@ -117,14 +117,14 @@ class Drivetrain:
         self.windings = Windings.of([motor for _, motor in motors])
         self.chosen = np.flatnonzero(["stiffness" in actuator.commanded for actuator in actuators])
         self.spring_joint = self.joint[self.sprung]
-        self._direct = np.flatnonzero(self.rigid)
+        self._rigid_joints = np.flatnonzero(self.rigid)
         groups = dict.fromkeys(actuator.spring_group for actuator in actuators if actuator.sprung)
-        self._groups = [self._group(group, actuators) for group in groups]
-        self._alone = len(self._groups) == 1 and not self.rigid.any()
+        self._groups = [self._make_group(group, actuators) for group in groups]
+        self._is_one_group = len(self._groups) == 1 and not self.rigid.any()
         ranges = [each for actuator in actuators if actuator.sprung for each in actuator.phi_ranges]
         self.domain = np.array(ranges).reshape(-1, 2).T
 
-    def _group(self, group: Hashable, actuators: Sequence[Actuator]) -> _SpringGroup:
+    def _make_group(self, group: Hashable, actuators: Sequence[Actuator]) -> _SpringGroup:
         indices = [
             index for index, each in enumerate(actuators) if each.sprung and each.spring_group == group
         ]
@@ -142,21 +142,21 @@ class Drivetrain:
         result[..., self.present] = values
         return result
 
-    def merged(self, sprung: FloatArray, rigid: FloatArray) -> FloatArray:
+    def of_motors_by_joint(self, sprung: FloatArray, rigid: FloatArray) -> FloatArray:
         """Return (..., joints, 2) from values of sprung motors, (..., springs), and of joints, (..., joints).
 
         Values of joints are used for motors without a spring.
         """
-        return self.of_joints(self.of_all(rigid, sprung))
+        return self.of_joints(self.of_all_motors(rigid, sprung))
 
-    def direct(self, values: FloatArray) -> FloatArray:
+    def of_rigid_joints(self, values: FloatArray) -> FloatArray:
         """Return the values of motors that move joints directly, (..., joints), else 0."""
         result = np.zeros_like(values, shape=(*values.shape[:-1], len(self.rigid)))
-        if self._direct.size:
-            result[..., self._direct] = values[..., ~self.sprung]
+        if self._rigid_joints.size:
+            result[..., self._rigid_joints] = values[..., ~self.sprung]
         return result
 
-    def of_all(self, rigid: FloatArray, sprung: FloatArray) -> FloatArray:
+    def of_all_motors(self, rigid: FloatArray, sprung: FloatArray) -> FloatArray:
         """Return (..., motors) from values of motors with springs, and of joints for the other motors."""
         values = rigid[..., self.joint]
         values[..., self.sprung] = sprung
@@ -196,11 +196,11 @@ class Drivetrain:
 
     def of_groups(self, values: FloatArray) -> list[FloatArray]:
         """Return the part of each group of actuators, (..., joints), of (..., joints)."""
-        return [values if self._alone else values[..., group.joints] for group in self._groups]
+        return [values if self._is_one_group else values[..., group.joints] for group in self._groups]
 
     def by_joint(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
         """Return (..., joints) from the parts of the groups; 0 for joints without springs."""
-        if self._alone:
+        if self._is_one_group:
             return parts[0]
         result = np.zeros_like(like)
         for group, part in zip(self._groups, parts, strict=True):
@@ -209,7 +209,7 @@ class Drivetrain:
 
     def of_springs(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
         """Return (..., springs) from the parts of the groups, (..., joints, motors)."""
-        if self._alone:
+        if self._is_one_group:
             return parts[0].reshape(*like.shape)
         result = np.empty_like(like)
         for group, part in zip(self._groups, parts, strict=True):
@@ -221,7 +221,7 @@ class Drivetrain:
         result = np.empty_like(like)
         for group, part in zip(self._groups, parts, strict=True):
             for number, of_motor in enumerate(part):
-                springs = slice(number, None, len(part)) if self._alone else group.springs[:, number]
+                springs = slice(number, None, len(part)) if self._is_one_group else group.springs[:, number]
                 result[..., springs] = of_motor
         return result
 
@@ -234,7 +234,7 @@ class Drivetrain:
     ) -> Iterator[tuple[Elasticity, tuple[FloatArray, FloatArray]]]:
         """Yield the springs of each group with the positions of joints and motors, (..., joints, motors)."""
         for group, of_joints in zip(self._groups, self.of_groups(q), strict=True):
-            if self._alone:
+            if self._is_one_group:
                 of_motors = theta.reshape(*theta.shape[:-1], *group.springs.shape)
             else:
                 of_motors = theta[..., group.springs]

@@ -113,7 +113,7 @@ class FrictionLaws(NamedTuple):
         smooth = np.tanh(velocity / np.where(self.width > 0, self.width, 1.0))
         return self._size(velocity, sign) * np.where(self.width > 0, smooth, sign) + self.offset
 
-    def beyond(self, torque: FloatArray) -> FloatArray:
+    def direction_beyond(self, torque: FloatArray) -> FloatArray:
         """Return 1 where a torque exceeds the holding friction, -1 where it is below its negative, else 0."""
         coulomb = torque - self.offset
         outside = np.where(coulomb > self.forward, 1.0, np.where(coulomb < -self.backward, -1.0, 0.0))

@@ -151,7 +151,7 @@ class Motor(DeclaredRecord):
     required_unless = MappingProxyType({"side": ("gear_ratio", 1)})
 
     def _problems(self) -> Iterator[FieldProblem]:
-        yield from (*self._gear_problems(), *self._missing())
+        yield from (*self._gear_problems(), *self._missing_keys())
 
     def _gear_problems(self) -> Iterator[FieldProblem]:
         ratio = self.gear_ratio
@@ -186,7 +186,7 @@ class Motor(DeclaredRecord):
         reason = "; ".join((f"{ratio:g} needs side: {SHAFT} or {JOINT}", *meanings))
         return FieldProblem(("gear_ratio",), reason, quantities=tuple(quantities))
 
-    def _missing(self) -> Iterator[FieldProblem]:
+    def _missing_keys(self) -> Iterator[FieldProblem]:
         """Yield the keys missing for constants of the windings."""
         for name, needed in NEEDED.items():
             missing = [key for key in needed if getattr(self, key) is None]

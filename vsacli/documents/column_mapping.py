@@ -168,8 +168,8 @@ class _ColumnSelection:
         self._problems: list[Problem] = []
 
     def select(self) -> ChosenColumns:
-        mapped = dict(self._mapped())
-        nanoseconds = self._nanoseconds()
+        mapped = dict(self._assigned_columns())
+        nanoseconds = self._find_nanoseconds()
         used = dict(mapped)
         unknown_columns: list[str] = []
         ignored: list[str] = []
@@ -194,14 +194,14 @@ class _ColumnSelection:
             places, headings, factors, tuple(unknown_columns), tuple(ignored), time, nanoseconds
         )
 
-    def _mapped(self) -> Iterator[tuple[int, tuple[str, float]]]:
+    def _assigned_columns(self) -> Iterator[tuple[int, tuple[str, float]]]:
         """Yield position, new heading and factor of each mapped column."""
         names_by_place: dict[int, str] = {}
         for name, source in self._mapping.columns.items():
             if self._readable_names is not None and name not in self._readable_names:
                 self._note(source, f"unknown name {name!r}{did_you_mean(name, self._readable_names)}")
                 continue
-            place = self._place(source.column, source)
+            place = self._find_place(source.column, source)
             if place is None:
                 continue
             file_heading = self._header.columns[place]
@@ -216,13 +216,13 @@ class _ColumnSelection:
                 names_by_place[place] = name
                 yield place, (source.heading(name, file_heading), source.factor)
 
-    def _nanoseconds(self) -> int | None:
+    def _find_nanoseconds(self) -> int | None:
         source = self._mapping.columns.get(TIME)
         if source is None or source.nanoseconds is None:
             return None
-        return self._place(source.nanoseconds, source)
+        return self._find_place(source.nanoseconds, source)
 
-    def _place(self, column: str | int, source: MappedColumn) -> int | None:
+    def _find_place(self, column: str | int, source: MappedColumn) -> int | None:
         """Return the position of a column; note a problem and return None if it is missing or ambiguous."""
         names = self._header.columns
         if isinstance(column, int):

@@ -45,7 +45,7 @@ CHUNK = 1_000_000
 """Bytes per read."""
 MAX_KINDS = 10
 """Maximum number of kinds of problems to report."""
-MAX_ALIKE = 1000
+MAX_SIMILAR = 1000
 """Number of problems of one kind after which reading stops."""
 MISSING = frozenset(("", *["nan", "+nan", "-nan", "nan(ind)", "-nan(ind)", "na", "n/a", "null", "none"]))
 """Cells without a number, in lower case, as C compilers, spreadsheets and statistics programs write them."""
@@ -401,7 +401,7 @@ def _row_problems(rows: RowsToRead) -> list[Problem]:
         for kind, message in _cell_problems(rows, line, decimals.with_points):
             problems_by_kind.setdefault(kind, []).append(Problem(rows.path, number, message))
         if len(problems_by_kind) > MAX_KINDS or any(
-            len(similar) >= MAX_ALIKE for similar in problems_by_kind.values()
+            len(similar) >= MAX_SIMILAR for similar in problems_by_kind.values()
         ):
             break
     if empty:
@@ -418,7 +418,7 @@ def _first_with_count(similar: list[Problem]) -> Problem:
     first, count = similar[0], len(similar)
     if count == 1:
         return first
-    number = f"{count}" if count < MAX_ALIKE else f"{count} or more"
+    number = f"{count}" if count < MAX_SIMILAR else f"{count} or more"
     return Problem(first.file, first.line, f"{first.message} (the first of {number} such lines)")
 
 

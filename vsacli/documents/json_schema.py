@@ -55,7 +55,7 @@ PRINTABLE = r"^[^\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]+$"
 def json_schema(cls: type, format_name: str, title: str) -> Schema:
     """Return the schema of documents read into the record class `cls`, which begin with `format: ...`."""
     builder = _SchemaBuilder()
-    document = builder.record(cls, {"format": {"const": format_name}}, ("format",))
+    document = builder.record_schema(cls, {"format": {"const": format_name}}, ("format",))
     return {"$schema": DIALECT, "title": title, **document, "$defs": builder.definitions}
 
 
@@ -65,27 +65,29 @@ class _SchemaBuilder:
     def __init__(self) -> None:
         self.definitions: dict[str, Schema] = {}
 
-    def record(self, cls: type, beside: Mapping[str, Schema], required: tuple[str, ...] = ()) -> Schema:
+    def record_schema(
+        self, cls: type, beside: Mapping[str, Schema], required: tuple[str, ...] = ()
+    ) -> Schema:
         """Return the schema of a mapping with a record class's fields and the further keys `beside`."""
         fields = declared_fields(cls)
         return {
             "type": "object",
             "properties": {
                 **beside,
-                **{name: self._field(field, default) for name, (field, default) in fields.items()},
+                **{name: self._field_schema(field, default) for name, (field, default) in fields.items()},
             },
             "required": [*required, *(name for name, (_, default) in fields.items() if default is REQUIRED)],
             "additionalProperties": False,
             **_required_unless_keywords(getattr(cls, "required_unless", {})),
         }
 
-    def _field(self, field: Field, default: Any) -> Schema:
+    def _field_schema(self, field: Field, default: Any) -> Schema:
         described = field.doc if field.quantity == DIMENSIONLESS else f"{field.doc}, {field.quantity}"
         shown = _json_default(default)
-        schema = self._value(field.kind, field.check)
+        schema = self._value_schema(field.kind, field.check)
         return {"description": described, **schema, **({} if shown is None else {"default": shown})}
 
-    def _value(self, kind: ValueKind, check: Check | None) -> Schema:
+    def _value_schema(self, kind: ValueKind, check: Check | None) -> Schema:
         """Return the schema of values of a kind; their numbers must meet the condition."""
         match kind:
             case OwnKind():
@@ -93,17 +95,19 @@ class _SchemaBuilder:
             case RecordOf(cls):
                 return self._reference(cls)
             case OneOf(variants):
-                return self._selected(variants)
+                return self._variants_schema(variants)
             case OneOrMore(item=item):
-                return {"anyOf": [self._value(item, check), _list_schema(self._value(item, check))]}
+                return {
+                    "anyOf": [self._value_schema(item, check), _list_schema(self._value_schema(item, check))]
+                }
             case Items(item=item):
-                return _list_schema(self._value(item, check))
+                return _list_schema(self._value_schema(item, check))
             case PairOf(item):
-                one = self._value(item, check)
+                one = self._value_schema(item, check)
                 return {"if": {"type": "array"}, "then": _list_schema(one, 2), "else": one}
         return _single_value_schema(kind, check) or _numbers_schema(kind, check)
 
-    def _selected(self, variants: Mapping[str, type]) -> Schema:
+    def _variants_schema(self, variants: Mapping[str, type]) -> Schema:
         """Return the schema of a mapping whose `type` selects its other keys."""
         return {
             "type": "object",
@@ -122,7 +126,7 @@ class _SchemaBuilder:
             self.definitions[name] = {}  # ends the recursion of a record that holds its own class
             beside = {} if word is None else {"type": {"const": word}}
             summary = inspect.cleandoc(cls.__doc__ or "").partition("\n")[0]
-            self.definitions[name] = {"description": summary, **self.record(cls, beside)}
+            self.definitions[name] = {"description": summary, **self.record_schema(cls, beside)}
         return {"$ref": f"#/$defs/{name}"}
 
 

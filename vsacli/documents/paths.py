@@ -214,7 +214,7 @@ class _Replacement(NamedTuple):
     def in_value(self, kind: ValueKind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """Return a value with the replacement in it, or the replacement itself at the end of the path."""
         if not words:
-            return self._read(kind, place)
+            return self._read_value(kind, place)
         if content is None:
             raise InputError.one(f"there is nothing at {_dotted_path(place)}; replace it as a whole")
         if isinstance(kind, PairOf) and words[0] not in SIDES:
@@ -229,7 +229,7 @@ class _Replacement(NamedTuple):
             return self.in_record(content, words, place)
         raise _missing_word_error(words[0], (), place)
 
-    def _read(self, kind: ValueKind, place: tuple[str, ...]) -> Any:
+    def _read_value(self, kind: ValueKind, place: tuple[str, ...]) -> Any:
         label, problems = _dotted_path(place), Problems(self.scope.problems.file)
         if kind.records and not isinstance(kind, Items | PairOf) and isinstance(self.node, tree.TextNode):
             keys = dict.fromkeys(key for cls in kind.records.values() for key in declared_fields(cls))

@@ -158,11 +158,11 @@ TranslatePath: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
 class ValuesInFile:
     """Values and lines of a YAML file, by the path to a number."""
 
-    def __init__(self, source: Source, moved: TranslatePath | None = None) -> None:
+    def __init__(self, source: Source, translate_path: TranslatePath | None = None) -> None:
         """Store the file, and the function that translates paths of the record into paths of the file."""
         self.path = source.path
         self._text = source.text or ""
-        self._moved = moved
+        self._translate_path = translate_path
 
     @cached_property
     def _root(self) -> tree.Node:
@@ -171,24 +171,24 @@ class ValuesInFile:
         except InputError:  # not a YAML file
             return tree.MapNode(0, {}, {})
 
-    def at(self, path: NumberPath) -> tuple[tree.Node, NumberPath]:
+    def node_along(self, path: NumberPath) -> tuple[tree.Node, NumberPath]:
         """Return the deepest node along a path, and the remaining steps."""
-        steps = path if self._moved is None else self._moved(self._root, path)
+        steps = path if self._translate_path is None else self._translate_path(self._root, path)
         node = self._root
-        for taken, step in enumerate(steps):
+        for count, step in enumerate(steps):
             inner = _child_node(node, step)
             if inner is None:
-                return node, steps[taken:]
+                return node, steps[count:]
             node = inner
         return node, ()
 
     def line(self, path: NumberPath) -> int:
         """Return the line of the deepest node along a path."""
-        return self.at(path)[0].line
+        return self.node_along(path)[0].line
 
     def as_in_file(self, measured: Measured) -> Measured | None:
         """Return the number with the path to its scalar, which all joints may share; None if it differs."""
-        node, left = self.at(measured.path)
+        node, left = self.node_along(measured.path)
         if not isinstance(node, tree.TextNode) or math.isnan(measured.value):
             return measured
         try:
@@ -201,7 +201,7 @@ class ValuesInFile:
 
     def in_angles(self, measured: Measured) -> bool:
         """Return whether the file has this number as an expression with `deg` or `pi`."""
-        node, _ = self.at(measured.path)
+        node, _ = self.node_along(measured.path)
         if not isinstance(node, tree.TextNode) or self.as_in_file(measured) is None:
             return False
         return bool(_EXPRESSION_OF_ANGLE.search(node.text))

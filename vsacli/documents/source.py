@@ -140,14 +140,14 @@ def _refusing(name: str) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError:
-        raise InputError.one(f"no such file{_sibling(name)}", name) from None
+        raise InputError.one(f"no such file{_hint_for_missing_file(name)}", name) from None
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror}", name) from None
     except ValueError:
         raise InputError.one("the path holds a NUL character", name) from None
 
 
-def _sibling(name: str) -> str:
+def _hint_for_missing_file(name: str) -> str:
     if name.startswith(IN_PACKAGE):
         package, _, rest = name.removeprefix(IN_PACKAGE).partition("/")
         return f"; of a file in a ROS package give the path, $(ros2 pkg prefix --share {package})/{rest}"
@@ -344,10 +344,10 @@ def _recognize_format(name: str) -> str:
         return _recognize_xml(text, ending)
     if by_name in SENTENCES:
         return by_name if b"\0" in beginning else ""
-    return "" if beginning.startswith((HDF5_SIGNATURE, *UTF16_MARKS)) else _binary(beginning)
+    return "" if beginning.startswith((HDF5_SIGNATURE, *UTF16_MARKS)) else _binary_if_nul_bytes(beginning)
 
 
-def _binary(beginning: bytes) -> str:
+def _binary_if_nul_bytes(beginning: bytes) -> str:
     """Return `binary` for a first line with many NUL bytes; other lines of a damaged table may have some."""
     first = beginning.partition(b"\n")[0]
     return "binary" if len(first) <= 3 * first.count(0) > 0 else ""

@@ -161,7 +161,7 @@ def parse_yaml(text: str, problems: Problems) -> Node:
     builder = _TreeBuilder(problems)
     try:
         for event in yaml.parse(text, Loader=_LOADER):
-            builder.take(event)
+            builder.add_event(event)
     except yaml.MarkedYAMLError as error:
         _fail_with_syntax(error, text, problems)
     if builder.root is None:
@@ -263,7 +263,7 @@ class _TreeBuilder:
         self._anchors: dict[str, _Anchored] = {}
         self._nodes = 0
 
-    def take(self, event: yaml.Event) -> None:
+    def add_event(self, event: yaml.Event) -> None:
         line = event.start_mark.line + 1 if event.start_mark else 0
         match event:
             case yaml.DocumentStartEvent() if self.root is not None:
@@ -271,14 +271,14 @@ class _TreeBuilder:
             case yaml.ScalarEvent():
                 self._refuse_tag(event, line)
                 node = TextNode(line, event.value, plain=not event.style)
-                self._place(_Anchored(node, 1, 0), line, event.anchor)
+                self._add_value(_Anchored(node, 1, 0), line, event.anchor)
             case yaml.AliasEvent():
-                self._place(self._resolve(str(event.anchor), line), line)
+                self._add_value(self._resolve(str(event.anchor), line), line)
             case yaml.CollectionStartEvent():
                 self._refuse_tag(event, line)
-                self._begin(event, line)
+                self._open_collection(event, line)
             case yaml.CollectionEndEvent():
-                self._end()
+                self._close_collection()
 
     def _refuse_tag(self, event: yaml.ScalarEvent | yaml.CollectionStartEvent, line: int) -> None:
         if event.tag is not None:
@@ -299,7 +299,7 @@ class _TreeBuilder:
             self._problems.add(line, f"the alias *{name} has no anchor{hint}")
         return _Anchored(TextNode(line, "", plain=True, noted=True), 1, 0)
 
-    def _begin(self, event: yaml.CollectionStartEvent, line: int) -> None:
+    def _open_collection(self, event: yaml.CollectionStartEvent, line: int) -> None:
         line = self._open[-1].child_line(line) if self._open else line
         self._check_limits(line, nodes=1, levels=1)
         first_node = self._nodes
@@ -309,12 +309,12 @@ class _TreeBuilder:
         else:
             self._open.append(_OpenSequence(line, first_node, event.anchor))
 
-    def _end(self) -> None:
+    def _close_collection(self) -> None:
         closed = self._open.pop()
         anchored = _Anchored(closed.close(), self._nodes - closed.first_node, closed.height)
         self._attach(anchored, closed.anchor)
 
-    def _place(self, child: _Anchored, line: int, anchor: str | None = None) -> None:
+    def _add_value(self, child: _Anchored, line: int, anchor: str | None = None) -> None:
         self._check_limits(line, child.size, child.height)
         self._nodes += child.size
         self._attach(child, anchor)

@@ -75,7 +75,7 @@ def response_with_friction(
     def under(direction: FloatArray) -> tuple[Response, FloatArray]:
         friction = laws.torque(velocity, direction)
         ddq, ddtheta, holding = balance(torque - friction, laws.sharp & (direction == 0))
-        return Response(ddq, ddtheta, friction + holding), laws.beyond(friction + holding)
+        return Response(ddq, ddtheta, friction + holding), laws.direction_beyond(friction + holding)
 
     if not laws.sharp.any():
         friction = laws.torque(velocity)

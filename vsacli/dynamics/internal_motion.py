@@ -275,8 +275,8 @@ class March:
         spread, phi = before + 0 * command.q, start + 0 * command.q
         converged, rounding = False, POSITION_ROUNDING * _largest(command.q)
         for _ in range(NEWTON_STEPS):
-            phi = springs.settled(spread, phi, command)
-            if np.isnan(phi[0]).any() or not springs.within(phi).all():
+            phi = springs.deflections_at_spread(spread, phi, command)
+            if np.isnan(phi[0]).any() or not springs.laws_hold(phi).all():
                 return LOST
             there = springs.springs_at(phi, command.q)
             if (np.sign(there.pivot) != side).any():
@@ -285,7 +285,7 @@ class March:
                 fastest = np.max(np.abs(there.slope) / damping)
                 return _Solution(
                     np.hstack((start, phi)),
-                    np.stack(springs.driven(phi, command)),
+                    np.stack(springs.damper_motion(phi, command)),
                     float(np.max(np.abs(command.tau_e))),
                     float(np.max(damping)),
                     (cell.right - cell.left) * float(fastest),

@@ -330,7 +330,7 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
     for index, joint in damped.items():
         springs, command = DampedSprings(joint.actuator), command_of(index, commanded)
         phi = springs.equilibrium(command, joint.damper_start)
-        found[index] = InternalMotion(phi, *springs.driven(phi, command))
+        found[index] = InternalMotion(phi, *springs.damper_motion(phi, command))
     return found
 
 

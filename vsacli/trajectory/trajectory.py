@@ -65,7 +65,7 @@ class Trajectory:
         """
         self.times, self.position, self.wrench, self.name = times, position, wrench, name
         self.commanded = {
-            key: commanded[key] if key in commanded else self._nothing(signal)
+            key: commanded[key] if key in commanded else self._commanding_no_joint(signal)
             for key, signal in COMMANDED.items()
             if key in commanded or signal.device is None
         }
@@ -119,7 +119,7 @@ class Trajectory:
                     f"the {signal.key} spans {start:g} to {end:g} s, the steps 0 to {self.duration:g} s"
                 )
 
-    def _nothing(self, signal: Signal) -> Constant:
+    def _commanding_no_joint(self, signal: Signal) -> Constant:
         """Return the profile of a signal that commands no joint."""
         return Constant(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
 
