@@ -300,7 +300,7 @@ def _read_recordings(
     mappings: dict[Path, ColumnMapping] = defaultdict(lambda: ColumnMapping(rate=document.rate))
     for signal, declared in document.recorded.items():
         file = folder / declared.file
-        wanted[file][signal] = declared.chosen
+        wanted[file][signal] = declared.fit_choice
         mappings[file] = mappings[file].combined_with(declared.mapping)
 
     resampled, unwrap = document.rate is not None, getattr(document.recorded.get(POSITION), "unwrap", False)

@@ -105,7 +105,7 @@ class StickSlip:
     def settle(self, time: float, vector: FloatArray) -> None:
         """Release held motors, one after the other, that friction cannot hold under the present torques."""
         while True:
-            beyond = self._laws.beyond(self._friction(time, vector)) * (self._slip == 0)
+            beyond = self._laws.direction_beyond(self._friction(time, vector)) * (self._slip == 0)
             if not beyond.any():
                 return
             motor = int(np.argmin(np.where(beyond != 0, self.distances(time, vector), np.inf)))

@@ -194,7 +194,7 @@ class Recorded(Declaration):
             yield FieldProblem(("bandwidth",), message)
 
     @property
-    def chosen(self) -> FitChoice:
+    def fit_choice(self) -> FitChoice:
         """Choice of the spline."""
         from vsacli.trajectory.fits import FitChoice
 
