@@ -14,26 +14,26 @@ from vsacli.documents.fields import (
     FINITE,
     REQUIRED,
     Boolean,
-    Choice,
     Field,
     Integer,
     Interval,
     Items,
-    Kind,
     Name,
     NamedNumbers,
-    Number,
+    NumberList,
+    NumberWithUnit,
     OneOf,
     OneOrMore,
     OwnKind,
-    Pair,
+    PairOf,
     PerJoint,
-    Record,
+    RecordOf,
     Share,
-    TableFile,
+    TablePath,
     Text,
-    Vector,
-    declared,
+    ValueKind,
+    WordChoice,
+    declared_fields,
 )
 
 Variants = Mapping[str, type]
@@ -102,28 +102,28 @@ def _not_supported(cls: type) -> Iterator[str]:
 def refused_in(cls: type) -> Iterator[str]:
     """Keys and words in a record class that belong to the format but are not supported yet."""
     yield from getattr(cls, "not_yet", ())
-    for name, (field, _) in declared(cls).items():
+    for name, (field, _) in declared_fields(cls).items():
         yield from _refused(field.kind, name)
 
 
-def _refused(kind: Kind, name: str) -> Iterator[str]:
+def _refused(kind: ValueKind, name: str) -> Iterator[str]:
     match kind:
-        case Choice():
+        case WordChoice():
             yield from (f"{name}: {word}" for word in kind.not_yet)
         case OneOf():
             yield from (f"{name}: {{type: {word}}}" for word in kind.not_yet)
-        case Record(cls):
+        case RecordOf(cls):
             yield from (f"{name}.{word}" for word in refused_in(cls))
-        case Items(item=item) | Pair(item):
+        case Items(item=item) | PairOf(item):
             yield from _refused(item, name)
 
 
-def words_of(kind: Kind) -> str:
+def words_of(kind: ValueKind) -> str:
     """What a value is, in a few words with its unit."""
     match kind:
         case OwnKind():
             return kind.words
-        case Record():
+        case RecordOf():
             return "mapping"
         case OneOf(variants):
             return f"mapping; `type`: {' or '.join(f'`{name}`' for name in variants)}"
@@ -131,36 +131,36 @@ def words_of(kind: Kind) -> str:
             return f"{words_of(item)}; or a list of these"
         case Items(item=item):
             return "list" if kind.records else f"list, each {words_of(item)}"
-        case Pair(item):
+        case PairOf(item):
             return f"{words_of(item)}; or a list of two"
     return _words_of_numbers(kind) if kind.unit else _words_of_one(kind)
 
 
-def _words_of_numbers(kind: Kind) -> str:
+def _words_of_numbers(kind: ValueKind) -> str:
     unit = _unit(kind.unit or DIMENSIONLESS)
     match kind:
         case Share():
             return "share, such as `3 %` or `0.03`"
-        case Vector(length=length):
+        case NumberList(length=length):
             return f"{length} numbers, {unit}"
         case Interval(lowest=lowest):
             alone = {None: "-x to x", -math.inf: "upper"}.get(lowest, f"{lowest} to x")
             return f"[lower, upper], or one number x ({alone}), {unit}"
         case PerJoint():
             return f"per joint, {unit}"
-    assert isinstance(kind, Number)
+    assert isinstance(kind, NumberWithUnit)
     return unit
 
 
-def _words_of_one(kind: Kind) -> str:
+def _words_of_one(kind: ValueKind) -> str:
     match kind:
         case Name():
             return f"text in one line, of at most {MOST_LETTERS} letters"
         case Text(identifier=identifier):
             return "text of letters, digits, `_` and `-`" if identifier else "text"
-        case Choice(options=options, words=words):
+        case WordChoice(options=options, words=words):
             return words or " or ".join(f"`{option}`" for option in options)
-        case TableFile(columns=columns):
+        case TablePath(columns=columns):
             return f"CSV file with the columns {', '.join(f'`{column}`' for column in columns)}"
     return {
         Integer: "whole number",
@@ -178,7 +178,7 @@ def _summary(cls: type) -> str:
 
 
 def _fields(cls: type, prefix: str) -> Iterator[Row | Choices]:
-    for name, (field, default) in declared(cls).items():
+    for name, (field, default) in declared_fields(cls).items():
         key = f"{prefix}{name}{'[]' if isinstance(field.kind, Items) else ''}"
         yield Row(f"{prefix}{name}", _value(field), _default(default), field.doc)
         records = field.kind.records

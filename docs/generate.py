@@ -44,7 +44,7 @@ from vsacli.robot.plausibility import ROBOT_RULES
 from vsacli.studies.sizing import CatalogMotor
 from vsacli.studies.sweeps.columns import KEPT
 from vsacli.studies.sweeps.study_file import StudyFile
-from vsacli.trajectory.file import content
+from vsacli.trajectory.file import trajectory_file_class
 from vsacli.trajectory.plausibility import TRAJECTORY_RULES
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -85,7 +85,7 @@ def spring_fields() -> str:
 
 def trajectory_fields() -> str:
     """Fields of a trajectory file."""
-    return record_sections(content(frozenset(COMMANDED), rigid=False))
+    return record_sections(trajectory_file_class(frozenset(COMMANDED), rigid=False))
 
 
 def csv_columns() -> str:

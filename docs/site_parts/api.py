@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from python_names import GROUPS, METHODS
 
 import vsacli
-from vsacli.documents.fields import declared
+from vsacli.documents.fields import declared_fields
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -65,7 +65,7 @@ def _description(path: str, thing: type | Callable[..., Any]) -> str:
 def _add_fields(_app: Sphinx, _what: str, _name: str, thing: Any, _options: Any, lines: list[str]) -> None:
     """Tell of the fields of a record what their declarations say."""
     if inspect.isclass(thing) and dataclasses.is_dataclass(thing):
-        lines += [f":ivar {name}: {field.doc}" for name, (field, _default) in declared(thing).items()]
+        lines += [f":ivar {name}: {field.doc}" for name, (field, _default) in declared_fields(thing).items()]
 
 
 def _escape(_app: Sphinx, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:

@@ -9,7 +9,7 @@ from samples.marks import slow_but
 from samples.mechanisms import DEVICES, Device
 
 from vsacli.actuators.mechanisms import MECHANISMS
-from vsacli.actuators.reach import reach
+from vsacli.actuators.reach import classify_stiffness
 from vsacli.base.arrays import FloatArray
 
 DRAWS = 10_000
@@ -94,7 +94,7 @@ def test_there_and_back(device: Device) -> None:
     springs = device.springs(q, q + phi, s)
     tau_e, sigma = -springs.link, springs.stiffness
     found = device.mechanism.solve(tau_e, sigma, q)
-    assert not reach(sigma, found).infeasible.any()
+    assert not classify_stiffness(sigma, found).infeasible.any()
     again = device.springs(q, q + found.phi_1, found.phi_2)
     np.testing.assert_allclose(-again.link, tau_e, rtol=1e-11, atol=1e-12 * peak(tau_e))
     np.testing.assert_allclose(again.stiffness, sigma, rtol=1e-11)
@@ -125,7 +125,7 @@ def test_the_corridor_is_that_of_a_scan_and_what_lies_outside_is_flagged(device:
         assert bool(found.lower_critical[0]) == expected.lower_turns or expected.lower == 0  # never reached
         assert bool(found.upper_critical[0]) == expected.upper_turns
         inside = (stiffness > 0) & (stiffness >= expected.lower) & (stiffness <= upper)
-        np.testing.assert_array_equal(reach(stiffness, found).infeasible, ~inside)
+        np.testing.assert_array_equal(classify_stiffness(stiffness, found).infeasible, ~inside)
 
 
 def test_next_to_the_ends_of_the_corridor_it_carries_what_is_asked(device: Device) -> None:
@@ -160,7 +160,9 @@ def test_what_no_setting_carries_is_infeasible(device: Device) -> None:
     beyond = 1e3 * peak(device.springs(q, q + phi, s).link)
     tau_e, stiffness = np.array([np.nan, np.inf, 0.0, beyond, -beyond]), np.full(5, 500.0)
     stiffness[2] = np.nan
-    infeasible = reach(stiffness, device.mechanism.solve(tau_e, stiffness, np.zeros(5))).infeasible
+    infeasible = classify_stiffness(
+        stiffness, device.mechanism.solve(tau_e, stiffness, np.zeros(5))
+    ).infeasible
     assert infeasible.tolist() == [True] * 3 + [not device.endless] * 2
 
 

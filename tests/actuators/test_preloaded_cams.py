@@ -16,7 +16,7 @@ from samples.mechanisms import profile
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
 from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import Maccepa, PreloadedCam
-from vsacli.actuators.reach import reach
+from vsacli.actuators.reach import classify_stiffness
 from vsacli.base.arrays import FloatArray
 
 EPS = float(np.finfo(float).eps)
@@ -216,11 +216,11 @@ def test_demands_outside_are_infeasible(case: Case):
         ends.upper * (1 + 10 ** rng.uniform(-8, 3, DRAWS)),
         -(10 ** rng.uniform(-6, 6, DRAWS)),
     ):
-        assert reach(stiffness, case.solve(tau_e, stiffness)).infeasible.all()
+        assert classify_stiffness(stiffness, case.solve(tau_e, stiffness)).infeasible.all()
     low, high = case.largest_torques()
     beyond = np.where(tau_e > 0, high, low) * (1 + 10 ** rng.uniform(-6, 6, DRAWS))
     found = case.solve(beyond, ends.upper)
-    assert reach(ends.upper, found).infeasible.all()
+    assert classify_stiffness(ends.upper, found).infeasible.all()
     assert np.isnan(found.phi_1).all()
 
 

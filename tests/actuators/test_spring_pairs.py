@@ -20,7 +20,7 @@ from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.pairs import make_pair, solver
 from vsacli.actuators.reach import margin, reach_flags
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
+from vsacli.base.flags import SINGULAR_MARGIN, Flag, has_flag
 
 DRAWS = 400
 """Points on the two curves for each pair; about half of them lie on the branch."""
@@ -149,7 +149,7 @@ def test_every_infeasible_demand_is_flagged_and_no_other(first: Spring, second: 
         )
         found = make_pair(law_1, law_2).solve(np.full_like(stiffness, tau_e), stiffness)
         feasible = (lower <= stiffness) & (stiffness <= upper)
-        np.testing.assert_array_equal(has(reach_flags(stiffness, found), Flag.INFEASIBLE), ~feasible)
+        np.testing.assert_array_equal(has_flag(reach_flags(stiffness, found), Flag.INFEASIBLE), ~feasible)
         # The scan's cells are a 1e-7 of the load at last, and the stiffness is of second order there; at
         # the end of a four-bar neighboring doubles differ by 1e-10.
         np.testing.assert_allclose(found.lower, lower, rtol=1e-9)
@@ -247,7 +247,7 @@ def test_negative_branch_is_the_branch_with_the_sides_exchanged(first: Spring, s
     # As for the positive branch.
     np.testing.assert_allclose(found.phi_1[regular], phi_1[regular], rtol=0, atol=1e-10)
     np.testing.assert_allclose(found.phi_2[regular], phi_2[regular], rtol=0, atol=1e-10)
-    assert not np.any(has(reach_flags(stiffness, found), Flag.INFEASIBLE))
+    assert not np.any(has_flag(reach_flags(stiffness, found), Flag.INFEASIBLE))
 
 
 # A measured curve with noise

@@ -20,7 +20,7 @@ from vsacli.actuators.laws.sinh import Sinh
 from vsacli.actuators.laws.tendons import Exponential, Quadratic
 from vsacli.analysis.result import Result
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.signals import POSITION
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
 from vsacli.robot.model import Robot
@@ -81,7 +81,7 @@ def test_step_at_which_the_branch_splits_is_named(vsacli, sinking):
 def test_lower_end_jumps_past_the_stiffness_between_two_samples(sinking):
     robot = load_robot(sinking[0])
     result = inverse_dynamics(robot, load_trajectory(sinking[1], robot))
-    lower, infeasible = result.stiffness_min[:, 0], has(result.flags[:, 0], Flag.INFEASIBLE)
+    lower, infeasible = result.stiffness_min[:, 0], has_flag(result.flags[:, 0], Flag.INFEASIBLE)
     first = int(infeasible.argmax())
     assert np.all(infeasible[first:])
     assert lower[first - 1] < 1937 < 1950 < 1965 < lower[first]
@@ -148,8 +148,8 @@ def test_passing_the_singular_set_is_near_singular_and_stays_on_the_branch(pair:
     result, lower = dip(PAIRS[pair], closest=1e-6)
     flags = result.flags[:, 0]
     gap = 1 - lower / result.stiffness
-    np.testing.assert_array_equal(has(flags, Flag.NEAR_SINGULAR), gap[:, 0] < 0.01)
-    assert not np.any(has(flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.SLACK))
+    np.testing.assert_array_equal(has_flag(flags, Flag.NEAR_SINGULAR), gap[:, 0] < 0.01)
+    assert not np.any(has_flag(flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.SLACK))
     assert np.all(np.isfinite(result.tau_motor))
     # On one branch the determinant keeps its sign, and the deflections move on without a jump.
     assert np.all(result.det_A < 0)
@@ -164,7 +164,7 @@ def test_touching_the_singular_set_loses_the_motor_torque_there_only(pair: str):
     laws = PAIRS[pair]
     result, _ = dip(laws, closest=0.0)
     passing, _ = dip(laws, closest=1e-6)
-    singular = has(result.flags[:, 0], Flag.SINGULAR)
+    singular = has_flag(result.flags[:, 0], Flag.SINGULAR)
     np.testing.assert_array_equal(np.flatnonzero(singular), [100])
     for name in ("dphi", "dtheta", "ddtheta", "tau_motor"):
         values = getattr(result, name)[:, 0]

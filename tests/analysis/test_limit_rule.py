@@ -23,7 +23,7 @@ from vsacli.actuators.reach import LimitCheck
 from vsacli.analysis.report import Report
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.inverse import compute_block
 from vsacli.dynamics.limits import worst_excess
@@ -87,7 +87,7 @@ class Task(NamedTuple):
     def report(self, bound: float, engine: str = "numpy") -> Report:
         """The report with a bound, which states nothing beyond a limit that does not count."""
         run = Run(self.limited(bound), self.trajectory, engine=engine)
-        flagged = sum(int(np.count_nonzero(has(block.flags[:, self.joint], LIMITS))) for block in run)
+        flagged = sum(int(np.count_nonzero(has_flag(block.flags[:, self.joint], LIMITS))) for block in run)
         report = run.report()
         joint = report.joints[self.joint]
         label = BOUNDED[self.name].label

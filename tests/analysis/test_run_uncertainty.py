@@ -17,7 +17,7 @@ from vsacli.analysis.report import VERDICTS, Report
 from vsacli.analysis.run import Run
 from vsacli.analysis.run_uncertainty import judged_variables
 from vsacli.analysis.trouble_text import uncertainty_lines
-from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.base.variables import deviation
 from vsacli.robot.joint import Limits
@@ -103,7 +103,7 @@ def test_limits_of_recorded_motions_count_beyond_two_deviations_but_one_percent(
     result = inverse_dynamics(limited(position=limit), swinging((deviation, *STEADY[1:])))
     joint = result.report.joints[0]
     assert bool(joint.samples["over_limit"]) == exceeded
-    assert has(result.flags[:, 0], LIMITS).any() == exceeded
+    assert has_flag(result.flags[:, 0], LIMITS).any() == exceeded
     within = joint.uncertainty.limits
     assert ("position_limit" in within) == (limit < AMPLITUDE)
     if not exceeded and within:
@@ -114,7 +114,7 @@ def test_limits_of_recorded_motions_count_beyond_two_deviations_but_one_percent(
 
 def test_what_lies_beyond_the_allowance_stays_flagged_and_what_does_not_is_named():
     result = inverse_dynamics(limited(position=0.2998), swinging((9e-5, *STEADY[1:])))
-    flagged = has(result.flags[:, 0], Flag.POSITION_LIMIT)
+    flagged = has_flag(result.flags[:, 0], Flag.POSITION_LIMIT)
     beyond = np.abs(result.q[:, 0]) - 0.2998
     np.testing.assert_array_equal(flagged, beyond > 1.8e-4 + 0.2998e-9)
     named = result.report.joints[0].uncertainty.limits["position_limit"]
@@ -128,7 +128,7 @@ def test_a_peak_between_samples_that_keep_their_limit_within_the_uncertainty_cou
     joint = result.report.joints[0]
     assert abs(joint.worst["position_limit"].value) == pytest.approx(AMPLITUDE)
     assert result.report.verdict == "over_limit"
-    assert has(result.flags[:, 0], Flag.POSITION_LIMIT).sum() == joint.samples["over_limit"] == 4
+    assert has_flag(result.flags[:, 0], Flag.POSITION_LIMIT).sum() == joint.samples["over_limit"] == 4
 
 
 def test_the_allowance_of_a_one_sided_limit_is_a_share_of_the_bound():

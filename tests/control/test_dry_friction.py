@@ -252,7 +252,7 @@ def test_a_held_motor_beside_one_that_rides_on_it():
     rotors = Rotors([_Riding()])
     torques = np.array([3.0, 1.0])
     for held in ([False, False], [True, False], [False, True], [True, True]):
-        accelerations, holding = rotors.held(torques, np.array(held))
+        accelerations, holding = rotors.accelerations_with_held(torques, np.array(held))
         matrix = np.array([[2.0, 0.4], [0.4, 0.5]])
         np.testing.assert_allclose(matrix @ accelerations + holding, torques, rtol=1e-14)
         assert (accelerations[held] == 0).all()

@@ -261,7 +261,7 @@ def test_perturbation_touches_every_dynamic_parameter_and_nothing_else():
 
 def test_every_declared_variable_is_in_the_history():
     past = simulate(vsa_3r(), short_motion(3), sensors=Sensors()).history
-    has = vsa_3r().has
+    has = vsa_3r().has_variable
     assert list(past.arrays()) == [name for name, each in SIMULATION_VARIABLES.items() if has(each)]
 
 

@@ -21,7 +21,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.units import ANGLE, MASS, POSITION
 from vsacli.documents import fields
 from vsacli.documents.expression import ExpressionError
-from vsacli.documents.fields import Check, Kind, OwnKind, declared
+from vsacli.documents.fields import Check, OwnKind, ValueKind, declared_fields
 from vsacli.documents.json_schema import json_schema
 from vsacli.documents.number import evaluate
 from vsacli.documents.tree import Node, Scope
@@ -134,7 +134,7 @@ def test_mistakes_in_a_trajectory(change: dict[str, Any]) -> None:
 
 
 @cache
-def schema_of(kind: Kind) -> Draft202012Validator:
+def schema_of(kind: ValueKind) -> Draft202012Validator:
     """The schema of a document with a single value `x`."""
     record = make_dataclass("Record", [("x", Any, fields.value(kind, "x"))], frozen=True)
     return Draft202012Validator(json_schema(record, "f/1", "t"))
@@ -142,8 +142,8 @@ def schema_of(kind: Kind) -> Draft202012Validator:
 
 def checks(cls: type, seen: set[type]) -> Iterator[Check]:
     """Every condition on a number that a record, and the records in it, declare."""
-    for field, _ in declared(cls).values() if cls not in seen else ():
-        if isinstance(field.kind, fields.Number | fields.Integer | fields.PerJoint) and field.check:
+    for field, _ in declared_fields(cls).values() if cls not in seen else ():
+        if isinstance(field.kind, fields.NumberWithUnit | fields.Integer | fields.PerJoint) and field.check:
             yield field.check
         for record in field.kind.records.values():
             yield from checks(record, seen | {cls})
@@ -199,7 +199,7 @@ def test_every_expression_that_is_read_is_accepted(text: str) -> None:
             evaluate(text, unit.revolute)
         except ExpressionError:
             continue
-        assert schema_of(fields.Number(unit)).is_valid({"format": "f/1", "x": text})
+        assert schema_of(fields.NumberWithUnit(unit)).is_valid({"format": "f/1", "x": text})
 
 
 def test_a_kind_without_a_schema_is_noticed() -> None:

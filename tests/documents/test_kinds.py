@@ -19,28 +19,28 @@ from vsacli.documents.fields import (
     FINITE,
     NON_NEGATIVE,
     Boolean,
-    Choice,
     Integer,
     Interval,
     Items,
-    Kind,
     NamedNumbers,
-    Number,
+    NumberList,
+    NumberWithUnit,
     OneOf,
-    Pair,
+    PairOf,
     PerJoint,
-    Record,
-    TableFile,
+    RecordOf,
+    TablePath,
     Text,
-    Vector,
+    ValueKind,
+    WordChoice,
     choice,
-    declared,
+    declared_fields,
     number,
     text,
     value,
 )
 from vsacli.documents.record_checks import DeclaredRecord, value_problems
-from vsacli.documents.record_values import ResolvedField, arrays, json_value
+from vsacli.documents.record_values import ResolvedField, resolve_values, value_as_json
 
 
 @dataclass(frozen=True)
@@ -58,20 +58,20 @@ class Ski:
 
 @dataclass(frozen=True)
 class Sledge:
-    run: Wheel = value(Record(Wheel), "what it runs on")
+    run: Wheel = value(RecordOf(Wheel), "what it runs on")
     color: str = choice(("red", "blue"), "color", not_yet=("green",))
     part: Wheel | Ski = value(OneOf({"wheel": Wheel, "ski": Ski}, not_yet=("rope",)), "part")
 
 
 @dataclass(frozen=True)
 class Light:
-    run: Wheel = value(Record(Wheel), "what it runs on")
+    run: Wheel = value(RecordOf(Wheel), "what it runs on")
 
 
 @dataclass(frozen=True)
 class Train:
-    sledges: tuple[Light, ...] = value(Items(Record(Light)), "sledges")
-    wheels: tuple[Wheel, Wheel] = value(Pair(Record(Wheel)), "front and rear")
+    sledges: tuple[Light, ...] = value(Items(RecordOf(Light)), "sledges")
+    wheels: tuple[Wheel, Wheel] = value(PairOf(RecordOf(Wheel)), "front and rear")
     gauge: float = number(LENGTH, "gauge")
 
 
@@ -87,32 +87,32 @@ PART = OneOf({"wheel": Wheel, "ski": Ski})
 
 
 def arrays_of(record: Any) -> Iterator[ResolvedField]:
-    for name, (field, _) in declared(type(record)).items():
-        for part in arrays(field.kind, getattr(record, name), arrays_of):
+    for name, (field, _) in declared_fields(type(record)).items():
+        for part in resolve_values(field.kind, getattr(record, name), arrays_of):
             yield part._replace(path=(name, *part.path))
 
 
-def resolved(kind: Kind, content: Any) -> dict[str, tuple[tuple[str, ...], Any]]:
+def resolved(kind: ValueKind, content: Any) -> dict[str, tuple[tuple[str, ...], Any]]:
     """Dimensions and values of what a kind makes of a value, by path."""
-    parts = arrays(kind, content, arrays_of)
+    parts = resolve_values(kind, content, arrays_of)
     return {".".join(part.path): (part.dims, part.values.tolist()) for part in parts}
 
 
 @pytest.mark.parametrize(
     ("kind", "content", "expected"),
     [
-        (Number(LENGTH), 1, {"": ((), 1.0)}),
+        (NumberWithUnit(LENGTH), 1, {"": ((), 1.0)}),
         (Boolean(), True, {"": ((), "true")}),
         (Text(), "a", {"": ((), "a")}),
-        (Choice(("a", "b")), "b", {"": ((), "b")}),
-        (Vector(2, LENGTH), (1, 2), {"": (("axis",), [1.0, 2.0])}),
+        (WordChoice(("a", "b")), "b", {"": ((), "b")}),
+        (NumberList(2, LENGTH), (1, 2), {"": (("axis",), [1.0, 2.0])}),
         (Interval(LENGTH), (1, 2), {"": (("bound",), [1.0, 2.0])}),
-        (Record(Wheel), WHEEL, {"radius": ((), 1.0), "name": ((), "w")}),
+        (RecordOf(Wheel), WHEEL, {"radius": ((), 1.0), "name": ((), "w")}),
         (PART, SKI, {"type": ((), "ski"), "length": ((), 2.0)}),
-        (Pair(Record(Ski)), (SKI, Ski(length=3.0)), {"length": (("motor",), [2.0, 3.0])}),
+        (PairOf(RecordOf(Ski)), (SKI, Ski(length=3.0)), {"length": (("motor",), [2.0, 3.0])}),
     ],
 )
-def test_arrays(kind: Kind, content: Any, expected: dict[str, Any]) -> None:
+def test_arrays(kind: ValueKind, content: Any, expected: dict[str, Any]) -> None:
     assert resolved(kind, content) == expected
 
 
@@ -124,22 +124,22 @@ def test_entries_of_a_list_share_the_arrays_whatever_fields_they_have() -> None:
     np.testing.assert_array_equal(found["length"][1], [np.nan, 2])
 
 
-@pytest.mark.parametrize("kind", [Integer(), PerJoint(LENGTH), Items(Number(LENGTH))])
-def test_kinds_without_arrays_say_so(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", [Integer(), PerJoint(LENGTH), Items(NumberWithUnit(LENGTH))])
+def test_kinds_without_arrays_say_so(kind: ValueKind) -> None:
     with pytest.raises(TypeError, match=r"a field of the kind .* has no array form"):
-        list(arrays(kind, (1,), arrays_of))
+        list(resolve_values(kind, (1,), arrays_of))
 
 
 @pytest.mark.parametrize(
     ("kind", "content", "path", "problem"),
     [
-        (Number(LENGTH), -1.0, ("x",), "must be zero or positive, not -1 {}"),
+        (NumberWithUnit(LENGTH), -1.0, ("x",), "must be zero or positive, not -1 {}"),
         (PerJoint(LENGTH), (1.0, None, -2.0), ("x", 2), "must be zero or positive, not -2 {}"),
-        (Vector(2, LENGTH), (1.0, -2.0), ("x", 1), "must be zero or positive, not -2 {}"),
-        (Vector(2, LENGTH), (1.0,), ("x",), "expected 2 numbers in {}, found 1"),
-        (Items(Vector(2, LENGTH)), ((1.0, 2.0), (1.0,)), ("x", 1), "expected 2 numbers in {}, found 1"),
-        (Items(Number(LENGTH)), (1.0, -2.0), ("x", 1), "must be zero or positive, not -2 {}"),
-        (Pair(Number(LENGTH)), (1.0, -2.0), ("x", 1), "must be zero or positive, not -2 {}"),
+        (NumberList(2, LENGTH), (1.0, -2.0), ("x", 1), "must be zero or positive, not -2 {}"),
+        (NumberList(2, LENGTH), (1.0,), ("x",), "expected 2 numbers in {}, found 1"),
+        (Items(NumberList(2, LENGTH)), ((1.0, 2.0), (1.0,)), ("x", 1), "expected 2 numbers in {}, found 1"),
+        (Items(NumberWithUnit(LENGTH)), (1.0, -2.0), ("x", 1), "must be zero or positive, not -2 {}"),
+        (PairOf(NumberWithUnit(LENGTH)), (1.0, -2.0), ("x", 1), "must be zero or positive, not -2 {}"),
         (
             Interval(LENGTH),
             (2.0, 1.0),
@@ -147,19 +147,19 @@ def test_kinds_without_arrays_say_so(kind: Kind) -> None:
             "the lower limit 2 {} exceeds the upper limit 1 {}; swap them",
         ),
         (Interval(LENGTH), (2.0, 1e31), ("x", 1), "must be at most 1e+30 in size, not 1e+31 {}"),
-        (Choice(("a",), not_yet=("b",)), "b", ("x",), "'b' is not supported yet"),
+        (WordChoice(("a",), not_yet=("b",)), "b", ("x",), "'b' is not supported yet"),
         (Boolean(), 1, ("x",), "must be true or false, not 1"),
         (Text(identifier=True), "1", ("x",), "must be made of letters, digits, _ and -, beginning with"),
         (
-            Items(Record(Wheel), unique="name"),
+            Items(RecordOf(Wheel), unique="name"),
             (WHEEL, WHEEL),
             ("x", 1, "name"),
             "'w' is already used by entry 0; choose another one",
         ),
     ],
 )
-def test_problems(kind: Kind, content: Any, path: tuple[str | int, ...], problem: str) -> None:
-    check = None if isinstance(kind, Interval | Text | Choice | Boolean) else NON_NEGATIVE
+def test_problems(kind: ValueKind, content: Any, path: tuple[str | int, ...], problem: str) -> None:
+    check = None if isinstance(kind, Interval | Text | WordChoice | Boolean) else NON_NEGATIVE
     (found,) = value_problems(kind, check, content, ("x",))
     assert found.path == path
     assert found.message.startswith(problem)
@@ -168,24 +168,24 @@ def test_problems(kind: Kind, content: Any, path: tuple[str | int, ...], problem
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        (Number(POSITION), "rad (m if prismatic)"),
+        (NumberWithUnit(POSITION), "rad (m if prismatic)"),
         (Integer(), "whole number"),
         (Boolean(), "`true` or `false`"),
         (Text(), "text"),
-        (Choice(("a", "b")), "`a` or `b`"),
-        (Vector(3, LENGTH), "3 numbers, m"),
+        (WordChoice(("a", "b")), "`a` or `b`"),
+        (NumberList(3, LENGTH), "3 numbers, m"),
         (Interval(LENGTH, lowest=-math.inf), "[lower, upper], or one number x (upper), m"),
         (Interval(LENGTH, lowest=0), "[lower, upper], or one number x (0 to x), m"),
         (PerJoint(LENGTH), "per joint, m"),
-        (TableFile(("a", "b")), "CSV file with the columns `a`, `b`"),
-        (Record(Wheel), "mapping"),
+        (TablePath(("a", "b")), "CSV file with the columns `a`, `b`"),
+        (RecordOf(Wheel), "mapping"),
         (PART, "mapping; `type`: `wheel` or `ski`"),
         (Items(PART), "list"),
-        (Items(Number(LENGTH)), "list, each m"),
-        (Pair(Record(Wheel)), "mapping; or a list of two"),
+        (Items(NumberWithUnit(LENGTH)), "list, each m"),
+        (PairOf(RecordOf(Wheel)), "mapping; or a list of two"),
     ],
 )
-def test_words(of_docs: Any, kind: Kind, words: str) -> None:
+def test_words(of_docs: Any, kind: ValueKind, words: str) -> None:
     assert of_docs.words_of(kind) == words
 
 
@@ -197,23 +197,23 @@ def test_what_is_not_supported_yet(of_docs: Any) -> None:
 @pytest.mark.parametrize(
     ("kind", "content", "expected"),
     [
-        (Number(LENGTH), 1.5, ["x: 1.5"]),
+        (NumberWithUnit(LENGTH), 1.5, ["x: 1.5"]),
         (Boolean(), False, ["x: false"]),
         (PerJoint(LENGTH), {"a": 1, "b": "90 deg"}, ["x: {a: 1, b: 90 deg}"]),
-        (Vector(2, LENGTH), (1.0, 2), ["x: [1, 2]"]),
-        (Record(Ski), {"length": 1}, ["x:", "  length: 1"]),
+        (NumberList(2, LENGTH), (1.0, 2), ["x: [1, 2]"]),
+        (RecordOf(Ski), {"length": 1}, ["x:", "  length: 1"]),
         (PART, {"type": "ski", "length": 1}, ["x:", "  type: ski", "  length: 1"]),
-        (Pair(PART), {"type": "ski", "length": 1}, ["x:", "  type: ski", "  length: 1"]),
-        (Items(Number(LENGTH)), [1, 2], ["x: [1, 2]"]),
-        (Items(Items(Number(LENGTH))), [[1, 2], [3]], ["x:", "  - [1, 2]", "  - [3]"]),
+        (PairOf(PART), {"type": "ski", "length": 1}, ["x:", "  type: ski", "  length: 1"]),
+        (Items(NumberWithUnit(LENGTH)), [1, 2], ["x: [1, 2]"]),
+        (Items(Items(NumberWithUnit(LENGTH))), [[1, 2], [3]], ["x:", "  - [1, 2]", "  - [3]"]),
         (
-            Items(Record(Wheel)),
+            Items(RecordOf(Wheel)),
             [{"radius": 1, "name": "w"}, {"radius": 2}],
             ["x:", "  - radius: 1", "    name: w", "  - radius: 2"],
         ),
     ],
 )
-def test_lines(kind: Kind, content: Any, expected: list[str]) -> None:
+def test_lines(kind: ValueKind, content: Any, expected: list[str]) -> None:
     document = dataclasses.make_dataclass("Document", [("x", Any, value(kind, "said of it"))])
     first, *lines = commented_document("f/1", document, {"x": content}).splitlines()
     assert first == "format: f/1"
@@ -224,23 +224,23 @@ def test_lines(kind: Kind, content: Any, expected: list[str]) -> None:
 @pytest.mark.parametrize(
     ("kind", "content", "expected"),
     [
-        (Number(LENGTH), 1.5, 1.5),
+        (NumberWithUnit(LENGTH), 1.5, 1.5),
         (Interval(LENGTH), (1, 2), [1, 2]),
         (PerJoint(LENGTH), (1, None), [1, None]),
-        (Record(Ski), SKI, {"length": 2.0}),
+        (RecordOf(Ski), SKI, {"length": 2.0}),
         (PART, SKI, {"type": "ski", "length": 2.0}),
-        (Pair(PART), (SKI, SKI), [{"type": "ski", "length": 2.0}] * 2),
-        (Items(Record(Ski)), (SKI,), [{"length": 2.0}]),
+        (PairOf(PART), (SKI, SKI), [{"type": "ski", "length": 2.0}] * 2),
+        (Items(RecordOf(Ski)), (SKI,), [{"length": 2.0}]),
     ],
 )
-def test_plain(kind: Kind, content: Any, expected: Any) -> None:
-    assert json_value(kind, content) == expected
+def test_plain(kind: ValueKind, content: Any, expected: Any) -> None:
+    assert value_as_json(kind, content) == expected
 
 
 def test_named_numbers_are_pairs_that_go_by_their_names():
     kind, content = NamedNumbers(), (("k", 3.0), ("turn", math.inf))
-    assert json_value(kind, content) == {"k": 3.0, "turn": math.inf}
-    found = arrays(kind, content, lambda _: iter(()))
+    assert value_as_json(kind, content) == {"k": 3.0, "turn": math.inf}
+    found = resolve_values(kind, content, lambda _: iter(()))
     assert [(field.path, float(field.values)) for field in found] == [(("k",), 3.0), (("turn",), math.inf)]
     problems = list(value_problems(kind, FINITE, content, ("constants",)))
     assert [str(problem) for problem in problems] == ["constants.turn: must be finite, not inf"]

@@ -14,9 +14,9 @@ from vsacli.documents.fields import (
     Items,
     OneOf,
     PerJoint,
-    Record,
+    RecordOf,
     choice,
-    declared,
+    declared_fields,
     integer,
     interval,
     number,
@@ -43,7 +43,7 @@ class Cart(DeclaredRecord):
     name: str = text("name", identifier=True)
     kind: str = choice(("revolute", "prismatic"), "kind", default="prismatic", not_yet=("spherical",))
     part: object = value(OneOf({"wheel": Wheel}, not_yet=("ski",)), "part", default=None)
-    wheels: tuple = value(Items(Record(Wheel)), "wheels", default=())
+    wheels: tuple = value(Items(RecordOf(Wheel)), "wheels", default=())
     count: int = integer("count", check=NON_NEGATIVE, default=0)
     span: tuple = interval(units.POSITION, "span", lowest=-math.inf, default=(0.0, 1.0))
     loads: tuple = value(PerJoint(units.POSITION), "loads", check=NON_NEGATIVE, default=())
@@ -147,7 +147,7 @@ def test_a_value_is_checked_once_in_a_file_and_in_a_constructor(tmp_path):
 
     @dataclass(frozen=True)
     class Heap(DeclaredRecord):
-        stones: tuple = value(Items(Record(Stone)), "stones")
+        stones: tuple = value(Items(RecordOf(Stone)), "stones")
 
     path = tmp_path / "heap.yaml"
     path.write_text("format: heap/1\nstones: [{mass: 1}, {mass: 2}]\n")
@@ -172,7 +172,7 @@ def test_a_constructor_refuses_what_a_file_may_not_have(read):
 def records_in(cls, seen):
     if cls not in seen:
         seen.add(cls)
-        for field, _ in declared(cls).values():
+        for field, _ in declared_fields(cls).values():
             for record in field.kind.records.values():
                 records_in(record, seen)
     return seen

@@ -43,7 +43,7 @@ def test_tables_that_are_accepted(read, content):
     assert [each.name for each in found.records] == ["apple", "pear"]
     assert [each.mass for each in found.records] == pytest.approx([0.1, 0.2])
     assert [each.speed for each in found.records] == [2, None]
-    assert found.others == (("color",) if "color" in content else ())
+    assert found.unknown_columns == (("color",) if "color" in content else ())
 
 
 def test_names_may_hold_separators_and_look_like_anything(read):

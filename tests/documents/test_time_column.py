@@ -10,7 +10,7 @@ import pytest
 
 from vsacli.base.errors import InputError
 from vsacli.documents.table import read_table
-from vsacli.documents.time_column import NANOSECONDS, Clock, elapsed, read_clock
+from vsacli.documents.time_column import NANOSECONDS, ClockTime, nanoseconds_since_first, read_clock
 
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -27,13 +27,15 @@ def test_dates_and_times_are_those_of_datetime(form: str) -> None:
     for moment in random_moments(200):
         text = moment.isoformat(timespec="microseconds") if form == "iso" else form.format(moment)
         expected = (moment - EPOCH) // timedelta(microseconds=1) * 1000
-        assert read_clock(text) == Clock(expected, dated=True)
+        assert read_clock(text) == ClockTime(expected, dated=True)
 
 
 def test_a_zone_is_taken_off() -> None:
     for text in ("2024-05-01T22:30:01+02:00", "2024-05-01T22:30:01+0200"):
         expected = datetime.fromisoformat("2024-05-01T20:30:01+00:00")
-        assert read_clock(text) == Clock((expected - EPOCH) // timedelta(seconds=1) * NANOSECONDS, dated=True)
+        assert read_clock(text) == ClockTime(
+            (expected - EPOCH) // timedelta(seconds=1) * NANOSECONDS, dated=True
+        )
 
 
 @pytest.mark.parametrize("separator", [".", ",", ":"])
@@ -42,7 +44,7 @@ def test_times_of_day_with_fractions(separator: str) -> None:
     for seconds, micros in zip(random.integers(0, 86400, 100), random.integers(0, 10**6, 100), strict=True):
         hours, rest = divmod(int(seconds), 3600)
         text = f"{hours:02d}:{rest // 60:02d}:{rest % 60:02d}{separator}{micros:06d}"
-        assert read_clock(text) == Clock(int(seconds) * NANOSECONDS + int(micros) * 1000, dated=False)
+        assert read_clock(text) == ClockTime(int(seconds) * NANOSECONDS + int(micros) * 1000, dated=False)
 
 
 @pytest.mark.parametrize(
@@ -58,7 +60,7 @@ def test_times_of_day_with_fractions(separator: str) -> None:
     ],
 )
 def test_times_of_day(text: str, nanoseconds: int) -> None:
-    assert read_clock(text) == Clock(nanoseconds, dated=False)
+    assert read_clock(text) == ClockTime(nanoseconds, dated=False)
 
 
 @pytest.mark.parametrize(
@@ -81,7 +83,7 @@ def test_what_is_no_time_or_has_two_meanings(text: str) -> None:
 
 def test_midnight_is_passed() -> None:
     clocks = [read_clock(text) for text in ("23:59:59.5", "00:00:00", "12:00:00", "23:00:00", "01:00:00")]
-    hours = (elapsed([clock for clock in clocks if clock]) / NANOSECONDS - 0.5) / 3600
+    hours = (nanoseconds_since_first([clock for clock in clocks if clock]) / NANOSECONDS - 0.5) / 3600
     assert hours[1:].tolist() == [0, 12, 23, 25]
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from vsacli.base.errors import InputError
 from vsacli.documents.source import Problems
-from vsacli.documents.tree import MAX_LEVELS, MAX_NODES, Mapping, Scalar, Sequence, parse_yaml
+from vsacli.documents.tree import MAX_LEVELS, MAX_NODES, ListNode, MapNode, TextNode, parse_yaml
 
 
 def parse(text):
@@ -25,10 +25,10 @@ def messages(text):
 def test_scalars_stay_texts_and_know_their_line_and_quotes():
     root = parse("a: 010\nb: 'on'\n\nc:\nd: on\n")
     assert root.entries == {
-        "a": Scalar(1, "010", plain=True),
-        "b": Scalar(2, "on", plain=False),
-        "c": Scalar(4, "", plain=True),
-        "d": Scalar(5, "on", plain=True),
+        "a": TextNode(1, "010", plain=True),
+        "b": TextNode(2, "on", plain=False),
+        "c": TextNode(4, "", plain=True),
+        "d": TextNode(5, "on", plain=True),
     }
     assert root.key_lines == {"a": 1, "b": 2, "c": 4, "d": 5}
 
@@ -52,8 +52,8 @@ def test_a_quoted_null_is_a_text():
 
 def test_aliases_stand_for_their_anchor_with_its_lines():
     root = parse("a: &x {b: 1}\nc: *x\nd: [*x, &y 2, *y]\n")
-    assert root.entries["c"] == root.entries["a"] == Mapping(1, {"b": Scalar(1, "1", plain=True)}, {"b": 1})
-    assert root.entries["d"].items[1:] == (Scalar(3, "2", plain=True),) * 2
+    assert root.entries["c"] == root.entries["a"] == MapNode(1, {"b": TextNode(1, "1", plain=True)}, {"b": 1})
+    assert root.entries["d"].items[1:] == (TextNode(3, "2", plain=True),) * 2
 
 
 def test_windows_line_ends_and_byte_order_mark_free_text():
@@ -111,7 +111,7 @@ def nested(levels):
 
 
 def test_nesting_up_to_the_limit():
-    assert isinstance(parse(nested(MAX_LEVELS)), Sequence)
+    assert isinstance(parse(nested(MAX_LEVELS)), ListNode)
     assert messages(nested(MAX_LEVELS + 1)) == ["file.yaml:1: nested more than 20 levels deep"]
 
 

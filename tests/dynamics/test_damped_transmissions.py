@@ -136,7 +136,7 @@ def start_apart(name: str, apart: float, damping: float) -> tuple[np.ndarray, np
         return Command(0 * rows, 0 * rows, 0 * rows, load * rows, zero * rows, zero * rows, commanded)
 
     begin = springs.equilibrium(demand(time[:1]))
-    away = springs.settled(springs.spread(begin) + apart, begin, demand(time[:1]))
+    away = springs.deflections_at_spread(springs.spread(begin) + apart, begin, demand(time[:1]))
     march = March(springs, demand)
     ways = [march.through(time[[0, -1]], start).phi for start in (begin, away)]
     assert all(way is not None for way in ways)

@@ -19,7 +19,7 @@ from samples.drives import Stopped, joint_with, springs, with_joint
 
 from vsacli import inverse_dynamics
 from vsacli.analysis.result import Result
-from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
+from vsacli.base.flags import SINGULAR_MARGIN, Flag, has_flag
 from vsacli.dynamics.integrated_deflections import (
     REASONS,
     SINGULAR,
@@ -48,7 +48,7 @@ def test_touching_the_singular_set_ends_the_way(touching: Result):
 def test_steps_after_the_end_are_infeasible(touching: Result):
     lost = touching.time >= 1.2999
     assert 50 < lost.sum() < 100
-    np.testing.assert_array_equal(has(touching.flags[:, 0], Flag.INFEASIBLE), lost)
+    np.testing.assert_array_equal(has_flag(touching.flags[:, 0], Flag.INFEASIBLE), lost)
     for name in MOTOR_VARIABLES:
         undefined = np.isnan(getattr(touching, name)[:, 0]).reshape(len(lost), -1)
         np.testing.assert_array_equal(undefined, np.broadcast_to(lost[:, None], undefined.shape))
@@ -67,7 +67,7 @@ def test_way_holds_no_number_at_its_very_end():
 def test_other_joint_goes_on(touching: Result):
     root = inverse_dynamics(ARM, dipping(800.0))
     np.testing.assert_allclose(touching.phi[:, 1:], root.phi[:, 1:], rtol=0, atol=DRIFT)
-    assert not has(touching.flags[:, 1:], Flag.INFEASIBLE).any()
+    assert not has_flag(touching.flags[:, 1:], Flag.INFEASIBLE).any()
 
 
 def test_report_says_when_and_why(touching: Result):
@@ -89,7 +89,7 @@ def test_stiffness_inside_the_corridor_is_not_called_out_of_reach(touching: Resu
 
 def test_crossing_the_fold_ends_where_the_corridor_does():
     crossing = inverse_dynamics(ARM, softening(), deflection_solver=softened())
-    unreachable = has(inverse_dynamics(ARM, softening()).flags[:, 1], Flag.INFEASIBLE)
+    unreachable = has_flag(inverse_dynamics(ARM, softening()).flags[:, 1], Flag.INFEASIBLE)
     first = int(unreachable.argmax())
     stop = crossing.report.drifts[1].stop
     assert stop is not None

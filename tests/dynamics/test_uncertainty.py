@@ -175,5 +175,5 @@ def test_between_the_times_at_which_they_are_computed_deviations_are_linear(monk
 @pytest.mark.slow
 def test_every_variable_that_may_have_a_deviation_gets_one():
     found = Uncertainty(vsa_3r(), blurred(3, exerted=True)).at(TIMES)
-    assert set(found) == {*(name for name in UNCERTAIN if vsa_3r().has(VARIABLES[name])), MARGIN}
+    assert set(found) == {*(name for name in UNCERTAIN if vsa_3r().has_variable(VARIABLES[name])), MARGIN}
     assert all(array.shape[0] == len(TIMES) for array in found.values())

@@ -22,7 +22,7 @@ from vsacli.actuators.serial import Serial
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.cli.new import new
-from vsacli.documents.fields import declared
+from vsacli.documents.fields import declared_fields
 from vsacli.files.data_sheets import SOURCES
 from vsacli.files.examples import example_tables
 from vsacli.files.templates import robot_template, trajectory_template
@@ -127,7 +127,7 @@ def test_each_source_of_a_value_is_said_once_of_a_field_that_exists() -> None:
     for field, source in SOURCES.items():
         name, _, key = field.partition(".")
         (cls,) = (each for each in RECORDS if each.__name__ == name)
-        assert key in declared(cls)
+        assert key in declared_fields(cls)
         assert said.replace("no- load", "no-load").count(f". {source}") == 1, field
 
 

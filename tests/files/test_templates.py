@@ -16,7 +16,7 @@ from vsacli.actuators.kinds import ACTUATORS
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.documents.commented import WIDTH
-from vsacli.documents.fields import OneOf, Pair, Record, declared
+from vsacli.documents.fields import OneOf, PairOf, RecordOf, declared_fields
 from vsacli.files.templates import MOST_JOINTS, robot_template, trajectory_template
 from vsacli.robot.file import RobotFile, load_robot
 from vsacli.robot.joint import Joint
@@ -143,13 +143,13 @@ def test_what_stands_commented_out_is_the_default(tmp_path: Path) -> None:
 
 def keys_of(cls: type, values: dict[str, Any]) -> Iterator[str]:
     """Every key that a record, and the records that are set in it, may have."""
-    for name, (field, _) in declared(cls).items():
+    for name, (field, _) in declared_fields(cls).items():
         yield name
         content = values.get(name, {})
         match field.kind:
-            case Record(inner) | Pair(Record(inner)):
+            case RecordOf(inner) | PairOf(RecordOf(inner)):
                 yield from keys_of(inner, content)
-            case OneOf(variants) | Pair(OneOf(variants)) if content:
+            case OneOf(variants) | PairOf(OneOf(variants)) if content:
                 yield from keys_of(variants[content["type"]], content)
 
 

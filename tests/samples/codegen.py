@@ -12,7 +12,7 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.variables import Block
 from vsacli.control.codegen.robot_functions import command_structure
 from vsacli.dynamics.inverse import compute_block
@@ -66,7 +66,7 @@ def reachable(robot: Robot) -> FloatArray:
     drawn = commands(robot, 1000, seed=1)
     flags = compute_block(robot, motion_of(drawn)).flags
     chosen = np.stack([drawn[array.name] for array in command_structure(robot).arrays], axis=1)
-    return chosen[~has(flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=1)]
+    return chosen[~has_flag(flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=1)]
 
 
 def motion_of(arrays: dict[str, FloatArray]) -> Motion:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from vsacli.base.variables import OF_ANY_ROBOT, VARIABLES, Variable
-from vsacli.robot.joint import existing
+from vsacli.robot.joint import existing_columns
 
 STIFFNESS_K, STIFFNESS_KC, MOTOR_INERTIA = 400.0, 2000.0, 3.2
 
@@ -43,12 +43,12 @@ class Result:
         self.variables = tuple(name for name in VARIABLES if name in variables)
 
     def existing(self, variable: Variable) -> np.ndarray:
-        return np.array(existing(variable, self.actuators))
+        return np.array(existing_columns(variable, self.actuators))
 
     def limits(self, name: str) -> np.ndarray:
         return self.bounds.get(name, np.full((len(self.joint_names), 1, 2), np.nan))
 
-    def has(self, variable: Variable) -> bool:
+    def has_variable(self, variable: Variable) -> bool:
         return variable.requires in OF_ANY_ROBOT
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> np.ndarray:

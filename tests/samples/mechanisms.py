@@ -28,7 +28,7 @@ from vsacli.actuators.motor import Motor
 from vsacli.actuators.serial import Serial
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.documents.source import Source
-from vsacli.documents.table import Table
+from vsacli.documents.table import CsvTable
 
 INERTIA, DAMPING = (0.3, 0.02), (0.1, 0.05)
 """Of motors 1 and 2."""
@@ -110,12 +110,12 @@ def _two_springs(k: float, k_c: float) -> Potential:
     return lambda q, *theta: sum(k / 2 * (each - q) ** 2 + k_c / 4 * (each - q) ** 4 for each in theta)
 
 
-def profile(phi: FloatArray, lift: FloatArray) -> Table:
+def profile(phi: FloatArray, lift: FloatArray) -> CsvTable:
     """A table, as if read from a file."""
-    return Table(("deflection", "lift"), np.column_stack([phi, lift]), Source("profile.csv", "", None))
+    return CsvTable(("deflection", "lift"), np.column_stack([phi, lift]), Source("profile.csv", "", None))
 
 
-def _polynomial_cam(*coefficients: float, rest: float = 0.0) -> tuple[Table, Potential]:
+def _polynomial_cam(*coefficients: float, rest: float = 0.0) -> tuple[CsvTable, Potential]:
     """Lifts of a polynomial, from the second power on; up to the sixth it lies in the span of the fit."""
 
     def lift(phi: Any) -> Any:
@@ -145,9 +145,9 @@ def _ratio(scale: Callable[[Any], Any], energy: Callable[[Any], Any]) -> Potenti
     return lambda q, theta_1, theta_2: scale(theta_2) * energy(theta_1 - q)
 
 
-def scale_table(settings: FloatArray, scale: Callable[[FloatArray], FloatArray]) -> Table:
+def scale_table(settings: FloatArray, scale: Callable[[FloatArray], FloatArray]) -> CsvTable:
     """A table, as if read from a file."""
-    return Table(
+    return CsvTable(
         ("setting", "scale"), np.column_stack([settings, scale(settings)]), Source("scale.csv", "", None)
     )
 

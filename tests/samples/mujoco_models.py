@@ -158,5 +158,5 @@ def accelerations(
 def _dampers(joint: Any) -> int:
     """Controls of a joint's damper: one beside each spring."""
     if joint.damper_at("transmission"):
-        return sum(joint.actuator.has(VARIABLES["phi"]))
+        return sum(joint.actuator.has_columns(VARIABLES["phi"]))
     return int(joint.damper is not None)

@@ -11,30 +11,30 @@ import numpy as np
 import yaml
 
 from vsacli.base import file_formats
-from vsacli.documents.fields import declared
-from vsacli.documents.record_values import json_value
-from vsacli.documents.table import Table
+from vsacli.documents.fields import declared_fields
+from vsacli.documents.record_values import value_as_json
+from vsacli.documents.table import CsvTable
 from vsacli.robot.model import Robot
 
 
 def fields(record: Any) -> dict[str, Any]:
     """The declared fields of a record that differ from their defaults, as plain values."""
     return {
-        name: json_value(field.kind, content, fields)
-        for name, (field, default) in declared(type(record)).items()
+        name: value_as_json(field.kind, content, fields)
+        for name, (field, default) in declared_fields(type(record)).items()
         if (content := getattr(record, name)) is not None and content != default
     }
 
 
-def tables(content: Any) -> Iterator[Table]:
+def tables(content: Any) -> Iterator[CsvTable]:
     """The tables in a record, wherever they are."""
-    if isinstance(content, Table):
+    if isinstance(content, CsvTable):
         yield content
     elif isinstance(content, tuple):
         for each in content:
             yield from tables(each)
     elif is_dataclass(content):
-        for name in declared(type(content)):
+        for name in declared_fields(type(content)):
             yield from tables(getattr(content, name))
 
 

@@ -18,7 +18,7 @@ from vsacli.actuators.laws import (
 from vsacli.actuators.laws.table import MeasuredSpring
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.source import Source
-from vsacli.documents.table import Table
+from vsacli.documents.table import CsvTable
 
 Spring = tuple[SpringLaw, scan.Curve]
 
@@ -26,7 +26,7 @@ Spring = tuple[SpringLaw, scan.Curve]
 def measured(deflection: FloatArray, torque: FloatArray) -> MeasuredSpring:
     """The spring of a table, as if read from a file."""
     rows = np.column_stack([deflection, torque])
-    return MeasuredSpring(file=Table(("deflection", "torque"), rows, Source("spring.csv", "", None)))
+    return MeasuredSpring(file=CsvTable(("deflection", "torque"), rows, Source("spring.csv", "", None)))
 
 
 def sampled(curve: scan.Curve, low: float, high: float, rows: int) -> Spring:

@@ -224,7 +224,7 @@ MUTATIONS = (
     Mutation(
         "damper parallel to springs, velocity",
         "damped",
-        "actuators.damped_springs:DampedSprings.driven",
+        "actuators.damped_springs:DampedSprings.damper_motion",
         "command.tau_e - springs",
         "1.01 * command.tau_e - springs",
     ),

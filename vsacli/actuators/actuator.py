@@ -80,13 +80,13 @@ class Actuator(DeclaredRecord, ABC):
     sprung: ClassVar[bool] = True
 
     @classmethod
-    def has(cls, variable: Variable) -> list[bool]:
+    def has_columns(cls, variable: Variable) -> list[bool]:
         """Return whether joints of this kind have each column of a result variable: one, or one per motor."""
         of_kind = {None: True, SPRINGS: cls.sprung}
-        there = of_kind.get(variable.requires, variable.requires in cls.commanded)
+        exists = of_kind.get(variable.requires, variable.requires in cls.commanded)
         if "motor" not in variable.dims:
-            return [there]
-        return [there and motor <= cls.motor_count for motor in MOTORS]
+            return [exists]
+        return [exists and motor <= cls.motor_count for motor in MOTORS]
 
     @classmethod
     @abstractmethod

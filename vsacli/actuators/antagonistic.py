@@ -23,7 +23,7 @@ from vsacli.actuators.spring_elements import SpringElement
 from vsacli.actuators.variable_stiffness import VariableStiffness
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
-from vsacli.documents.fields import OneOf, Pair, Record, choice, value
+from vsacli.documents.fields import OneOf, PairOf, RecordOf, choice, value
 from vsacli.documents.source import Source
 
 
@@ -31,9 +31,9 @@ from vsacli.documents.source import Source
 class Antagonistic(VariableStiffness):
     """Two motors, each pulling the link through a nonlinear spring of its own."""
 
-    motor: tuple[Motor, Motor] = value(Pair(Record(Motor)), "motors 1 and 2; one mapping applies to both")
+    motor: tuple[Motor, Motor] = value(PairOf(RecordOf(Motor)), "motors 1 and 2; one mapping applies to both")
     spring: tuple[SpringLaw, SpringLaw] = value(
-        Pair(OneOf(LAWS)), "springs 1 and 2; one mapping applies to both"
+        PairOf(OneOf(LAWS)), "springs 1 and 2; one mapping applies to both"
     )
     coupling: SpringLaw | None = value(
         OneOf(LAWS),

@@ -24,7 +24,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.elasticity import Components, ElasticState, MotorMatrix
-from vsacli.actuators.reach import Reach, reach
+from vsacli.actuators.reach import Reach, classify_stiffness
 from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, marked
@@ -39,7 +39,7 @@ CONTINUATION_STEPS = 200
 """Steps from the equilibrium to the start of the motion given in the robot file."""
 
 
-class _Springs(NamedTuple):
+class _DampedState(NamedTuple):
     """State of the springs at deflections.
 
     Attributes:
@@ -78,42 +78,42 @@ class DampedSprings:
     def __init__(self, actuator: Actuator) -> None:
         self._actuator = actuator
         self._motors = actuator.motor_count
-        self._settable = STIFFNESS.key in actuator.commanded
-        self._behind = np.array(actuator.has(VARIABLES["phi"])[: self._motors], dtype=float)
+        self._sets_stiffness = STIFFNESS.key in actuator.commanded
+        self._has_spring = np.array(actuator.has_columns(VARIABLES["phi"])[: self._motors], dtype=float)
 
     def spread(self, phi: FloatArray) -> FloatArray:
         """Return the spread: the sum of the deflections parallel to the damper."""
-        parts = [factor * row for factor, row in zip(self._behind, phi, strict=False)]
+        parts = [factor * row for factor, row in zip(self._has_spring, phi, strict=False)]
         return reduce(operator.add, parts)
 
     def slope(self, phi: FloatArray, q: FloatArray) -> FloatArray:
         """Return dT/d(spread) at constant stiffness: positive where the internal motion is stable."""
         return self.springs_at(phi, q).slope
 
-    def within(self, phi: FloatArray) -> BoolArray:
+    def laws_hold(self, phi: FloatArray) -> BoolArray:
         """Return where the springs' laws hold."""
         lowest, highest = np.array(self._actuator.phi_ranges).T[..., None]
         inside: BoolArray = (phi[: self._motors] >= lowest) & (phi[: self._motors] <= highest)
         return np.asarray(np.all(inside, axis=0))
 
-    def settled(self, spread: FloatArray, phi: FloatArray, command: Command) -> FloatArray:
+    def deflections_at_spread(self, spread: FloatArray, phi: FloatArray, command: Command) -> FloatArray:
         """Return the deflections with a spread and the commanded stiffness near a guess; NaN if none."""
-        missing = (spread - self.spread(phi)) / sum(self._behind)
-        shares = zip_longest(phi, self._behind, fillvalue=0.0)
-        phi = np.stack([row + missing * share for row, share in shares])
-        if not self._settable:
+        spread_error = (spread - self.spread(phi)) / sum(self._has_spring)
+        shares = zip_longest(phi, self._has_spring, fillvalue=0.0)
+        phi = np.stack([row + spread_error * share for row, share in shares])
+        if not self._sets_stiffness:
             return phi
         stiffness = command.commanded[STIFFNESS.key]
-        along = self._along(spread)
+        direction = self._rates_at_constant_spread(spread)
         for _ in range(NEWTON_STEPS):
             springs = self.springs_at(phi, command.q)
-            phi = phi + along * ((stiffness - springs.state.stiffness) / springs.divisor)
-        left = stiffness - self._state(phi, command.q).stiffness
-        return np.where(np.abs(left) < SINGULAR_MARGIN * stiffness, phi, np.nan)
+            phi = phi + direction * ((stiffness - springs.state.stiffness) / springs.divisor)
+        stiffness_error = stiffness - self._elastic_state(phi, command.q).stiffness
+        return np.where(np.abs(stiffness_error) < SINGULAR_MARGIN * stiffness, phi, np.nan)
 
     def equilibrium(self, command: Command, spread: float | None = None) -> FloatArray:
         """Return the deflections at which the springs carry the torque alone; or with a spread, if given."""
-        if self._settable:
+        if self._sets_stiffness:
             phi = self._actuator.solve(command.tau_e, command.commanded[STIFFNESS.key], command.q).deflections
         else:
             phi = self._actuator.transmit(command, SINGULAR_MARGIN, None).phi
@@ -121,16 +121,16 @@ class DampedSprings:
             return phi
         begin = self.spread(phi)
         for share in np.linspace(0, 1, CONTINUATION_STEPS + 1)[1:]:
-            phi = self.settled(begin + (spread - begin) * share, phi, command)
+            phi = self.deflections_at_spread(begin + (spread - begin) * share, phi, command)
         return phi
 
-    def driven(self, phi: FloatArray, command: Command) -> tuple[FloatArray, FloatArray]:
+    def damper_motion(self, phi: FloatArray, command: Command) -> tuple[FloatArray, FloatArray]:
         """Return w = (tau_l - T)/d and w' = (tau_l' - d' w - T')/d at deflections."""
         damping, d_damping = (command.commanded[name] for name in DAMPING.names[:2])
         springs = self.springs_at(phi, command.q)
         velocity = (command.tau_e - springs.state.tau_e) / damping
-        dtheta = self._velocities(springs, velocity, command)
-        rate = springs.state.torque_rate(self._rates(command.dq, dtheta))
+        dtheta = self._motor_velocities(springs, velocity, command)
+        rate = springs.state.torque_rate(self._coordinate_rates(command.dq, dtheta))
         return velocity, (command.dtau_e - d_damping * velocity - rate) / damping
 
     def transmit(self, command: Command, motion: InternalMotion, min_margin: float) -> JointVariables:
@@ -139,16 +139,16 @@ class DampedSprings:
         The attainable range is that at the springs' torque. A sample is singular where the pivot is zero, not
         where det A is; INTERNAL_INSTABILITY is set where the slope is not positive.
         """
-        phi = self.settled(self.spread(motion.phi), motion.phi, command)
+        phi = self.deflections_at_spread(self.spread(motion.phi), motion.phi, command)
         _, rate, acceleration = motion
         if rate is None or acceleration is None:
-            rate, acceleration = self.driven(phi, command)
+            rate, acceleration = self.damper_motion(phi, command)
         springs = self.springs_at(phi, command.q)
-        lower, upper, reached = self._reach(springs, phi, command, min_margin)
+        lower, upper, reached = self._range_and_reach(springs, phi, command, min_margin)
         velocity = np.where(reached.singular | reached.infeasible, np.nan, rate)
-        dtheta = self._velocities(springs, velocity, command)
-        rates = self._rates(command.dq, dtheta)
-        ddtheta = self._accelerations(springs, acceleration, rates, command)
+        dtheta = self._motor_velocities(springs, velocity, command)
+        rates = self._coordinate_rates(command.dq, dtheta)
+        ddtheta = self._motor_accelerations(springs, acceleration, rates, command)
         none = np.full_like(command.q, np.nan)
 
         def of_motors(values: Components) -> FloatArray:
@@ -156,13 +156,13 @@ class DampedSprings:
             return np.where(reached.infeasible, np.nan, np.stack(rows))
 
         unstable = ~reached.infeasible & ~(springs.slope > 0)
-        behind = self._behind[:, None] > 0
+        has_spring = self._has_spring[:, None] > 0
         stiffness = zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)
         return command.variables()._replace(
             **dict(stiffness),
-            phi=np.where(behind, of_motors(phi), np.nan),
-            dphi=np.where(behind, of_motors(rates), np.nan),
-            theta=of_motors(self._positions(phi, command.q)),
+            phi=np.where(has_spring, of_motors(phi), np.nan),
+            dphi=np.where(has_spring, of_motors(rates), np.nan),
+            theta=of_motors(self._motor_positions(phi, command.q)),
             dtheta=of_motors(dtheta),
             ddtheta=of_motors(ddtheta),
             tau_transmission=of_motors(springs.state.tau_transmission),
@@ -173,17 +173,17 @@ class DampedSprings:
             flags=reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
         )
 
-    def _reach(
-        self, springs: _Springs, phi: FloatArray, command: Command, min_margin: float
+    def _range_and_reach(
+        self, springs: _DampedState, phi: FloatArray, command: Command, min_margin: float
     ) -> tuple[FloatArray, FloatArray, Reach]:
         """Return minimum and maximum stiffness at the torque of the springs, and the reach of the samples."""
         lost, none = ~np.isfinite(phi[0]), np.full_like(command.q, np.nan)
         never = np.zeros_like(lost)
-        if not self._settable:
+        if not self._sets_stiffness:
             return none, none, Reach(lost, never, never, never)
         stiffness = command.commanded[STIFFNESS.key]
         solution = self._actuator.solve(springs.state.tau_e, stiffness, command.q)
-        reached = reach(stiffness, solution, min_margin)
+        reached = classify_stiffness(stiffness, solution, min_margin)
         margin = self._margin(springs, stiffness)
         return (
             solution.lower,
@@ -196,63 +196,67 @@ class DampedSprings:
             ),
         )
 
-    def _margin(self, springs: _Springs, stiffness: FloatArray) -> FloatArray:
+    def _margin(self, springs: _DampedState, stiffness: FloatArray) -> FloatArray:
         """Return the distance of the stiffness from its extremum at the same spread, relative to itself."""
-        bent = springs.state.stiffness_curvature(self._rates(0 * stiffness, self._along(stiffness)))
-        divisor = 2 * stiffness * np.abs(bent)
+        curvature = springs.state.stiffness_curvature(
+            self._coordinate_rates(0 * stiffness, self._rates_at_constant_spread(stiffness))
+        )
+        divisor = 2 * stiffness * np.abs(curvature)
         margin: FloatArray = springs.pivot * springs.pivot / np.where(divisor > 0, divisor, np.nan)
         return margin
 
-    def _along(self, like: FloatArray) -> FloatArray:
+    def _rates_at_constant_spread(self, like: FloatArray) -> FloatArray:
         """Return motor velocities that leave the spread unchanged, (motors, samples)."""
-        return np.stack((0 * like - self._behind[1], 0 * like + self._behind[0]))
+        return np.stack((0 * like - self._has_spring[1], 0 * like + self._has_spring[0]))
 
-    def _velocities(self, springs: _Springs, velocity: FloatArray, command: Command) -> FloatArray:
-        still = self._rates(command.dq, np.zeros((self._motors, 1)) * command.dq)
+    def _motor_velocities(self, springs: _DampedState, velocity: FloatArray, command: Command) -> FloatArray:
+        still = self._coordinate_rates(command.dq, np.zeros((self._motors, 1)) * command.dq)
         rate = command.commanded[STIFFNESS.names[1]] - springs.state.stiffness_rate(still)
-        return self._solved(springs, velocity + sum(self._behind) * command.dq, rate)
+        return self._solve_spreading(springs, velocity + sum(self._has_spring) * command.dq, rate)
 
-    def _accelerations(
-        self, springs: _Springs, acceleration: FloatArray, rates: Components, command: Command
+    def _motor_accelerations(
+        self, springs: _DampedState, acceleration: FloatArray, rates: Components, command: Command
     ) -> FloatArray:
-        still = self._rates(command.ddq, np.zeros((self._motors, 1)) * command.ddq)
+        still = self._coordinate_rates(command.ddq, np.zeros((self._motors, 1)) * command.ddq)
         state = springs.state
-        bent = state.stiffness_curvature(rates) + state.stiffness_rate(still)
-        missing = command.commanded[STIFFNESS.names[2]] - bent
-        return self._solved(springs, acceleration + sum(self._behind) * command.ddq, missing)
+        bias = state.stiffness_curvature(rates) + state.stiffness_rate(still)
+        remainder = command.commanded[STIFFNESS.names[2]] - bias
+        return self._solve_spreading(springs, acceleration + sum(self._has_spring) * command.ddq, remainder)
 
-    def _solved(self, springs: _Springs, of_spread: FloatArray, of_stiffness: FloatArray) -> FloatArray:
+    def _solve_spreading(
+        self, springs: _DampedState, of_spread: FloatArray, of_stiffness: FloatArray
+    ) -> FloatArray:
         """Return the solution of both rows; of the first alone if there is one motor."""
         if springs.spreading is None:
             return of_spread[None]
         return np.stack(springs.spreading.solve(of_spread, of_stiffness))
 
     def _stiffness(
-        self, springs: _Springs, rates: Components, ddtheta: FloatArray, command: Command
+        self, springs: _DampedState, rates: Components, ddtheta: FloatArray, command: Command
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the commanded stiffness, or that of the springs, with its derivatives."""
-        if self._settable:
+        if self._sets_stiffness:
             stiffness, rate, acceleration = (command.commanded[name] for name in STIFFNESS.names)
             return stiffness, rate, acceleration
-        state, turning = springs.state, self._rates(command.ddq, ddtheta)
-        bent = state.stiffness_curvature(rates) + state.stiffness_rate(turning)
-        return state.stiffness, state.stiffness_rate(rates), bent
+        state, turning = springs.state, self._coordinate_rates(command.ddq, ddtheta)
+        acceleration = state.stiffness_curvature(rates) + state.stiffness_rate(turning)
+        return state.stiffness, state.stiffness_rate(rates), acceleration
 
-    def springs_at(self, phi: FloatArray, q: FloatArray) -> _Springs:
+    def springs_at(self, phi: FloatArray, q: FloatArray) -> _DampedState:
         """Return the state of the springs at deflections and joint positions."""
-        state = self._state(phi, q)
-        if not self._settable:
-            return _Springs(state, None)
-        (one, two), decoupling = self._behind, state.matrix
-        return _Springs(state, MotorMatrix(one, two, decoupling.stiffness_1, decoupling.stiffness_2))
+        state = self._elastic_state(phi, q)
+        if not self._sets_stiffness:
+            return _DampedState(state, None)
+        (one, two), decoupling = self._has_spring, state.matrix
+        return _DampedState(state, MotorMatrix(one, two, decoupling.stiffness_1, decoupling.stiffness_2))
 
-    def _state(self, phi: FloatArray, q: FloatArray) -> ElasticState:
-        theta = self._positions(phi, q)
+    def _elastic_state(self, phi: FloatArray, q: FloatArray) -> ElasticState:
+        theta = self._motor_positions(phi, q)
         return self._actuator.springs(self._actuator.unknowns(theta - q, theta), q)
 
-    def _positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
+    def _motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
         return self._actuator.motor_positions(phi[: self._motors], q)
 
-    def _rates(self, dq: FloatArray, dtheta: FloatArray) -> Components:
+    def _coordinate_rates(self, dq: FloatArray, dtheta: FloatArray) -> Components:
         """Return the rates of the coordinates of the springs from velocities of joint and motors."""
         return *self._actuator.unknowns(dtheta - dq, dtheta), dq

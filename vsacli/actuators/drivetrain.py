@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, SpringTorques
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import Windings
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
@@ -53,17 +53,17 @@ class Rotors:
         """Return theta'' = B^-1 of the torques that accelerate the rotors."""
         accelerations: FloatArray = torques / self._inertia
         if self._coupled.size:
-            here, other = self._coupled, self._other
-            share = self._coupling[here] / self._inertia[other]
-            effective = self._inertia[here] - share * self._coupling[here]
-            accelerations[..., here] = (torques[..., here] - share * torques[..., other]) / effective
+            coupled, other = self._coupled, self._other
+            share = self._coupling[coupled] / self._inertia[other]
+            effective = self._inertia[coupled] - share * self._coupling[coupled]
+            accelerations[..., coupled] = (torques[..., coupled] - share * torques[..., other]) / effective
         return accelerations
 
-    def held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
+    def accelerations_with_held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Return theta'' with some motors held, and the holding torques, 0 for others; (..., motors)."""
-        apart = held.copy()
-        apart[..., self._coupled] |= held[..., self._other]
-        moving = np.where(apart, torques / self._inertia, self.accelerations(torques))
+        held_or_coupled = held.copy()
+        held_or_coupled[..., self._coupled] |= held[..., self._other]
+        moving = np.where(held_or_coupled, torques / self._inertia, self.accelerations(torques))
         accelerations = np.where(held, 0.0, moving)
         return accelerations, np.where(held, torques - self.torques(accelerations), 0.0)
 
@@ -72,7 +72,7 @@ SIDES = 2
 """Largest number of motors of a joint."""
 
 
-class _Group(NamedTuple):
+class _SpringGroup(NamedTuple):
     """Joints of one `Actuator.spring_group`: their springs, and where the joints and motors are."""
 
     elasticity: Elasticity
@@ -105,7 +105,7 @@ class Drivetrain:
         counts = [len(actuator.motors) for actuator in actuators]
         self.present = np.arange(SIDES) < np.array(counts)[:, None]
         self.joint = np.array([index for index, _ in motors])
-        self.deflected = np.array([actuator.has(VARIABLES["phi"]) for actuator in actuators])
+        self.deflected = np.array([actuator.has_columns(VARIABLES["phi"]) for actuator in actuators])
         self.rigid = np.array([not actuator.sprung for actuator in actuators])
         self.sprung = ~self.rigid[self.joint]
         self.inertia, self.damping, self.max_torque = (
@@ -117,20 +117,20 @@ class Drivetrain:
         self.windings = Windings.of([motor for _, motor in motors])
         self.chosen = np.flatnonzero(["stiffness" in actuator.commanded for actuator in actuators])
         self.spring_joint = self.joint[self.sprung]
-        self._direct = np.flatnonzero(self.rigid)
+        self._rigid_joints = np.flatnonzero(self.rigid)
         groups = dict.fromkeys(actuator.spring_group for actuator in actuators if actuator.sprung)
-        self._groups = [self._group(group, actuators) for group in groups]
-        self._alone = len(self._groups) == 1 and not self.rigid.any()
+        self._groups = [self._make_group(group, actuators) for group in groups]
+        self._is_one_group = len(self._groups) == 1 and not self.rigid.any()
         ranges = [each for actuator in actuators if actuator.sprung for each in actuator.phi_ranges]
         self.domain = np.array(ranges).reshape(-1, 2).T
 
-    def _group(self, group: Hashable, actuators: Sequence[Actuator]) -> _Group:
+    def _make_group(self, group: Hashable, actuators: Sequence[Actuator]) -> _SpringGroup:
         indices = [
             index for index, each in enumerate(actuators) if each.sprung and each.spring_group == group
         ]
         springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in indices])
         members = [actuators[joint] for joint in indices]
-        return _Group(type(members[0]).elasticity(members), np.array(indices), springs)
+        return _SpringGroup(type(members[0]).elasticity(members), np.array(indices), springs)
 
     def of_motors(self, values: FloatArray) -> FloatArray:
         """Return (..., motors) from (..., joints, 2), whose entries without a motor are ignored."""
@@ -142,21 +142,21 @@ class Drivetrain:
         result[..., self.present] = values
         return result
 
-    def merged(self, sprung: FloatArray, rigid: FloatArray) -> FloatArray:
+    def of_motors_by_joint(self, sprung: FloatArray, rigid: FloatArray) -> FloatArray:
         """Return (..., joints, 2) from values of sprung motors, (..., springs), and of joints, (..., joints).
 
         Values of joints are used for motors without a spring.
         """
-        return self.of_joints(self.of_all(rigid, sprung))
+        return self.of_joints(self.of_all_motors(rigid, sprung))
 
-    def direct(self, values: FloatArray) -> FloatArray:
+    def of_rigid_joints(self, values: FloatArray) -> FloatArray:
         """Return the values of motors that move joints directly, (..., joints), else 0."""
         result = np.zeros_like(values, shape=(*values.shape[:-1], len(self.rigid)))
-        if self._direct.size:
-            result[..., self._direct] = values[..., ~self.sprung]
+        if self._rigid_joints.size:
+            result[..., self._rigid_joints] = values[..., ~self.sprung]
         return result
 
-    def of_all(self, rigid: FloatArray, sprung: FloatArray) -> FloatArray:
+    def of_all_motors(self, rigid: FloatArray, sprung: FloatArray) -> FloatArray:
         """Return (..., motors) from values of motors with springs, and of joints for the other motors."""
         values = rigid[..., self.joint]
         values[..., self.sprung] = sprung
@@ -167,10 +167,10 @@ class Drivetrain:
         parts = [each.ranged(*positions) for each, positions in self._positions(q, theta)]
         return self.of_springs(parts, theta)
 
-    def torques(self, q: FloatArray, theta: FloatArray) -> Torques:
+    def torques(self, q: FloatArray, theta: FloatArray) -> SpringTorques:
         """Return the torques of the springs: on links, (..., joints), and against motors, (..., springs)."""
         parts = [elasticity.torques(at) for elasticity, at in self.at(q, theta)]
-        return Torques(
+        return SpringTorques(
             self.by_joint([part.tau_e for part in parts], q),
             self.of_springs([part.tau_transmission for part in parts], theta),
         )
@@ -185,8 +185,8 @@ class Drivetrain:
 
     def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return det A (67), (..., joints), NaN where no stiffness is commanded."""
-        found = self.by_joint([each.state(at).determinant for each, at in self.at(q, theta)], q)
-        return np.where(self.rigid, np.nan, found)
+        determinants = self.by_joint([each.state(at).determinant for each, at in self.at(q, theta)], q)
+        return np.where(self.rigid, np.nan, determinants)
 
     def state(self, q: FloatArray, theta: FloatArray, dq: FloatArray, dtheta: FloatArray) -> DrivetrainState:
         """Return the springs with their derivatives, at positions and velocities of joints and motors."""
@@ -196,11 +196,11 @@ class Drivetrain:
 
     def of_groups(self, values: FloatArray) -> list[FloatArray]:
         """Return the part of each group of actuators, (..., joints), of (..., joints)."""
-        return [values if self._alone else values[..., group.joints] for group in self._groups]
+        return [values if self._is_one_group else values[..., group.joints] for group in self._groups]
 
     def by_joint(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
         """Return (..., joints) from the parts of the groups; 0 for joints without springs."""
-        if self._alone:
+        if self._is_one_group:
             return parts[0]
         result = np.zeros_like(like)
         for group, part in zip(self._groups, parts, strict=True):
@@ -209,7 +209,7 @@ class Drivetrain:
 
     def of_springs(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
         """Return (..., springs) from the parts of the groups, (..., joints, motors)."""
-        if self._alone:
+        if self._is_one_group:
             return parts[0].reshape(*like.shape)
         result = np.empty_like(like)
         for group, part in zip(self._groups, parts, strict=True):
@@ -221,7 +221,7 @@ class Drivetrain:
         result = np.empty_like(like)
         for group, part in zip(self._groups, parts, strict=True):
             for number, of_motor in enumerate(part):
-                springs = slice(number, None, len(part)) if self._alone else group.springs[:, number]
+                springs = slice(number, None, len(part)) if self._is_one_group else group.springs[:, number]
                 result[..., springs] = of_motor
         return result
 
@@ -234,7 +234,7 @@ class Drivetrain:
     ) -> Iterator[tuple[Elasticity, tuple[FloatArray, FloatArray]]]:
         """Yield the springs of each group with the positions of joints and motors, (..., joints, motors)."""
         for group, of_joints in zip(self._groups, self.of_groups(q), strict=True):
-            if self._alone:
+            if self._is_one_group:
                 of_motors = theta.reshape(*theta.shape[:-1], *group.springs.shape)
             else:
                 of_motors = theta[..., group.springs]

@@ -22,8 +22,8 @@ from vsacli.actuators.transmission import Command, JointVariables, single_motor
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
-from vsacli.base.flags import Flag, has
-from vsacli.documents.fields import POSITIVE, OneOf, Record, number, value
+from vsacli.base.flags import Flag, has_flag
+from vsacli.documents.fields import POSITIVE, OneOf, RecordOf, number, value
 from vsacli.documents.source import Source
 
 EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
@@ -33,7 +33,7 @@ EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
 class Elastic(Actuator):
     """One motor that moves the link through a spring: a linear one, or one of any law."""
 
-    motor: Motor = value(Record(Motor), "motor")
+    motor: Motor = value(RecordOf(Motor), "motor")
     stiffness: float | None = number(
         units.STIFFNESS, "stiffness of a linear spring; either this or `spring`", check=POSITIVE, default=None
     )
@@ -123,7 +123,7 @@ class Elastic(Actuator):
 
         NaN where tau_e cannot be carried; derivatives, which require 1/sigma, also where sigma is zero.
         """
-        infeasible = has(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)
+        infeasible = has_flag(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)
         solution = self.solve(command.tau_e, np.full_like(command.tau_e, np.nan), command.q)
         phi = np.where(infeasible, np.nan, solution.phi_1)
         spring = self.springs((phi,), command.q)

@@ -18,7 +18,7 @@ Components: TypeAlias = Sequence[FloatArray] | FloatArray
 """One array for each motor of a joint, or for each coordinate of its springs; all of one shape."""
 
 
-class Torques(NamedTuple):
+class SpringTorques(NamedTuple):
     """Torques of springs: on the link of each joint (6), and against each motor (62)."""
 
     tau_e: FloatArray
@@ -41,7 +41,7 @@ class Elasticity(ABC):
         return self.coordinates(q, theta)
 
     @abstractmethod
-    def torques(self, coordinates: FloatArray) -> Torques:
+    def torques(self, coordinates: FloatArray) -> SpringTorques:
         """Return the torques of the springs."""
 
     @abstractmethod

@@ -14,7 +14,7 @@ import numpy as np
 
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.documents.fields import NON_NEGATIVE, Number, Pair, number, value
+from vsacli.documents.fields import NON_NEGATIVE, NumberWithUnit, PairOf, number, value
 from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
 
 REST = 1e-10
@@ -27,7 +27,7 @@ class Friction(DeclaredRecord):
     """Dry friction: a torque against the motion that hardly depends on its velocity."""
 
     coulomb: tuple[float, float] = value(
-        Pair(Number(units.TORQUE), dim="direction"),
+        PairOf(NumberWithUnit(units.TORQUE), dim="direction"),
         "Coulomb friction, or a list of two: for negative and for positive velocity",
         check=NON_NEGATIVE,
     )
@@ -107,13 +107,13 @@ class FrictionLaws(NamedTuple):
             direction: Direction of motion for sharp friction, -1, 0 or 1; that of the velocity if None, and
                 where it is NaN.
         """
-        sign = direction_of(velocity)
+        sign = sign_of_motion(velocity)
         if direction is not None:
             sign = np.where(np.isnan(direction), sign, direction)
         smooth = np.tanh(velocity / np.where(self.width > 0, self.width, 1.0))
         return self._size(velocity, sign) * np.where(self.width > 0, smooth, sign) + self.offset
 
-    def beyond(self, torque: FloatArray) -> FloatArray:
+    def direction_beyond(self, torque: FloatArray) -> FloatArray:
         """Return 1 where a torque exceeds the holding friction, -1 where it is below its negative, else 0."""
         coulomb = torque - self.offset
         outside = np.where(coulomb > self.forward, 1.0, np.where(coulomb < -self.backward, -1.0, 0.0))
@@ -132,6 +132,6 @@ class FrictionLaws(NamedTuple):
         return np.where(np.where(self.width > 0, velocity, sign) < 0, self.backward, self.forward)
 
 
-def direction_of(velocity: FloatArray) -> FloatArray:
+def sign_of_motion(velocity: FloatArray) -> FloatArray:
     """Return -1, 0 or 1; 0 at rest, and where the velocity is NaN."""
     return np.where(np.abs(velocity) > REST, np.where(velocity < 0, -1.0, 1.0), 0.0)

@@ -78,8 +78,8 @@ def example(words: str, joint_type: str) -> dict[str, Any]:
             reason = f"{mechanism} turns about an axis, and drives no {joint_type} joint"
         else:
             reason = f"there is no example of {mechanism} for a {joint_type} joint"
-        others = [other for other in mechanisms_of(kind) if _has_example(other, joint_type)]
-        raise InputError.one(f"{reason}; choose {' or '.join(others)}")
+        alternatives = [other for other in mechanisms_of(kind) if _has_example(other, joint_type)]
+        raise InputError.one(f"{reason}; choose {' or '.join(alternatives)}")
     return {"type": kind, **ACTUATORS[kind].example(joint_type, mechanism)}
 
 
@@ -89,5 +89,5 @@ def _has_example(mechanism: str, joint_type: str) -> bool:
 
     if mechanism in LAWS:
         return joint_type in LAWS[mechanism].examples
-    found = MECHANISMS[mechanism]
-    return joint_type in found.joint_types and bool(found.example(joint_type))
+    mechanism_class = MECHANISMS[mechanism]
+    return joint_type in mechanism_class.joint_types and bool(mechanism_class.example(joint_type))

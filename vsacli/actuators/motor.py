@@ -21,7 +21,7 @@ from vsacli.documents.fields import (
     NON_ZERO,
     POSITIVE,
     POSITIVE_OR_INFINITE,
-    Record,
+    RecordOf,
     choice,
     number,
     value,
@@ -74,7 +74,9 @@ class JointMotor:
         "ratio of the motion of the motor shaft to the motion on the joint side",
         default=None,
     )
-    friction: Friction | None = value(Record(Friction), "dry friction, joint side of the gear", default=None)
+    friction: Friction | None = value(
+        RecordOf(Friction), "dry friction, joint side of the gear", default=None
+    )
     torque_constant: float | None = number(
         units.JOINT_TORQUE_CONSTANT,
         "ratio of the torque on the joint side of the gear to the current",
@@ -117,7 +119,7 @@ class Motor(DeclaredRecord):
         "N m, rad/s at any joint",
         default=None,
     )
-    friction: Friction | None = value(Record(Friction), f"dry friction, {_ON_SIDE}", default=None)
+    friction: Friction | None = value(RecordOf(Friction), f"dry friction, {_ON_SIDE}", default=None)
     torque_constant: float | None = number(
         units.TORQUE_CONSTANT,
         "ratio of torque to current, and so of voltage to velocity, on the motor shaft; requires "
@@ -149,7 +151,7 @@ class Motor(DeclaredRecord):
     required_unless = MappingProxyType({"side": ("gear_ratio", 1)})
 
     def _problems(self) -> Iterator[FieldProblem]:
-        yield from (*self._gear_problems(), *self._missing())
+        yield from (*self._gear_problems(), *self._missing_keys())
 
     def _gear_problems(self) -> Iterator[FieldProblem]:
         ratio = self.gear_ratio
@@ -166,7 +168,7 @@ class Motor(DeclaredRecord):
     def _without_side(self, ratio: float) -> FieldProblem:
         """Return the problem of a motor with a gear but no side, with both meanings of its values."""
         values, of_shaft, of_joint = map(
-            _given, (vars(self), self._reflected(ratio), self._reflected(1 / ratio))
+            _format_constants, (vars(self), self._reflected(ratio), self._reflected(1 / ratio))
         )
         meanings: list[str] = []
         quantities: list[Quantity] = []
@@ -184,7 +186,7 @@ class Motor(DeclaredRecord):
         reason = "; ".join((f"{ratio:g} needs side: {SHAFT} or {JOINT}", *meanings))
         return FieldProblem(("gear_ratio",), reason, quantities=tuple(quantities))
 
-    def _missing(self) -> Iterator[FieldProblem]:
+    def _missing_keys(self) -> Iterator[FieldProblem]:
         """Yield the keys missing for constants of the windings."""
         for name, needed in NEEDED.items():
             missing = [key for key in needed if getattr(self, key) is None]
@@ -229,7 +231,7 @@ class Motor(DeclaredRecord):
         }
 
 
-def _given(values: Mapping[str, Any]) -> Iterator[tuple[str, Quantity, str]]:
+def _format_constants(values: Mapping[str, Any]) -> Iterator[tuple[str, Quantity, str]]:
     """Yield name, quantity and text of the values of `_ON_EITHER_SIDE` that are neither zero nor infinite."""
     friction = values["friction"] or NO_FRICTION
     for name, quantity in _ON_EITHER_SIDE.items():
@@ -263,8 +265,8 @@ class Windings(NamedTuple):
         rows = [[getattr(motor, name, None) for name in cls._fields] for motor in motors]
         if all(constant is None for constant, _ in rows):
             return None
-        known = [[math.nan if value is None else value for value in row] for row in rows]
-        return cls(*map(np.stack, zip(*known, strict=True)))
+        filled_rows = [[math.nan if value is None else value for value in row] for row in rows]
+        return cls(*map(np.stack, zip(*filled_rows, strict=True)))
 
     def with_axis_behind(self) -> Windings:
         """Return the constants with a further last axis, for samples."""

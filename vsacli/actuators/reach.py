@@ -1,7 +1,7 @@
 """Flags of the samples of one joint: stiffness attainable, A regular, and limits kept; with their margins.
 
-`reach` compares the stiffness with its attainable range, which `PairSolution` holds; a `LimitCheck` compares
-a result variable with a limit.
+`classify_stiffness` compares the stiffness with its attainable range, which `PairSolution` holds; a
+`LimitCheck` compares a result variable with a limit.
 """
 
 from __future__ import annotations
@@ -124,11 +124,13 @@ class Reach(NamedTuple):
     def flags(self) -> FlagArray:
         """The bits of the same names."""
         bits = (Flag.INFEASIBLE, Flag.SLACK, Flag.SINGULAR, Flag.NEAR_SINGULAR)
-        first, *others = (marked(flag, where) for flag, where in zip(bits, self, strict=True))
-        return reduce(operator.or_, others, first)
+        first, *further_bits = (marked(flag, where) for flag, where in zip(bits, self, strict=True))
+        return reduce(operator.or_, further_bits, first)
 
 
-def reach(stiffness: FloatArray, solution: PairSolution, min_margin: float = MIN_MARGIN) -> Reach:
+def classify_stiffness(
+    stiffness: FloatArray, solution: PairSolution, min_margin: float = MIN_MARGIN
+) -> Reach:
     """Compare a stiffness with its attainable range; margins below `min_margin` count as near-singular."""
     # At a critical end A is singular. The other ends, of a law's domain, are feasible and regular.
     gap = margin(stiffness, solution.lower, solution.upper)
@@ -150,7 +152,7 @@ def deflections_within_reach(
 
     Integrated deflections replace those of the solution; samples where they are NaN are infeasible.
     """
-    reached = reach(stiffness, solution, min_margin)
+    reached = classify_stiffness(stiffness, solution, min_margin)
     if integrated is not None:
         reached = reached._replace(infeasible=reached.infeasible | np.isnan(integrated[0]))
     phi = solution.deflections if integrated is None else integrated
@@ -159,4 +161,4 @@ def deflections_within_reach(
 
 def reach_flags(stiffness: FloatArray, solution: PairSolution, min_margin: float = MIN_MARGIN) -> FlagArray:
     """Return the bits INFEASIBLE, SLACK, SINGULAR and NEAR_SINGULAR of the samples of a joint, (samples,)."""
-    return reach(stiffness, solution, min_margin).flags
+    return classify_stiffness(stiffness, solution, min_margin).flags

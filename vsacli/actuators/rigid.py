@@ -13,14 +13,14 @@ from vsacli.actuators.actuator import Actuator, PlaceholderConstants
 from vsacli.actuators.motor import JointMotor, Motor
 from vsacli.actuators.transmission import Command, JointVariables, single_motor
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
-from vsacli.documents.fields import Record, value
+from vsacli.documents.fields import RecordOf, value
 
 
 @dataclass(frozen=True)
 class Rigid(Actuator):
     """One motor that moves the link directly."""
 
-    motor: Motor = value(Record(Motor), "motor")
+    motor: Motor = value(RecordOf(Motor), "motor")
 
     sprung = False
     uncommanded: ClassVar[Mapping[str, str]] = {"stiffness": "its actuator is rigid and has no stiffness"}

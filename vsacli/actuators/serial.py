@@ -13,7 +13,7 @@ import numpy as np
 
 from vsacli.actuators.actuator import PlaceholderConstants
 from vsacli.actuators.drivetrain import largest_coupling
-from vsacli.actuators.elasticity import Components, Elasticity, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, SpringTorques
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.mechanisms.mechanism import Mechanism, MechanismState
@@ -24,7 +24,7 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.variables import Variable
-from vsacli.documents.fields import OneOf, Pair, Record, number, value
+from vsacli.documents.fields import OneOf, PairOf, RecordOf, number, value
 from vsacli.documents.source import Source
 
 
@@ -33,7 +33,7 @@ class Serial(VariableStiffness):
     """Motor 1 moves the link through springs that motor 2 adjusts."""
 
     motor: tuple[Motor, Motor] = value(
-        Pair(Record(Motor)), "motor 1, which carries the load, and motor 2, which adjusts the springs"
+        PairOf(RecordOf(Motor)), "motor 1, which carries the load, and motor 2, which adjusts the springs"
     )
     coupled_inertia: float = number(
         units.MOTOR_INERTIA,
@@ -58,9 +58,9 @@ class Serial(VariableStiffness):
             yield FieldProblem(("coupled_inertia",), reason)
 
     @classmethod
-    def has(cls, variable: Variable) -> list[bool]:
-        """See `Actuator.has`; motor 2 has no deflection."""
-        return [True, False] if variable.name in {"phi", "dphi"} else super().has(variable)
+    def has_columns(cls, variable: Variable) -> list[bool]:
+        """See `Actuator.has_columns`; motor 2 has no deflection."""
+        return [True, False] if variable.name in {"phi", "dphi"} else super().has_columns(variable)
 
     @classmethod
     def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:
@@ -84,8 +84,8 @@ class Serial(VariableStiffness):
         """Return the mechanism as the problem, if it rotates and the joint does not."""
         if joint_type in self.mechanism.joint_types:
             return None
-        others = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
-        reason = f"turns about an axis, and drives no {joint_type} joint; {' or '.join(others)} can"
+        alternatives = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
+        reason = f"turns about an axis, and drives no {joint_type} joint; {' or '.join(alternatives)} can"
         return FieldProblem(("mechanism", "type"), reason)
 
     @property
@@ -143,7 +143,7 @@ class Serial(VariableStiffness):
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
         """Return the springs of joints whose mechanisms are equal."""
-        return _Springs(actuators[0].mechanism)
+        return _MechanismElasticity(actuators[0].mechanism)
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """Return phi and theta_2 on the mechanism's branch."""
@@ -159,7 +159,7 @@ class Serial(VariableStiffness):
         return self.mechanism.other_branch(tau_e, stiffness, q)
 
 
-class _Springs(Elasticity):
+class _MechanismElasticity(Elasticity):
     """A mechanism at any number of joints."""
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -173,10 +173,10 @@ class _Springs(Elasticity):
         """Return phi, theta_2 and q."""
         return np.stack((theta[..., 0] - q, theta[..., 1], q), axis=-1)
 
-    def torques(self, coordinates: FloatArray) -> Torques:
+    def torques(self, coordinates: FloatArray) -> SpringTorques:
         """Return the derivatives of the potential."""
         state = self.state(coordinates)
-        return Torques(state.tau_e, np.stack(state.tau_transmission, axis=-1))
+        return SpringTorques(state.tau_e, np.stack(state.tau_transmission, axis=-1))
 
     def energy(self, coordinates: FloatArray) -> FloatArray:
         """Return the potential."""

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, SpringTorques
 from vsacli.actuators.laws.law import SpringRows, SpringState
 from vsacli.base.arrays import FloatArray
 
@@ -107,10 +107,10 @@ class SingleSprings(Elasticity):
     def __init__(self, rows: SpringRows | LinearRows) -> None:
         self._rows = rows
 
-    def torques(self, phi: FloatArray) -> Torques:
+    def torques(self, phi: FloatArray) -> SpringTorques:
         """Return the torques; the spring exerts the same torque on the link as against its motor."""
         tau = self._rows.torque(phi)
-        return Torques(tau[..., 0], tau)
+        return SpringTorques(tau[..., 0], tau)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy of the spring."""

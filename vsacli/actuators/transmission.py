@@ -39,8 +39,8 @@ class Command(NamedTuple):
     def of(cls, arrays: Mapping[str, FloatArray]) -> Command:
         """Return the command from arrays by name; other names are ignored."""
         commanded = {name: arrays[name] for name in commanded_names() if name in arrays}
-        own = {name: arrays[name] for name in cls._fields[:-1]}
-        return cls(**own, commanded=commanded)
+        motion = {name: arrays[name] for name in cls._fields[:-1]}
+        return cls(**motion, commanded=commanded)
 
     @classmethod
     def at_rest(cls, tau_e: FloatArray, q: FloatArray) -> Command:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from vsacli.actuators.friction import direction_of
+from vsacli.actuators.friction import sign_of_motion
 from vsacli.actuators.motor import JointMotor
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Stored, named
@@ -156,7 +156,7 @@ class DryFrictionSummary:
 
     def add(self, time: FloatArray, dtheta: FloatArray) -> None:
         """Add consecutive samples, (samples,)."""
-        direction = direction_of(dtheta)
+        direction = sign_of_motion(dtheta)
         moving = np.flatnonzero(direction)
         self._rest += len(time) - len(moving)
         if moving.size:

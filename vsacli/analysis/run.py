@@ -22,7 +22,7 @@ from vsacli.analysis.run_dynamics import RunDynamics, choose_deflections, damped
 from vsacli.analysis.self_check import RunCheck
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
-from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has
+from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has_flag
 from vsacli.base.progress import Tell, unheard
 from vsacli.base.signals import POSITION
 from vsacli.base.units import time_text
@@ -146,7 +146,7 @@ class Run:
 
     def _until_infeasible(self, block: Block, between: list[Minima]) -> tuple[Block, list[Minima]]:
         """Return a block up to its first infeasible sample, with the minima of these samples."""
-        infeasible = has(block.flags, Flag.INFEASIBLE).any(axis=1)
+        infeasible = has_flag(block.flags, Flag.INFEASIBLE).any(axis=1)
         if not infeasible.any():
             return block, between
         self._stopped, last = True, int(infeasible.argmax())

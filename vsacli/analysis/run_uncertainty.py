@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.actuators.reach import ALLOWED_DEVIATIONS, margin
 from vsacli.analysis.joint_report import JUDGED, JointUncertainty, Spread
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, BoolArray, FloatArray
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.variables import UNCERTAIN, VARIABLES, Block, deviation
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.limits import Finding, keep_worse, limit_checks, worst_excess
@@ -112,7 +112,7 @@ class RunUncertainty:
         gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
         near = np.abs(gap) <= ALLOWED_DEVIATIONS * deviations
         for kind, bit in WITHIN.items():
-            for steps, undecided in zip(self._steps, (has(block.flags, bit) & near).T, strict=True):
+            for steps, undecided in zip(self._steps, (has_flag(block.flags, bit) & near).T, strict=True):
                 steps[kind] += int(np.count_nonzero(undecided))
 
     def _judge_limits(self, block: Block, index: int, *, between: bool) -> None:

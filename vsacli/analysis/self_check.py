@@ -19,7 +19,7 @@ from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.difference_errors import MIDDLE, NEIGHBORS, OFFSETS, DifferenceErrors
 from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, evenly, of_joint
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.json_records import Stored, named
 from vsacli.base.signals import COMMANDED
 from vsacli.base.variables import VARIABLES, Block
@@ -289,7 +289,7 @@ def _variable_on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, .
 def _computed_columns(actuator: Actuator, name: str) -> list[bool]:
     """Return whether each column of a variable is computed, not commanded, for this actuator."""
     commanded = {name for key in actuator.commanded for name in COMMANDED[key].names}
-    return [False] if name in commanded else actuator.has(VARIABLES[name])
+    return [False] if name in commanded else actuator.has_columns(VARIABLES[name])
 
 
 def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
@@ -298,7 +298,7 @@ def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
     No sample is infeasible, singular or near-singular, and the margin changes by less than a tenth: motor
     motion has features as short as the distance to the end of the attainable range.
     """
-    troubled = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
+    troubled = has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
     gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max).reshape(*shape, -1)
     hasty = np.ptp(gap, axis=1) > gap[:, MIDDLE] / 10
     smooth: BoolArray = ~(np.any(troubled, axis=1) | hasty)

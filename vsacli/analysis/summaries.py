@@ -11,7 +11,7 @@ from vsacli.actuators.reach import margin, nearer_end
 from vsacli.analysis.dry_friction import dry_frictions
 from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, JointUncertainty
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import SINGULAR_MARGIN, Flag, has
+from vsacli.base.flags import SINGULAR_MARGIN, Flag, has_flag
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.inverse import DeflectionStop
@@ -142,7 +142,7 @@ class JointSummary:
 
     def _count(self, flags: FlagArray, time: FloatArray) -> None:
         for kind, bits in COUNTED.items():
-            hit = has(flags, bits)
+            hit = has_flag(flags, bits)
             if hit.any():
                 self._steps[kind] += int(hit.sum())
                 self._first_time.setdefault(kind, float(time[hit.argmax()]))
@@ -160,9 +160,9 @@ class JointSummary:
 
     def _record_reach(self, flags: FlagArray, gap: FloatArray, block: Block) -> None:
         """Record the worst sample of each kind; none where integrated deflections end inside the range."""
-        outside = (gap < -SINGULAR_MARGIN) & ~has(flags, Flag.NOT_FINITE)
+        outside = (gap < -SINGULAR_MARGIN) & ~has_flag(flags, Flag.NOT_FINITE)
         for kind, bits in REACH.items():
-            hit = has(flags, bits) & (outside if kind == "infeasible" else ~outside)
+            hit = has_flag(flags, bits) & (outside if kind == "infeasible" else ~outside)
             for step in _worst_step(hit, -gap):
                 value, lower, upper = (
                     float(getattr(block, name)[step, self._index])
@@ -175,7 +175,7 @@ class JointSummary:
         self, flag: Flag, flags: FlagArray, time: FloatArray, values: FloatArray | float, of: str
     ) -> None:
         """Record the first sample with a flag: later ones are as bad, or follow from it."""
-        hit, kind = has(flags, flag), flag.label
+        hit, kind = has_flag(flags, flag), flag.label
         if hit.any() and kind not in self._worst:
             step = int(hit.argmax())
             self._first_time.setdefault(kind, float(time[step]))
@@ -187,7 +187,7 @@ class JointSummary:
         for check in self._limits:
             # The flag of a sample may be the other motor's.
             exceeded = flags & check.flags(values, check.allowance(values))
-            beyond, between = has(exceeded, check.flag), self._between_samples
+            beyond, between = has_flag(exceeded, check.flag), self._between_samples
             worst = worst_excess(self._joint, check, values, block.time, beyond, between=between)
             if worst is not None:
                 first = self._first_time.get(worst.kind, worst.first)

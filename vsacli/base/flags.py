@@ -92,7 +92,7 @@ LIMITS = reduce(or_, (flag for flag in Flag if flag.quantity is not None))
 """All bits that mark an exceeded limit."""
 
 
-def has(flags: FlagArray, bits: Flag) -> BoolArray:
+def has_flag(flags: FlagArray, bits: Flag) -> BoolArray:
     """Return where any of the bits is set."""
     hit: BoolArray = (flags & FLAG_TYPE(bits)) != 0
     return hit

@@ -110,7 +110,7 @@ def _cache(folder: str, clear: bool) -> dict[str, Any]:
 
 
 def _extract(file: str, folder: str, talk: Talk) -> None:
-    from vsacli.documents.reading import written
+    from vsacli.documents.reading import format_changes
     from vsacli.files.repetition import extract
 
     with naming_kind("FILE", file, ("result", "simulation", "table of a study")):
@@ -122,7 +122,7 @@ def _extract(file: str, folder: str, talk: Talk) -> None:
             outputs.file(target).write_bytes(content)
     talk.wrote(outputs)
     if found.changes:
-        again = shlex.join(part for change in written(found.changes) for part in ("--set", change))
+        again = shlex.join(part for change in format_changes(found.changes) for part in ("--set", change))
         talk.note(f"the files are as they were read; {file} was computed from them with {again}")
 
 

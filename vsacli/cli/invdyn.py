@@ -156,7 +156,7 @@ def _figures(
     from vsacli.results.charts.figures import drawable_figures, result_drawings
 
     stored = VARIABLES if variables is None else variables
-    drawn = drawable_figures(result_drawings(inputs.robot.has), stored)
+    drawn = drawable_figures(result_drawings(inputs.robot.has_variable), stored)
     if inputs.trajectory.estimates:
         drawn.append(RECORDING)
     return target.files(drawn, stem, outputs)

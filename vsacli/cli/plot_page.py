@@ -13,7 +13,7 @@ from vsacli.base.texts import one_line
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import FIXABLE, result_line
 from vsacli.cli.console import Talk
-from vsacli.documents.reading import written
+from vsacli.documents.reading import format_changes
 from vsacli.files.repetition import rebuilt
 from vsacli.files.stored_reports import stored_report
 from vsacli.results.pages import FixText, result_page, study_page
@@ -114,7 +114,7 @@ def _command(result: StoredResult, found: Fixes) -> tuple[str, str]:
     parts = ["vsacli", "check-feasibility", *files]
     if found.min_margin != MIN_MARGIN:
         parts += ["--min-margin", f"{found.min_margin}"]
-    changes = written({path: value for each in inputs for path, value in each.changes.items()})
+    changes = format_changes({path: value for each in inputs for path, value in each.changes.items()})
     parts += [part for change in changes for part in ("--set", change)]
     if changes:
         announced = "this lists them again; to have one written, change the files themselves as --set does:"

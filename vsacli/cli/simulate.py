@@ -250,7 +250,9 @@ def _figures(robot: Robot, target: FigureTarget, stem: str, outputs: Outputs) ->
     from vsacli.results.charts.figures import simulation_drawings
 
     def drawn(variable: Variable) -> bool:
-        return robot.has(variable) and any(any(joint.has(variable)) for joint in robot.joints)
+        return robot.has_variable(variable) and any(
+            any(joint.has_columns(variable)) for joint in robot.joints
+        )
 
     return target.files(simulation_drawings(drawn), stem, outputs)
 

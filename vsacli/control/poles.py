@@ -11,7 +11,7 @@ from vsacli.base import file_formats
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, STIFFNESS_ORDER, Gains, check_stable
-from vsacli.documents.fields import Items, Record, text, value
+from vsacli.documents.fields import Items, RecordOf, text, value
 from vsacli.documents.reading import read_document
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.robot.model import Robot
@@ -45,7 +45,7 @@ class JointPoles(DeclaredRecord):
 class PolesFile(DeclaredRecord):
     """The content of a poles file."""
 
-    joints: tuple[JointPoles, ...] = value(Items(Record(JointPoles), unique="name"), "poles of each joint")
+    joints: tuple[JointPoles, ...] = value(Items(RecordOf(JointPoles), unique="name"), "poles of each joint")
 
 
 def parse_poles(written: str, alternative: str = "") -> Poles:

@@ -47,23 +47,27 @@ class MappedColumn:
     nanoseconds: str | int | None = None
     place: tuple[str, int] = ("", 0)
 
-    def heading(self, target: str, own: str) -> str:
+    def heading(self, target: str, file_heading: str) -> str:
         """Return the heading under which the column is read.
 
         Args:
             target: name of the quantity in the column.
-            own: heading in the file.
+            file_heading: heading in the file.
         """
         if self.nanoseconds is not None:
             return f"{target} [ns]"
-        unit = split_heading(own)[1] if self.unit is None else self.unit
+        unit = split_heading(file_heading)[1] if self.unit is None else self.unit
         return target if unit is None else f"{target} [{unit}]"
 
-    def doubt(self, own: str) -> str | None:
+    def undeclared_unit(self, file_heading: str) -> str | None:
         """Return a unit that the heading in the file suggests but that is not declared; None without one."""
-        if self.unit is not None or self.nanoseconds is not None or split_heading(own)[1] is not None:
+        if (
+            self.unit is not None
+            or self.nanoseconds is not None
+            or split_heading(file_heading)[1] is not None
+        ):
             return None
-        last, camel = _LAST_WORD.search(own), _CAMEL.search(own)
+        last, camel = _LAST_WORD.search(file_heading), _CAMEL.search(file_heading)
         word = camel[1] if camel else last[1] if last else ""
         return UNIT_WORDS.get(word.lower())
 
@@ -75,7 +79,7 @@ class ChosenColumns(NamedTuple):
         places: positions of the columns, ascending, from 0.
         headings: names in this package, each with its unit in brackets if one is known.
         factors: factors by which their numbers are multiplied.
-        others: names of unknown columns.
+        unknown_columns: names of unknown columns.
         ignored: names of columns to leave out.
         time: position of the column of stamps, if it is read.
         nanoseconds: position of the column of nanoseconds that completes the stamps, if there is one.
@@ -84,7 +88,7 @@ class ChosenColumns(NamedTuple):
     places: tuple[int, ...]
     headings: tuple[str, ...]
     factors: tuple[float, ...]
-    others: tuple[str, ...] = ()
+    unknown_columns: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     time: int | None = None
     nanoseconds: int | None = None
@@ -115,28 +119,30 @@ class ColumnMapping:
         numbers = tuple(each.column for each in self.columns.values() if isinstance(each.column, int))
         return numbers if len(numbers) == len(self.columns) else ()
 
-    def applied(self, header: Header, known: Collection[str] | None, file: str) -> ChosenColumns:
+    def choose_columns(
+        self, header: Header, readable_names: Collection[str] | None, file: str
+    ) -> ChosenColumns:
         """Return the columns of a table to read.
 
         Args:
             header: header of the table.
-            known: names of columns to read; all if None.
+            readable_names: names of columns to read; all if None.
             file: path for errors.
 
         Raises:
             InputError: a column is missing, ambiguous, or mapped twice.
         """
-        return _Choice(self, header, known, file).made()
+        return _ColumnSelection(self, header, readable_names, file).select()
 
-    def joined(self, other: ColumnMapping) -> ColumnMapping:
+    def combined_with(self, other: ColumnMapping) -> ColumnMapping:
         """Return the combination of two mappings of the same file.
 
         Raises:
             InputError: the mappings contradict each other.
         """
         for name, source in other.columns.items():
-            mine = self.columns.get(name, source)
-            if dataclasses.replace(mine, place=source.place) != source:
+            source_above = self.columns.get(name, source)
+            if dataclasses.replace(source_above, place=source.place) != source:
                 file, line = source.place
                 raise InputError.one(
                     f"columns: {name} is mapped to another column of the same file above", file, line
@@ -151,21 +157,21 @@ AS_NAMED = ColumnMapping()
 """A mapping that reads each column under its own name."""
 
 
-class _Choice:
+class _ColumnSelection:
     """Selection of columns from a header, with the problems of the mapping."""
 
     def __init__(
-        self, mapping: ColumnMapping, header: Header, known: Collection[str] | None, file: str
+        self, mapping: ColumnMapping, header: Header, readable_names: Collection[str] | None, file: str
     ) -> None:
-        self._mapping, self._header, self._known = mapping, header, known
+        self._mapping, self._header, self._readable_names = mapping, header, readable_names
         self._file = file
         self._problems: list[Problem] = []
 
-    def made(self) -> ChosenColumns:
-        mapped = dict(self._mapped())
-        nanoseconds = self._nanoseconds()
+    def select(self) -> ChosenColumns:
+        mapped = dict(self._assigned_columns())
+        nanoseconds = self._find_nanoseconds()
         used = dict(mapped)
-        others: list[str] = []
+        unknown_columns: list[str] = []
         ignored: list[str] = []
         for place, heading in enumerate(self._header.columns):
             if place in mapped or place == nanoseconds:
@@ -173,10 +179,10 @@ class _Choice:
             name = split_heading(heading)[0]
             if self._is_ignored(place, heading):
                 ignored.append(heading)
-            elif self._known is None or name in self._known:
+            elif self._readable_names is None or name in self._readable_names:
                 used[place] = (heading, 1.0)
             else:
-                (ignored if self._mapping.ignore == REST else others).append(heading)
+                (ignored if self._mapping.ignore == REST else unknown_columns).append(heading)
         self._note_repeated(heading for heading, _ in used.values())
         if self._problems:
             raise InputError(self._problems)
@@ -184,35 +190,39 @@ class _Choice:
         headings = tuple(used[place][0] for place in places)
         time = next((place for place in places if split_heading(used[place][0])[0] == TIME), None)
         factors = tuple(used[place][1] for place in places)
-        return ChosenColumns(places, headings, factors, tuple(others), tuple(ignored), time, nanoseconds)
+        return ChosenColumns(
+            places, headings, factors, tuple(unknown_columns), tuple(ignored), time, nanoseconds
+        )
 
-    def _mapped(self) -> Iterator[tuple[int, tuple[str, float]]]:
+    def _assigned_columns(self) -> Iterator[tuple[int, tuple[str, float]]]:
         """Yield position, new heading and factor of each mapped column."""
-        taken: dict[int, str] = {}
+        names_by_place: dict[int, str] = {}
         for name, source in self._mapping.columns.items():
-            if self._known is not None and name not in self._known:
-                self._note(source, f"unknown name {name!r}{did_you_mean(name, self._known)}")
+            if self._readable_names is not None and name not in self._readable_names:
+                self._note(source, f"unknown name {name!r}{did_you_mean(name, self._readable_names)}")
                 continue
-            place = self._place(source.column, source)
+            place = self._find_place(source.column, source)
             if place is None:
                 continue
-            own = self._header.columns[place]
-            unit = source.doubt(own)
-            if place in taken:
-                self._note(source, f"{own or source.column!r} is already mapped to {taken[place]}")
+            file_heading = self._header.columns[place]
+            unit = source.undeclared_unit(file_heading)
+            if place in names_by_place:
+                self._note(
+                    source, f"{file_heading or source.column!r} is already mapped to {names_by_place[place]}"
+                )
             elif unit is not None:
-                self._note(source, _unit_advice(name, own, unit))
+                self._note(source, _unit_advice(name, file_heading, unit))
             else:
-                taken[place] = name
-                yield place, (source.heading(name, own), source.factor)
+                names_by_place[place] = name
+                yield place, (source.heading(name, file_heading), source.factor)
 
-    def _nanoseconds(self) -> int | None:
+    def _find_nanoseconds(self) -> int | None:
         source = self._mapping.columns.get(TIME)
         if source is None or source.nanoseconds is None:
             return None
-        return self._place(source.nanoseconds, source)
+        return self._find_place(source.nanoseconds, source)
 
-    def _place(self, column: str | int, source: MappedColumn) -> int | None:
+    def _find_place(self, column: str | int, source: MappedColumn) -> int | None:
         """Return the position of a column; note a problem and return None if it is missing or ambiguous."""
         names = self._header.columns
         if isinstance(column, int):
@@ -255,6 +265,6 @@ class _Choice:
         self._problems.append(Problem(*source.place, f"columns: {message}"))
 
 
-def _unit_advice(name: str, own: str, unit: str) -> str:
-    say = f"{name}: {{column: {own!r}, unit: {unit}}}"
-    return f"{own!r} speaks of {unit}; if its numbers are, write {say}, else their unit"
+def _unit_advice(name: str, file_heading: str, unit: str) -> str:
+    mapping_text = f"{name}: {{column: {file_heading!r}, unit: {unit}}}"
+    return f"{file_heading!r} speaks of {unit}; if its numbers are, write {mapping_text}, else their unit"

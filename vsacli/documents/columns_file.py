@@ -46,7 +46,7 @@ class ColumnName(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return a text, or an integer if the node is a whole number without quotes."""
-        if isinstance(node, tree.Scalar) and node.plain and node.text.isdecimal():
+        if isinstance(node, tree.TextNode) and node.plain and node.text.isdecimal():
             return int(node.text)
         return read_text(self, node, label, scope)
 
@@ -94,20 +94,22 @@ class Columns(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return `ColumnSource` records by name."""
-        if not isinstance(node, tree.Mapping) or not node.entries:
+        if not isinstance(node, tree.MapNode) or not node.entries:
             return scope.unexpected(node, "a mapping such as {time: stamp, elbow.q: position}", label)
-        found = {name: self._source(entry, f"{label}.{name}", scope) for name, entry in node.entries.items()}
-        if INVALID in found.values():
+        sources = {
+            name: self._source(entry, f"{label}.{name}", scope) for name, entry in node.entries.items()
+        }
+        if INVALID in sources.values():
             return INVALID
         return {
             name: construct_unchecked(
                 ColumnSource, {**vars(source), "place": (scope.problems.file, node.key_lines[name])}
             )
-            for name, source in found.items()
+            for name, source in sources.items()
         }
 
     def _source(self, node: Node, label: str, scope: Scope) -> Any:
-        if isinstance(node, tree.Mapping):
+        if isinstance(node, tree.MapNode):
             return read_record(ColumnSource, node, label, scope)
         column = ColumnName().read(node, label, scope)
         if column == 0:
@@ -137,9 +139,9 @@ class Ignored(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return the word `REST`, or a tuple of names."""
-        if isinstance(node, tree.Sequence):
+        if isinstance(node, tree.ListNode):
             return tree.all_valid([ColumnName().read(item, label, scope) for item in node.items])
-        if isinstance(node, tree.Scalar) and node.text == REST:
+        if isinstance(node, tree.TextNode) and node.text == REST:
             return REST
         return scope.unexpected(node, f"{REST} or a list of columns", label)
 
@@ -199,17 +201,17 @@ def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
     )
 
 
-def checked_rate(given: Any) -> float:
+def parse_rate(rate_or_text: Any) -> float:
     """Return rows per second, given as a number or as a text in the form used in files.
 
     Raises:
         InputError: the rate is not a positive number.
     """
     try:
-        rate = evaluate(given, "1/s") if isinstance(given, str) else float(given)
+        rate = evaluate(rate_or_text, "1/s") if isinstance(rate_or_text, str) else float(rate_or_text)
     except (ExpressionError, TypeError, ValueError):
         rate = math.nan
     if not 0 < rate <= LARGEST:
-        shown = f"{given:g}" if isinstance(given, float) else given
+        shown = f"{rate_or_text:g}" if isinstance(rate_or_text, float) else rate_or_text
         raise InputError.one(f"rate: must be a positive number of samples per second, not {shown}")
     return rate

@@ -12,15 +12,15 @@ from vsacli.base.texts import on_one_line
 from vsacli.base.units import DIMENSIONLESS
 from vsacli.documents.fields import (
     REQUIRED,
-    Choice,
     Field,
     Interval,
     Items,
-    Kind,
     OneOf,
-    Pair,
-    Record,
-    declared,
+    PairOf,
+    RecordOf,
+    ValueKind,
+    WordChoice,
+    declared_fields,
     variant_inside,
 )
 
@@ -31,14 +31,14 @@ COMMENT_COLUMN = 44
 WIDTH = 110
 
 
-class _Line(NamedTuple):
+class _YamlLine(NamedTuple):
     """A line: its text, a comment on it, and whether it is active or commented out."""
 
     text: str
     comment: str = ""
     active: bool = True
 
-    def inside(self, indent: str = "  ") -> _Line:
+    def inside(self, indent: str = "  ") -> _YamlLine:
         return self._replace(text=indent + self.text)
 
 
@@ -58,12 +58,12 @@ def commented_document(
         head: lines of the comment at the top.
         sources: where a reader finds the value of a field, by `Class.field`; each text is said once.
     """
-    lines = [_Line(f"format: {format_name}"), *_Commented(sources).record(cls, values, "")]
+    lines = [_YamlLine(f"format: {format_name}"), *_Commented(sources).record(cls, values, "")]
     comments = [f"# {line}".rstrip() for line in head]
-    return "\n".join([*comments, *(text for line in lines for text in _rendered(line))]) + "\n"
+    return "\n".join([*comments, *(text for line in lines for text in _wrap_comment(line))]) + "\n"
 
 
-def _rendered(line: _Line) -> Iterator[str]:
+def _wrap_comment(line: _YamlLine) -> Iterator[str]:
     """Yield a line and its wrapped comment, next to it or, if the line is long, before it."""
     text = line.text if line.active else f"# {line.text}"
     comments = [f"# {part}" for part in textwrap.wrap(line.comment, WIDTH - COMMENT_COLUMN - 2)]
@@ -85,80 +85,88 @@ class _Commented:
 
     def __init__(self, sources: Mapping[str, str]) -> None:
         self._sources = sources
-        self._said: set[str] = set()
+        self._stated_sources: set[str] = set()
         self._explained: set[tuple[type, str]] = set()
-        self._again = False
+        self._in_later_entry = False
 
-    def record(self, cls: type, values: Values, variant: str) -> Iterator[_Line]:
+    def record(self, cls: type, values: Values, variant: str) -> Iterator[_YamlLine]:
         """Yield all fields of a record; fields without a value are inactive and show their defaults."""
         variant = variant_inside(cls, values.get(getattr(cls, "unit_variant", "")), variant) or variant
-        for name, (field, default) in declared(cls).items():
-            known = self._again and (cls, name) in self._explained
+        for name, (field, default) in declared_fields(cls).items():
+            explained_before = self._in_later_entry and (cls, name) in self._explained
             self._explained.add((cls, name))
-            comment = "" if known else self._comment(cls, name, field, variant)
+            comment = "" if explained_before else self._comment(cls, name, field, variant)
             if name in values:
-                yield from self._given(field.kind, name, values[name], comment, variant)
+                yield from self._field_with_value(field.kind, name, values[name], comment, variant)
             elif default is REQUIRED:
                 raise KeyError(f"{cls.__name__} needs a value of {name}")
-            elif not known:
-                yield from self._optional(field, name, default, comment, variant)
+            elif not explained_before:
+                yield from self._field_without_value(field, name, default, comment, variant)
 
-    def _given(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_Line]:
+    def _field_with_value(
+        self, kind: ValueKind, name: str, value: Any, comment: str, variant: str
+    ) -> Iterator[_YamlLine]:
         """Yield a field with a value, in one line if all inside is explained already."""
         first, *inside = self._field(kind, name, value, comment, variant)
-        if inside and self._again and all(line.active and not line.comment for line in inside):
-            yield _Line(f"{name}: {on_one_line(value)}", comment)
+        if inside and self._in_later_entry and all(line.active and not line.comment for line in inside):
+            yield _YamlLine(f"{name}: {on_one_line(value)}", comment)
         else:
             yield first
             yield from inside
 
-    def _optional(self, field: Field, name: str, default: Any, comment: str, variant: str) -> Iterator[_Line]:
+    def _field_without_value(
+        self, field: Field, name: str, default: Any, comment: str, variant: str
+    ) -> Iterator[_YamlLine]:
         """Yield a field without a value, inactive; of a record its example."""
-        if not isinstance(field.kind, Record):
-            yield _Line(f"{name}: {_default(default)}".rstrip(), comment, active=False)
+        if not isinstance(field.kind, RecordOf):
+            yield _YamlLine(f"{name}: {_format_default(default)}".rstrip(), comment, active=False)
             return
         example: Values = {} if default is not None else field.kind.records[""].example(variant)  # type: ignore[attr-defined]
-        lines = self._given(field.kind, name, example, comment, variant)
+        lines = self._field_with_value(field.kind, name, example, comment, variant)
         yield from (line._replace(active=False) for line in lines)
 
-    def _field(self, kind: Kind, name: str, value: Any, comment: str, variant: str) -> Iterator[_Line]:
+    def _field(
+        self, kind: ValueKind, name: str, value: Any, comment: str, variant: str
+    ) -> Iterator[_YamlLine]:
         """Yield a field for a value in the form used in files; nested fields are indented."""
         match kind:
-            case Pair(item):
+            case PairOf(item):
                 yield from self._field(item, name, value, comment, variant)
-            case Record(cls):
-                yield _Line(f"{name}:", comment)
+            case RecordOf(cls):
+                yield _YamlLine(f"{name}:", comment)
                 yield from (line.inside() for line in self.record(cls, value, variant))
             case OneOf(variants):
                 chosen = value["type"]
-                others = ", ".join(word for word in variants if word != chosen)
-                yield _Line(f"{name}:", comment)
-                yield _Line(f"type: {chosen}", f"or {others}" if others and comment else "").inside()
+                other_types = ", ".join(word for word in variants if word != chosen)
+                yield _YamlLine(f"{name}:", comment)
+                yield _YamlLine(
+                    f"type: {chosen}", f"or {other_types}" if other_types and comment else ""
+                ).inside()
                 yield from (line.inside() for line in self.record(variants[chosen], value, variant))
             case Items() if kind.records or isinstance(value[0], list):
-                yield _Line(f"{name}:", comment)
+                yield _YamlLine(f"{name}:", comment)
                 yield from self._entries(kind, value, variant)
             case _:
-                yield _Line(f"{name}: {on_one_line(value)}", comment)
+                yield _YamlLine(f"{name}: {on_one_line(value)}", comment)
 
-    def _entries(self, kind: Items, values: Any, variant: str) -> Iterator[_Line]:
+    def _entries(self, kind: Items, values: Any, variant: str) -> Iterator[_YamlLine]:
         """Yield lists as one line each, and the keys of records."""
         if not kind.records:
-            yield from (_Line(f"- {on_one_line(entry)}").inside() for entry in values)
+            yield from (_YamlLine(f"- {on_one_line(entry)}").inside() for entry in values)
             return
-        outside = self._again
+        outside = self._in_later_entry
         for value in values:
             head, *rest = self.record(kind.records[""], value, variant)
             yield head.inside("- ").inside()
             yield from (line.inside().inside() for line in rest)
-            self._again = True
-        self._again = outside
+            self._in_later_entry = True
+        self._in_later_entry = outside
 
     def _comment(self, cls: type, name: str, field: Field, variant: str) -> str:
         """Return unit and meaning of a field, its forms where they are not obvious, and its source."""
         unit = field.quantity.unit(variant) if variant else str(field.quantity)
         match field.kind:
-            case Choice(options=options):
+            case WordChoice(options=options):
                 forms = f" ({' or '.join(options)})"
             case Interval():
                 forms = " ([lower, upper] or one number)"
@@ -166,13 +174,13 @@ class _Commented:
                 forms = ""
         meaning = f"{field.doc}{forms}" if unit == str(DIMENSIONLESS) else f"{unit}; {field.doc}{forms}"
         source = self._sources.get(f"{cls.__name__}.{name}", "")
-        if not source or source in self._said:
+        if not source or source in self._stated_sources:
             return meaning
-        self._said.add(source)
+        self._stated_sources.add(source)
         return f"{meaning}. {source}"
 
 
-def _default(default: Any) -> str:
+def _format_default(default: Any) -> str:
     """Return a default in the form used in files; empty if it has none."""
     numbers = default if isinstance(default, tuple) else (default,)
     if all(isinstance(number, int | float) and math.isfinite(number) for number in numbers):

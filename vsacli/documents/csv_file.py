@@ -45,7 +45,7 @@ CHUNK = 1_000_000
 """Bytes per read."""
 MAX_KINDS = 10
 """Maximum number of kinds of problems to report."""
-MAX_ALIKE = 1000
+MAX_SIMILAR = 1000
 """Number of problems of one kind after which reading stops."""
 MISSING = frozenset(("", *["nan", "+nan", "-nan", "nan(ind)", "-nan(ind)", "na", "n/a", "null", "none"]))
 """Cells without a number, in lower case, as C compilers, spreadsheets and statistics programs write them."""
@@ -142,13 +142,13 @@ def header_of(
     file.detach()
     text = line.partition(COMMENT)[0]
     separator = separator_of(text)
-    columns = tuple(cell.strip() for cell in cells_of(text.rstrip("\r\n"), separator))
+    columns = tuple(cell.strip() for cell in split_cells(text.rstrip("\r\n"), separator))
     numbers = [is_number(cell.replace(",", "," if separator == "," else ".")) for cell in columns]
     if numbered and all(numbers[place - 1] for place in numbered if place <= len(columns)):
         return Header(0, separator, ("",) * len(columns), frozenset(skipped))
     number = number if line else 0
-    found = _header_problems(line, columns, comment, strict)
-    problems = [Problem(name, number, message) for message in found]
+    messages = _header_problems(line, columns, comment, strict)
+    problems = [Problem(name, number, message) for message in messages]
     if problems:
         raise InputError(problems)
     return Header(number, separator, columns, frozenset(skipped))
@@ -161,7 +161,7 @@ def separator_of(line: str) -> str:
     return next((mark for mark in SEPARATORS if mark in bare), blanks)
 
 
-def cells_of(line: str, separator: str) -> list[str]:
+def split_cells(line: str, separator: str) -> list[str]:
     """Return the cells of a line, without quotes."""
     if separator == BLANKS:
         return [cell.replace(QUOTE, "") for cell in _BETWEEN_BLANKS.findall(line)]
@@ -191,7 +191,7 @@ def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: 
     elif len(line) == MAX_HEADER:
         yield f"{HEADER}, found more than {MAX_HEADER} characters without a line break"
     elif all(is_number(column) for column in columns):
-        yield f"{HEADER}, found numbers{_advice(comment)}"
+        yield f"{HEADER}, found numbers{_advise_on_numeric_header(comment)}"
     elif _KEY.match(line):
         yield f"{HEADER}, found YAML, {line.strip()[:40]!r}; rename the file to .yaml"
     elif strict:
@@ -200,13 +200,13 @@ def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: 
         yield from (f"column {column!r} appears {n} times" for column, n in repeated.items() if n > 1)
 
 
-def _advice(comment: int) -> str:
+def _advise_on_numeric_header(comment: int) -> str:
     if comment:
         return f"; if line {comment} is meant, remove its {COMMENT!r}"
     return "; without one, columns are given by their numbers, as in columns: {time: 1, elbow.q: 2}"
 
 
-class Rows(NamedTuple):
+class RowsToRead(NamedTuple):
     """The part of a file to read.
 
     Attributes:
@@ -238,7 +238,7 @@ class Rows(NamedTuple):
         """
         count = len(self.header.columns)
         for number, line in self.lines():
-            cells = cells_of(line, self.header.separator)
+            cells = split_cells(line, self.header.separator)
             if len(cells) != count:
                 raise InputError.one(wrong_count(count, len(cells)), self.path, number)
             yield number, cells
@@ -249,12 +249,12 @@ class Rows(NamedTuple):
             yield from filled_lines(file, self.header)
 
 
-def wrong_count(expected: int, found: int) -> str:
+def wrong_count(expected: int, count: int) -> str:
     """Return the problem of a row with another number of values than the header."""
-    return f"expected {counted(expected, 'value')}, one for each column of the header, found {found}"
+    return f"expected {counted(expected, 'value')}, one for each column of the header, found {count}"
 
 
-def of_columns(problems: Iterable[tuple[str, str]]) -> Iterator[str]:
+def group_column_problems(problems: Iterable[tuple[str, str]]) -> Iterator[str]:
     """Yield each problem once, after the names of all columns that have it.
 
     Args:
@@ -276,7 +276,7 @@ def filled_lines(file: Iterable[str], header: Header) -> Iterator[tuple[int, str
             yield number, content
 
 
-def read_numbers(rows: Rows) -> FloatArray:
+def read_numbers(rows: RowsToRead) -> FloatArray:
     """Return the numbers of the columns used, (rows, columns).
 
     NumPy's C reader is used; only if it fails, or meets anything unusual, each line is parsed.
@@ -286,23 +286,23 @@ def read_numbers(rows: Rows) -> FloatArray:
     """
     values, reason = np.empty((0, 0)), None
     if not rows.header.interrupted and (rows.all_used or _is_regular(rows)):
-        values, reason = _loaded(rows, float)
+        values, reason = _load_with_numpy(rows, float)
     if not values.size:
-        values, reason = _loaded(rows, float, _cleaned(rows))
+        values, reason = _load_with_numpy(rows, float, _normalized_rows(rows))
     odd = np.isinf(values) if rows.empty_cells else ~np.isfinite(values)
     if values.shape[1] == len(rows.used) and not odd.any():
         return values
     raise InputError(_row_problems(rows) or [Problem(rows.path, 0, f"cannot be read: {reason}")])
 
 
-def read_integers(rows: Rows) -> npt.NDArray[np.int64] | None:
+def read_integers(rows: RowsToRead) -> npt.NDArray[np.int64] | None:
     """Return the columns used as 64-bit integers, (rows, columns); None if they are not whole numbers."""
-    integers, _ = _loaded(rows, np.int64, _cleaned(rows))
+    integers, _ = _load_with_numpy(rows, np.int64, _normalized_rows(rows))
     return integers if integers.size else None
 
 
-def _loaded(
-    rows: Rows, kind: npt.DTypeLike, cleaned: Iterable[str] | None = None
+def _load_with_numpy(
+    rows: RowsToRead, kind: npt.DTypeLike, cleaned: Iterable[str] | None = None
 ) -> tuple[npt.NDArray[Any], object]:
     """Return the rows of the file, or of cleaned lines, and the reason if there are none."""
     header, used = rows.header, None if rows.all_used else rows.used
@@ -328,7 +328,7 @@ def _loaded(
     return values, "its rows are not those of a table"
 
 
-def _is_regular(rows: Rows) -> bool:
+def _is_regular(rows: RowsToRead) -> bool:
     """Return whether each line has as many cells as the header, so that columns can be picked by position.
 
     NumPy's reader does not count the cells that it skips. Lines with quotes or comments are parsed one by
@@ -361,11 +361,11 @@ class _IrregularError(Exception):
     """A row that does not belong to the table."""
 
 
-def _cleaned(rows: Rows) -> Iterator[str]:
+def _normalized_rows(rows: RowsToRead) -> Iterator[str]:
     """Yield rows of the cells used, with points for decimal commas, and `nan` in empty cells."""
     header, decimals = rows.header, _Decimals(rows.header.separator)
     for _, line in rows.lines():
-        cells = cells_of(line, header.separator)
+        cells = split_cells(line, header.separator)
         if len(cells) != len(header.columns):
             raise _IrregularError(line)
         used = [cells[place].strip() for place in rows.used]  # also tabs, the separator of the result
@@ -392,38 +392,42 @@ class _Decimals:
         return cell.replace(",", ".")
 
 
-def _row_problems(rows: Rows) -> list[Problem]:
+def _row_problems(rows: RowsToRead) -> list[Problem]:
     """Return the first problem of each kind, with the number of similar problems."""
-    alike: dict[str, list[Problem]] = {}
+    problems_by_kind: dict[str, list[Problem]] = {}
     empty, decimals = True, _Decimals(rows.header.separator)
     for number, line in rows.lines():
         empty = False
         for kind, message in _cell_problems(rows, line, decimals.with_points):
-            alike.setdefault(kind, []).append(Problem(rows.path, number, message))
-        if len(alike) > MAX_KINDS or any(len(found) >= MAX_ALIKE for found in alike.values()):
+            problems_by_kind.setdefault(kind, []).append(Problem(rows.path, number, message))
+        if len(problems_by_kind) > MAX_KINDS or any(
+            len(similar) >= MAX_SIMILAR for similar in problems_by_kind.values()
+        ):
             break
     if empty:
         return [Problem(rows.path, 0, "has a header but no rows of values")]
-    problems = [_summary(found) for found in list(alike.values())[:MAX_KINDS]]
-    if len(alike) > MAX_KINDS:
+    problems = [_first_with_count(similar) for similar in list(problems_by_kind.values())[:MAX_KINDS]]
+    if len(problems_by_kind) > MAX_KINDS:
         problems.append(
             Problem(rows.path, 0, f"more than {MAX_KINDS} kinds of problems; reading stopped there")
         )
     return problems
 
 
-def _summary(found: list[Problem]) -> Problem:
-    first, count = found[0], len(found)
+def _first_with_count(similar: list[Problem]) -> Problem:
+    first, count = similar[0], len(similar)
     if count == 1:
         return first
-    number = f"{count}" if count < MAX_ALIKE else f"{count} or more"
+    number = f"{count}" if count < MAX_SIMILAR else f"{count} or more"
     return Problem(first.file, first.line, f"{first.message} (the first of {number} such lines)")
 
 
-def _cell_problems(rows: Rows, line: str, with_point: Callable[[str], str]) -> Iterator[tuple[str, str]]:
+def _cell_problems(
+    rows: RowsToRead, line: str, with_point: Callable[[str], str]
+) -> Iterator[tuple[str, str]]:
     """Yield kind and message of each problem of a row."""
     separator, count = rows.header.separator, len(rows.header.columns)
-    cells = cells_of(line, separator)
+    cells = split_cells(line, separator)
     if len(cells) != count:
         doubled = separator == "," and len(cells) == 2 * count
         hint = "; with decimal commas, semicolons or tabs stand between the columns" if doubled else ""

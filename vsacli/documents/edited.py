@@ -44,7 +44,7 @@ def edited(text: str, values: Mapping[str, Any]) -> str:
         InputError: a path does not exist, or leads through an alias, so that its anchor would change as well.
     """
     root = root_of(text)
-    edits = (_edit(root, tuple(path.split(".")), value) for path, value in values.items())
+    edits = (_locate_edit(root, tuple(path.split(".")), value) for path, value in values.items())
     for start, end, replacement in sorted(edits, reverse=True):
         text = text[:start] + replacement + text[end:]
     return text
@@ -61,14 +61,14 @@ def moved_files(text: str, origin: Path, folder: Path) -> Iterator[tuple[str, st
 def node_at(root: yaml.Node, path: str) -> yaml.Node | None:
     """Return the node at a path; None if there is none."""
     words = path.split(".")
-    nodes = list(_along(root, words))
+    nodes = list(_nodes_along(root, words))
     return nodes[-1] if len(nodes) == len(words) else None
 
 
-def _along(node: yaml.Node | None, words: Iterable[str]) -> Iterator[yaml.Node]:
+def _nodes_along(node: yaml.Node | None, words: Iterable[str]) -> Iterator[yaml.Node]:
     """Yield the nodes along a path, as far as they exist."""
     for word in words:
-        node = None if node is None else dict(_entries(node)).get(word)
+        node = None if node is None else dict(_children_by_word(node)).get(word)
         if node is None:
             return
         yield node
@@ -87,13 +87,13 @@ def root_of(text: str) -> yaml.Node:
 
 
 def _texts_at(node: yaml.Node, key: str, place: _Words) -> Iterator[tuple[str, str]]:
-    for word, entry in _entries(node):
+    for word, entry in _children_by_word(node):
         if word == key and isinstance(entry, yaml.ScalarNode):
             yield ".".join((*place, word)), entry.value
         yield from _texts_at(entry, key, (*place, word))
 
 
-def _entries(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
+def _children_by_word(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
     """Yield the entries of a node, each with the path word that leads to it."""
     if isinstance(node, yaml.MappingNode):
         yield from ((key.value, entry) for key, entry in node.value)
@@ -101,39 +101,39 @@ def _entries(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
         yield from ((str(index), entry) for index, entry in enumerate(node.value))
 
 
-def _edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
+def _locate_edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, str]:
     """Return start and end of a span of the text, and its replacement."""
-    *way, key = words
+    *parent_words, key = words
     node = root
-    for word in way:
-        found = dict(_entries(node)).get(word)
-        if found is None:
+    for word in parent_words:
+        child = dict(_children_by_word(node)).get(word)
+        if child is None:
             raise InputError.one(f"{'.'.join(words)}: there is no {word!r}")
-        if not node.start_mark.index <= found.start_mark.index < node.end_mark.index:
+        if not node.start_mark.index <= child.start_mark.index < node.end_mark.index:
             raise InputError.one(f"{'.'.join(words)}: {word!r} is an alias, which others share")
-        node = found
-    here = dict(_entries(node)).get(key)
-    if here is not None:
-        return _replacement(node, here, _written(value))
+        node = child
+    entry = dict(_children_by_word(node)).get(key)
+    if entry is not None:
+        return _replacement(node, entry, _format_on_one_line(value))
     if not isinstance(node, yaml.MappingNode):
         raise InputError.one(f"{'.'.join(words)}: there is no {key!r}")
-    return _insertion(node, f"{key}: {_written(value)}")
+    return _insertion(node, f"{key}: {_format_on_one_line(value)}")
 
 
-def _replacement(node: yaml.Node, here: yaml.Node, written: str) -> tuple[int, int, str]:
+def _replacement(node: yaml.Node, replaced: yaml.Node, written: str) -> tuple[int, int, str]:
     """Return the edit that replaces an entry of a node; a block value is replaced from its key on."""
-    block = isinstance(here, yaml.CollectionNode) and not here.flow_style
+    block = isinstance(replaced, yaml.CollectionNode) and not replaced.flow_style
     if block and isinstance(node, yaml.MappingNode):
-        key = next(key for key, entry in node.value if entry is here)
-        return key.end_mark.index, _end(here), f": {written}"
-    return here.start_mark.index, _end(here), written
+        key = next(key for key, entry in node.value if entry is replaced)
+        return key.end_mark.index, _end_of_text(replaced), f": {written}"
+    return replaced.start_mark.index, _end_of_text(replaced), written
 
 
-def _end(node: yaml.Node) -> int:
+def _end_of_text(node: yaml.Node) -> int:
     """Return where the text of a node ends; a block ends with its last entry."""
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
-        return _end(last[1] if isinstance(last, tuple) else last)
+        return _end_of_text(last[1] if isinstance(last, tuple) else last)
     return node.end_mark.index
 
 
@@ -144,15 +144,15 @@ def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
     return start, start, f"{entry}, " if node.flow_style else f"{entry}\n{' ' * first.column}"
 
 
-def _written(value: Any) -> str:
+def _format_on_one_line(value: Any) -> str:
     """Return a value on one line: identifiers plain, other texts in quotes."""
     match value:
         case Mapping():
-            return "{" + ", ".join(f"{key}: {_written(each)}" for key, each in value.items()) + "}"
+            return "{" + ", ".join(f"{key}: {_format_on_one_line(each)}" for key, each in value.items()) + "}"
         case str():
             return value if value.isidentifier() else for_yaml(value)
         case list():
-            return "[" + ", ".join(map(_written, value)) + "]"
+            return "[" + ", ".join(map(_format_on_one_line, value)) + "]"
     return json.dumps(value)
 
 
@@ -163,45 +163,45 @@ def unaliased(text: str, paths: Iterable[str]) -> str:
         text: valid YAML document.
         paths: words joined by dots, entries of lists by index; paths that do not exist are ignored.
     """
-    ways = [tuple(path.split(".")) for path in paths]
+    paths_in_words = [tuple(path.split(".")) for path in paths]
     while True:
-        shared = _shared(text, ways)
+        shared = _aliases_along(text, paths_in_words)
         if not shared:
             return text
         for start, end, node in sorted(shared, key=lambda alias: alias[0], reverse=True):
-            text = text[:start] + _flow(text, node) + text[end:]
+            text = text[:start] + _flow_style(text, node) + text[end:]
 
 
-def _shared(text: str, ways: Iterable[tuple[str, ...]]) -> list[tuple[int, int, yaml.Node]]:
+def _aliases_along(text: str, paths: Iterable[tuple[str, ...]]) -> list[tuple[int, int, yaml.Node]]:
     """Return start, end and node of each alias whose node lies on one of the paths."""
     root = root_of(text)
-    nodes = {node.start_mark.index: node for way in ways for node in _along(root, way)}
+    nodes = {node.start_mark.index: node for path in paths for node in _nodes_along(root, path)}
     anchors: dict[str, yaml.Node] = {}
-    found = []
+    aliases = []
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         if isinstance(event, yaml.AliasEvent):
             if event.anchor in anchors:
-                found.append((*_place(event), anchors[event.anchor]))
-        elif isinstance(event, yaml.NodeEvent) and event.anchor and _place(event)[0] in nodes:
-            anchors[event.anchor] = nodes[_place(event)[0]]
-    return found
+                aliases.append((*_event_span(event), anchors[event.anchor]))
+        elif isinstance(event, yaml.NodeEvent) and event.anchor and _event_span(event)[0] in nodes:
+            anchors[event.anchor] = nodes[_event_span(event)[0]]
+    return aliases
 
 
-def _place(event: yaml.Event) -> tuple[int, int]:
+def _event_span(event: yaml.Event) -> tuple[int, int]:
     """Return start and end of an event in the text."""
     assert event.start_mark is not None, "as of every event of a text"
     assert event.end_mark is not None, "likewise"
     return event.start_mark.index, event.end_mark.index
 
 
-def _flow(text: str, node: yaml.Node) -> str:
+def _flow_style(text: str, node: yaml.Node) -> str:
     """Return a node on one line, with its scalars as written."""
     if isinstance(node, yaml.MappingNode):
-        return "{" + ", ".join(f"{key.value}: {_flow(text, value)}" for key, value in node.value) + "}"
+        return "{" + ", ".join(f"{key.value}: {_flow_style(text, value)}" for key, value in node.value) + "}"
     if isinstance(node, yaml.SequenceNode):
-        return "[" + ", ".join(_flow(text, value) for value in node.value) + "]"
-    own = text[node.start_mark.index : node.end_mark.index]
-    return own.partition(" ")[2] if own.startswith("&") else own
+        return "[" + ", ".join(_flow_style(text, value) for value in node.value) + "]"
+    node_text = text[node.start_mark.index : node.end_mark.index]
+    return node_text.partition(" ")[2] if node_text.startswith("&") else node_text
 
 
 def with_errors(text: str, errors: Mapping[str, str]) -> str:

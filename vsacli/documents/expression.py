@@ -78,7 +78,7 @@ class Grammar(NamedTuple):
     of_units: bool = False
 
 
-class Step(NamedTuple):
+class ExpressionStep(NamedTuple):
     """An operation.
 
     Attributes:
@@ -97,7 +97,7 @@ class Expression(NamedTuple):
     Equal parts of the text share one step.
     """
 
-    steps: tuple[Step, ...]
+    steps: tuple[ExpressionStep, ...]
 
     @property
     def names(self) -> set[str]:
@@ -137,7 +137,7 @@ def parse(text: str, grammar: Grammar) -> Expression:
     """
     if len(text) > grammar.max_length:
         raise ExpressionError(f"longer than {grammar.max_length} characters")
-    return _Parser(_tokens(text, _UNIT_TOKEN if grammar.of_units else _TOKEN), grammar).parsed()
+    return _Parser(_tokens(text, _UNIT_TOKEN if grammar.of_units else _TOKEN), grammar).parse()
 
 
 class _Token(NamedTuple):
@@ -149,15 +149,15 @@ class _Token(NamedTuple):
 def _tokens(text: str, token: re.Pattern[str]) -> list[_Token]:
     tokens, position = [], 0
     while position < len(text):
-        found = token.match(text, position)
-        if not found:
+        match = token.match(text, position)
+        if not match:
             raise ExpressionError(f"unexpected character {text[position]!r}", position + 1)
-        if found["number"] and re.match(r"0\d", found["number"]):
+        if match["number"] and re.match(r"0\d", match["number"]):
             reason = "a leading zero, which would mean an octal number elsewhere"
             raise ExpressionError(reason, position + 1)
-        if found.lastgroup and not found["space"]:
-            tokens.append(_Token(found.lastgroup, found[0], position + 1))
-        position = found.end()
+        if match.lastgroup and not match["space"]:
+            tokens.append(_Token(match.lastgroup, match[0], position + 1))
+        position = match.end()
     return [*tokens, _Token("end", "", len(text) + 1)]
 
 
@@ -171,7 +171,7 @@ class _Parser:
         self._nesting = 0
         self._steps: dict[Hashable, int] = {}
 
-    def parsed(self) -> Expression:
+    def parse(self) -> Expression:
         """Return the expression of all tokens."""
         self._expression(binding=1)
         if self._next.kind != "end":
@@ -232,8 +232,8 @@ class _Parser:
         if word in self._grammar.functions:
             return self._step(word, self._parentheses(f"( behind {word!r}"))
         if word not in self._grammar.names:
-            known = (*self._grammar.names, *self._grammar.functions)
-            raise ExpressionError(f"unknown word {word!r}", place, did_you_mean(word, known))
+            valid_words = (*self._grammar.names, *self._grammar.functions)
+            raise ExpressionError(f"unknown word {word!r}", place, did_you_mean(word, valid_words))
         return self._step("name", word)
 
     def _parentheses(self, otherwise: str) -> int:
@@ -248,7 +248,7 @@ class _Parser:
 
     def _step(self, operation: str, *operands: Any) -> int:
         """Return the index of a step; equal steps are stored once."""
-        return self._steps.setdefault(Step(operation, operands), len(self._steps))
+        return self._steps.setdefault(ExpressionStep(operation, operands), len(self._steps))
 
     def _take(self) -> _Token:
         token, self._next = self._next, next(self._tokens, self._next)
@@ -369,57 +369,59 @@ def conversion_factor(text: str, expected: str) -> float:
     Raises:
         InputError: the unit is not understood, or has other dimensions.
     """
-    wanted = _parsed(expected)
-    found = size_of_unit(text)
-    if found is None:
-        near = nearest(text, _similar_to(wanted))
-        advice = f"did you mean [{near}]?" if near else _expected(expected)
+    expected_unit = _parse_unit(expected)
+    written_unit = size_of_unit(text)
+    if written_unit is None:
+        near = nearest(text, _units_like(expected_unit))
+        advice = f"did you mean [{near}]?" if near else _expected_unit_clause(expected)
         raise InputError.one(f"unknown unit [{text[: _UNITS.max_length]}]; {advice}")
-    if found.dimensions != wanted.dimensions:
-        raise InputError.one(_other_kind(text, expected))
-    return found.size / wanted.size
+    if written_unit.dimensions != expected_unit.dimensions:
+        raise InputError.one(_wrong_dimensions(text, expected))
+    return written_unit.size / expected_unit.size
 
 
 def size_of_unit(text: str) -> Unit | None:
     """Return the unit of a text; None if it is not understood."""
     try:
-        return _parsed(text)
+        return _parse_unit(text)
     except ExpressionError:
         return None
 
 
 def kind_of_unit(text: str) -> str:
     """Return the kind of quantity that a unit measures, e.g. `a length`; empty if it has no common name."""
-    dimensions = _parsed(text).dimensions
-    return next((kind for unit, kind in _QUANTITIES.items() if _parsed(unit).dimensions == dimensions), "")
+    dimensions = _parse_unit(text).dimensions
+    return next(
+        (kind for unit, kind in _QUANTITIES.items() if _parse_unit(unit).dimensions == dimensions), ""
+    )
 
 
-def _parsed(text: str) -> Unit:
+def _parse_unit(text: str) -> Unit:
     expression = parse(text.translate(_SPELLINGS), _UNITS)
     unit: Unit = expression.value({name: Unit(*BASES[name]) for name in expression.names}, {}, int)
     return unit
 
 
-def _similar_to(unit: Unit) -> list[str]:
+def _units_like(unit: Unit) -> list[str]:
     """Return the symbols of units of the same dimensions."""
     return [symbol for symbol, (_, dimensions) in BASES.items() if dimensions == unit.dimensions]
 
 
-def _expected(unit: str) -> str:
+def _expected_unit_clause(unit: str) -> str:
     """Return a clause with the kind of quantity, and the units in which it can be given."""
-    kind, units = kind_of_unit(unit), joined(dict.fromkeys((unit, *_similar_to(_parsed(unit)))), "or")
+    kind, units = kind_of_unit(unit), joined(dict.fromkeys((unit, *_units_like(_parse_unit(unit)))), "or")
     return f"expected {kind} in {units}" if kind else f"expected {units}"
 
 
-def _other_kind(text: str, expected: str) -> str:
+def _wrong_dimensions(text: str, expected: str) -> str:
     """Return the problem of a unit with other dimensions than the expected one."""
     product = text.replace("/", " ")  # g/cm^2 for g cm^2
-    found = size_of_unit(product)
-    if found is not None and found.dimensions == _parsed(expected).dimensions:
+    product_unit = size_of_unit(product)
+    if product_unit is not None and product_unit.dimensions == _parse_unit(expected).dimensions:
         return f"[{text}] is not {kind_of_unit(expected) or 'of this kind'}; did you mean [{product}]?"
     kind = kind_of_unit(text)
     return (
-        f"[{text}] is {kind}, {_expected(expected)}"
+        f"[{text}] is {kind}, {_expected_unit_clause(expected)}"
         if kind
-        else f"[{text}] does not fit; {_expected(expected)}"
+        else f"[{text}] does not fit; {_expected_unit_clause(expected)}"
     )

@@ -65,7 +65,7 @@ NON_ZERO = Check(
 FINITE = Check(lambda value: abs(value) < math.inf, "finite")
 
 
-class Kind:
+class ValueKind:
     """The kind of a declared value.
 
     Attributes:
@@ -77,13 +77,13 @@ class Kind:
     """
 
     unit: Quantity | None = None
-    item: Kind | None = None
+    item: ValueKind | None = None
     records: Mapping[str, type] = MappingProxyType({})
     per_joint = False
     dims: tuple[str, ...] | None = None
 
 
-class Number(Kind):
+class NumberWithUnit(ValueKind):
     """A number with a unit."""
 
     unit: Quantity
@@ -93,24 +93,24 @@ class Number(Kind):
         self.unit = unit
 
 
-class Share(Number):
+class Share(NumberWithUnit):
     """A share such as `3 %` or `0.03`, read as a fraction."""
 
     def __init__(self) -> None:
         super().__init__(DIMENSIONLESS)
 
 
-class Integer(Kind):
+class Integer(ValueKind):
     """A whole number, read as `int`."""
 
 
-class Boolean(Kind):
+class Boolean(ValueKind):
     """True or false, written as one of these words."""
 
     dims = ()
 
 
-class Text(Kind):
+class Text(ValueKind):
     """A text; `identifier` restricts it to letters, digits, `_` and `-`, starting with a letter or `_`."""
 
     dims = ()
@@ -123,7 +123,7 @@ class Name(Text):
     """A name for titles, messages and comments in code: one printable line."""
 
 
-class Choice(Kind):
+class WordChoice(ValueKind):
     """One of a few words; `words` describes them in the documentation if there are many.
 
     `not_yet` are words of the format that this version does not support.
@@ -135,8 +135,8 @@ class Choice(Kind):
         self.options, self.not_yet, self.words = options, not_yet, words
 
 
-class TableFile(Kind):
-    """Path of a CSV file, relative to the document, read as a `Table` with these columns."""
+class TablePath(ValueKind):
+    """Path of a CSV file, relative to the document, read as a `CsvTable` with these columns."""
 
     dims = ()
 
@@ -144,38 +144,38 @@ class TableFile(Kind):
         self.columns = columns
 
 
-class Vector(Kind):
+class NumberList(ValueKind):
     """A list of `length` numbers, read as a tuple."""
 
     dims = ("axis",)
 
     def __init__(self, length: int, unit: Quantity) -> None:
         self.length, self.unit = length, unit
-        self.item: Number = Number(unit)
+        self.item: NumberWithUnit = NumberWithUnit(unit)
 
 
-class Interval(Kind):
+class Interval(ValueKind):
     """An interval `[lower, upper]`, read as a pair; a scalar x means [-x, x], or [`lowest`, x] if given."""
 
     dims = ("bound",)
 
     def __init__(self, unit: Quantity, lowest: float | None = None) -> None:
         self.unit, self.lowest = unit, lowest
-        self.item: Number = Number(unit)
+        self.item: NumberWithUnit = NumberWithUnit(unit)
 
 
-class NamedNumbers(Kind):
+class NamedNumbers(ValueKind):
     """A mapping from user-defined names to numbers in SI units, read as pairs; angles may be in degrees."""
 
-    number = Number(ANY_SI_UNIT)
+    number = NumberWithUnit(ANY_SI_UNIT)
 
 
-class Items(Kind):
+class Items(ValueKind):
     """A list of one or more values of a kind, read as a tuple; the text field `unique` must differ in all."""
 
-    item: Kind
+    item: ValueKind
 
-    def __init__(self, item: Kind, unique: str | None = None) -> None:
+    def __init__(self, item: ValueKind, unique: str | None = None) -> None:
         self.item, self.unique = item, unique
         self.records, self.per_joint = item.records, item.per_joint
 
@@ -184,21 +184,21 @@ class OneOrMore(Items):
     """One value of a kind, or a list of one or more, read as a tuple."""
 
 
-class Pair(Kind):
+class PairOf(ValueKind):
     """One value for both members of a pair, such as the sides of a joint, or a list of two; read as a pair.
 
     `dim` is the dimension of arrays along which both are stored. Both are the same object if one was written.
     """
 
     __match_args__ = ("item", "dim")
-    item: Kind
+    item: ValueKind
 
-    def __init__(self, item: Kind, dim: str = "motor") -> None:
+    def __init__(self, item: ValueKind, dim: str = "motor") -> None:
         self.item, self.dim = item, dim
         self.records, self.unit = item.records, item.unit
 
 
-class PerJoint(Kind):
+class PerJoint(ValueKind):
     """A scalar for all joints, a list, or a mapping by joint name; read as a tuple with one entry a joint.
 
     Joints exempt from `purpose` are omitted in mappings and null in lists; their entry is None.
@@ -209,10 +209,10 @@ class PerJoint(Kind):
 
     def __init__(self, unit: Quantity, purpose: str = "") -> None:
         self.unit, self.purpose = unit, purpose
-        self.item: Number = Number(unit)
+        self.item: NumberWithUnit = NumberWithUnit(unit)
 
 
-class Record(Kind):
+class RecordOf(ValueKind):
     """A mapping read into the record class `cls`."""
 
     __match_args__ = ("cls",)
@@ -221,8 +221,8 @@ class Record(Kind):
         self.cls, self.records = cls, {"": cls}
 
 
-class OneOf(Kind):
-    """A mapping whose key `type` selects the record class; see `Choice` for `not_yet`."""
+class OneOf(ValueKind):
+    """A mapping whose key `type` selects the record class; see `WordChoice` for `not_yet`."""
 
     __match_args__ = ("records",)
 
@@ -234,7 +234,7 @@ class OneOf(Kind):
         return next(word for word, variant in self.records.items() if type(record) is variant)
 
 
-class OwnKind(Kind, ABC):
+class OwnKind(ValueKind, ABC):
     """A kind declared by a single module, with all tasks; `words` describe it in the documentation."""
 
     words: str
@@ -259,7 +259,7 @@ class OwnKind(Kind, ABC):
 class Field(NamedTuple):
     """A declared field: the kind of its value, a sentence about it, and the condition on each number."""
 
-    kind: Kind
+    kind: ValueKind
     doc: str
     check: Check | None = None
 
@@ -269,7 +269,7 @@ class Field(NamedTuple):
         return self.kind.unit or DIMENSIONLESS
 
 
-def _declared(cls: type) -> Mapping[str, tuple[Field, Any]]:
+def _collect_fields(cls: type) -> Mapping[str, tuple[Field, Any]]:
     return MappingProxyType(
         {
             attribute.name: (attribute.metadata["field"], attribute.default)
@@ -279,7 +279,7 @@ def _declared(cls: type) -> Mapping[str, tuple[Field, Any]]:
     )
 
 
-declared: Callable[[type], Mapping[str, tuple[Field, Any]]] = cache(_declared)
+declared_fields: Callable[[type], Mapping[str, tuple[Field, Any]]] = cache(_collect_fields)
 """Function that returns the fields of a record class in file order, each with its default (or REQUIRED)."""
 
 
@@ -296,10 +296,10 @@ def variant_inside(cls: type, word: Any, variant: str | None) -> str | None:
         return variant
     variants = getattr(cls, "unit_variants", None)
     if variants is not None:
-        known: str | None = variants.get(word, variant)
-        return known
-    kind = declared(cls)[selector][0].kind
-    return str(word) if isinstance(kind, Choice) and word in kind.options else None
+        inner_variant: str | None = variants.get(word, variant)
+        return inner_variant
+    kind = declared_fields(cls)[selector][0].kind
+    return str(word) if isinstance(kind, WordChoice) and word in kind.options else None
 
 
 def _declare(field: Field, default: Any) -> Any:
@@ -308,7 +308,7 @@ def _declare(field: Field, default: Any) -> Any:
 
 def number(unit: Quantity, doc: str, *, check: Check = FINITE, default: Any = REQUIRED) -> Any:
     """Declare a number."""
-    return _declare(Field(Number(unit), doc, check), default)
+    return _declare(Field(NumberWithUnit(unit), doc, check), default)
 
 
 def integer(doc: str, *, check: Check, default: Any = REQUIRED) -> Any:
@@ -330,12 +330,12 @@ def choice(
     options: tuple[str, ...], doc: str, *, default: Any = REQUIRED, not_yet: tuple[str, ...] = ()
 ) -> Any:
     """Declare a choice from a few words."""
-    return _declare(Field(Choice(options, not_yet), doc), default)
+    return _declare(Field(WordChoice(options, not_yet), doc), default)
 
 
 def vector(length: int, unit: Quantity, doc: str, *, default: Any = REQUIRED) -> Any:
     """Declare a list of finite numbers."""
-    return _declare(Field(Vector(length, unit), doc, FINITE), default)
+    return _declare(Field(NumberList(length, unit), doc, FINITE), default)
 
 
 def interval(unit: Quantity, doc: str, *, lowest: float | None = None, default: Any = REQUIRED) -> Any:
@@ -343,6 +343,6 @@ def interval(unit: Quantity, doc: str, *, lowest: float | None = None, default: 
     return _declare(Field(Interval(unit, lowest), doc), default)
 
 
-def value(kind: Kind, doc: str, *, check: Check | None = None, default: Any = REQUIRED) -> Any:
+def value(kind: ValueKind, doc: str, *, check: Check | None = None, default: Any = REQUIRED) -> Any:
     """Declare a nested value: Record, OneOf, Items, Pair or PerJoint; `check` applies to its numbers."""
     return _declare(Field(kind, doc, check), default)

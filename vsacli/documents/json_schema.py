@@ -19,26 +19,26 @@ from vsacli.documents.fields import (
     REQUIRED,
     Boolean,
     Check,
-    Choice,
     Field,
     Integer,
     Interval,
     Items,
-    Kind,
     Name,
     NamedNumbers,
-    Number,
+    NumberList,
+    NumberWithUnit,
     OneOf,
     OneOrMore,
     OwnKind,
-    Pair,
+    PairOf,
     PerJoint,
-    Record,
+    RecordOf,
     Schema,
     Share,
     Text,
-    Vector,
-    declared,
+    ValueKind,
+    WordChoice,
+    declared_fields,
 )
 from vsacli.documents.number import ANGLES, MAX_LENGTH
 
@@ -54,56 +54,60 @@ PRINTABLE = r"^[^\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]+$"
 
 def json_schema(cls: type, format_name: str, title: str) -> Schema:
     """Return the schema of documents read into the record class `cls`, which begin with `format: ...`."""
-    builder = _Builder()
-    document = builder.record(cls, {"format": {"const": format_name}}, ("format",))
+    builder = _SchemaBuilder()
+    document = builder.record_schema(cls, {"format": {"const": format_name}}, ("format",))
     return {"$schema": DIALECT, "title": title, **document, "$defs": builder.definitions}
 
 
-class _Builder:
+class _SchemaBuilder:
     """A builder of record schemas, which are collected in `definitions` and referenced."""
 
     def __init__(self) -> None:
         self.definitions: dict[str, Schema] = {}
 
-    def record(self, cls: type, beside: Mapping[str, Schema], required: tuple[str, ...] = ()) -> Schema:
+    def record_schema(
+        self, cls: type, beside: Mapping[str, Schema], required: tuple[str, ...] = ()
+    ) -> Schema:
         """Return the schema of a mapping with a record class's fields and the further keys `beside`."""
-        fields = declared(cls)
+        fields = declared_fields(cls)
         return {
             "type": "object",
             "properties": {
                 **beside,
-                **{name: self._field(field, default) for name, (field, default) in fields.items()},
+                **{name: self._field_schema(field, default) for name, (field, default) in fields.items()},
             },
             "required": [*required, *(name for name, (_, default) in fields.items() if default is REQUIRED)],
             "additionalProperties": False,
-            **_conditions(getattr(cls, "required_unless", {})),
+            **_required_unless_keywords(getattr(cls, "required_unless", {})),
         }
 
-    def _field(self, field: Field, default: Any) -> Schema:
+    def _field_schema(self, field: Field, default: Any) -> Schema:
         described = field.doc if field.quantity == DIMENSIONLESS else f"{field.doc}, {field.quantity}"
-        shown = _json_value(default)
-        schema = self._value(field.kind, field.check)
+        shown = _json_default(default)
+        schema = self._value_schema(field.kind, field.check)
         return {"description": described, **schema, **({} if shown is None else {"default": shown})}
 
-    def _value(self, kind: Kind, check: Check | None) -> Schema:
+    def _value_schema(self, kind: ValueKind, check: Check | None) -> Schema:
         """Return the schema of values of a kind; their numbers must meet the condition."""
         match kind:
             case OwnKind():
                 return kind.schema(self._reference)
-            case Record(cls):
+            case RecordOf(cls):
                 return self._reference(cls)
             case OneOf(variants):
-                return self._selected(variants)
+                return self._variants_schema(variants)
             case OneOrMore(item=item):
-                return {"anyOf": [self._value(item, check), _list(self._value(item, check))]}
+                return {
+                    "anyOf": [self._value_schema(item, check), _list_schema(self._value_schema(item, check))]
+                }
             case Items(item=item):
-                return _list(self._value(item, check))
-            case Pair(item):
-                one = self._value(item, check)
-                return {"if": {"type": "array"}, "then": _list(one, 2), "else": one}
-        return _single(kind, check) or _of_numbers(kind, check)
+                return _list_schema(self._value_schema(item, check))
+            case PairOf(item):
+                one = self._value_schema(item, check)
+                return {"if": {"type": "array"}, "then": _list_schema(one, 2), "else": one}
+        return _single_value_schema(kind, check) or _numbers_schema(kind, check)
 
-    def _selected(self, variants: Mapping[str, type]) -> Schema:
+    def _variants_schema(self, variants: Mapping[str, type]) -> Schema:
         """Return the schema of a mapping whose `type` selects its other keys."""
         return {
             "type": "object",
@@ -122,11 +126,11 @@ class _Builder:
             self.definitions[name] = {}  # ends the recursion of a record that holds its own class
             beside = {} if word is None else {"type": {"const": word}}
             summary = inspect.cleandoc(cls.__doc__ or "").partition("\n")[0]
-            self.definitions[name] = {"description": summary, **self.record(cls, beside)}
+            self.definitions[name] = {"description": summary, **self.record_schema(cls, beside)}
         return {"$ref": f"#/$defs/{name}"}
 
 
-def _conditions(required_unless: Mapping[str, tuple[str, float]]) -> Schema:
+def _required_unless_keywords(required_unless: Mapping[str, tuple[str, float]]) -> Schema:
     """Return keywords that require keys; expressions, whose values no schema knows, require none."""
     conditions = [
         {
@@ -138,24 +142,24 @@ def _conditions(required_unless: Mapping[str, tuple[str, float]]) -> Schema:
     return {"allOf": conditions} if conditions else {}
 
 
-def _list(item: Schema, length: int | None = None) -> Schema:
+def _list_schema(item: Schema, length: int | None = None) -> Schema:
     """Return the schema of a list with the given length, or of any list that is not empty."""
     if length is None:
         return {"type": "array", "minItems": 1, "items": item}
     return {"type": "array", "items": item, "minItems": length, "maxItems": length}
 
 
-def _single(kind: Kind, check: Check | None) -> Schema:
+def _single_value_schema(kind: ValueKind, check: Check | None) -> Schema:
     """Return the schema of a single value; empty if the kind has several numbers."""
     match kind:
         case Share():
             per_cent = {"type": "string", "pattern": EXPRESSION[:-1] + "%$"}
-            return {"anyOf": [*_number(kind.unit, check)["anyOf"], per_cent]}
-        case Number():
-            return _number(kind.unit, check)
+            return {"anyOf": [*_number_schema(kind.unit, check)["anyOf"], per_cent]}
+        case NumberWithUnit():
+            return _number_schema(kind.unit, check)
         case Integer():
             keywords = {} if check is None else check.keywords
-            return {"anyOf": [{"type": "integer", **keywords}, _expression(EXPRESSION)]}
+            return {"anyOf": [{"type": "integer", **keywords}, _expression_schema(EXPRESSION)]}
         case Boolean():
             return {"type": "boolean"}
         case Name():
@@ -165,42 +169,42 @@ def _single(kind: Kind, check: Check | None) -> Schema:
             return {"type": "string", "pattern": f"^{IDENTIFIER.pattern}$"}
         case Text():
             return {"type": ["string", "number"]}  # YAML may read a text as a number
-        case Choice():
+        case WordChoice():
             return {"enum": list(kind.options)}
     return {}
 
 
-def _of_numbers(kind: Kind, check: Check | None) -> Schema:
+def _numbers_schema(kind: ValueKind, check: Check | None) -> Schema:
     """Return the schema of several numbers, or of the path of a file with numbers."""
     match kind:
-        case Vector():
-            return _list(_number(kind.item.unit, check), kind.length)
+        case NumberList():
+            return _list_schema(_number_schema(kind.item.unit, check), kind.length)
         case Interval():
-            bound = _number(kind.item.unit, None)
-            return {"anyOf": [*bound["anyOf"], _list(bound, 2)]}
+            bound = _number_schema(kind.item.unit, None)
+            return {"anyOf": [*bound["anyOf"], _list_schema(bound, 2)]}
         case NamedNumbers():
-            return {"type": "object", "additionalProperties": _number(ANY_SI_UNIT, check)}
+            return {"type": "object", "additionalProperties": _number_schema(ANY_SI_UNIT, check)}
         case PerJoint():
-            numbers = _number(kind.unit, check)["anyOf"]
+            numbers = _number_schema(kind.unit, check)["anyOf"]
             entry = {"anyOf": [*numbers, {"type": "null"}]}
             names = {"pattern": f"^{IDENTIFIER.pattern}$"}
             by_name = {"type": "object", "propertyNames": names, "additionalProperties": entry}
-            return {"anyOf": [*numbers, _list(entry), by_name]}
+            return {"anyOf": [*numbers, _list_schema(entry), by_name]}
     return {"type": "string"}
 
 
-def _number(unit: Quantity, check: Check | None) -> Schema:
+def _number_schema(unit: Quantity, check: Check | None) -> Schema:
     """Return the schema of a number within bounds, or of an expression."""
     keywords = {"minimum": -LARGEST, "maximum": LARGEST, **({} if check is None else check.keywords)}
     pattern = ANGLE if {unit.revolute, unit.prismatic} & set(ANGLES) else EXPRESSION
-    return {"anyOf": [{"type": "number", **keywords}, _expression(pattern)]}
+    return {"anyOf": [{"type": "number", **keywords}, _expression_schema(pattern)]}
 
 
-def _expression(pattern: str) -> Schema:
+def _expression_schema(pattern: str) -> Schema:
     return {"type": "string", "pattern": pattern, "maxLength": MAX_LENGTH}
 
 
-def _json_value(default: Any) -> Any:
+def _json_default(default: Any) -> Any:
     """Return a default in a form that a document can hold, or None."""
     match default:
         case bool() | str() if default != "":

@@ -54,9 +54,9 @@ def evaluate(text: str, unit: str) -> float:
         ExpressionError: the text is not an expression, or its value is not finite.
     """
     try:
-        value = _value(text.strip(), unit)
+        value = _evaluate_text(text.strip(), unit)
     except ExpressionError as error:
-        raise ExpressionError(_problem(text, unit, error)) from None
+        raise ExpressionError(_describe_invalid_number(text, unit, error)) from None
     if not math.isfinite(value):
         raise ExpressionError(
             f"expected {expected_number(unit)}, found {quoted(text)}; this is too large for a "
@@ -70,35 +70,35 @@ def expected_number(unit: str) -> str:
     return "a number" if unit in ("", str(DIMENSIONLESS)) else f"a number in {unit}"
 
 
-def _value(text: str, unit: str) -> float:
+def _evaluate_text(text: str, unit: str) -> float:
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"longer than {MAX_LENGTH} characters")
     if text.lower() in BOOLEANS:
         raise ExpressionError("YAML reads this word as a boolean")
-    return _degrees(text) if unit in ANGLES and text.endswith("deg") else _expression(text)
+    return _evaluate_degrees(text) if unit in ANGLES and text.endswith("deg") else _evaluate_expression(text)
 
 
-def _degrees(text: str) -> float:
+def _evaluate_degrees(text: str) -> float:
     parts = _DEGREES.fullmatch(text)
     if not parts:
         raise ExpressionError(
             "before `deg`, write one number, or an expression in parentheses as in `(90/2) deg`"
         )
     inner = parts["value"].removeprefix("(").removesuffix(")")
-    return math.radians(float(parts["sign"] + "1") * _expression(inner))
+    return math.radians(float(parts["sign"] + "1") * _evaluate_expression(inner))
 
 
-def _expression(text: str) -> float:
+def _evaluate_expression(text: str) -> float:
     try:
         return float(parse(text, _GRAMMAR).value({"pi": math.pi}, {}))
     except ZeroDivisionError:
         raise ExpressionError("division by zero") from None
 
 
-def _problem(text: str, unit: str, error: ExpressionError) -> str:
+def _describe_invalid_number(text: str, unit: str, error: ExpressionError) -> str:
     """Return the message about a text that is no number."""
-    if found := _about_unit(text.strip(), unit):
-        return f"{quoted(text)} {found}"
+    if unit_problem := _describe_written_unit(text.strip(), unit):
+        return f"{quoted(text)} {unit_problem}"
     expected = f"expected {expected_number(unit)}, found {quoted(text)}"
     for form, advice in _REFUSED_FORMS.items():
         if re.fullmatch(form, text.strip(), re.IGNORECASE):
@@ -112,18 +112,18 @@ def _problem(text: str, unit: str, error: ExpressionError) -> str:
     )
 
 
-def _about_unit(text: str, unit: str) -> str:
+def _describe_written_unit(text: str, unit: str) -> str:
     """Return the problem of a number with a known unit after it; empty if the text is no such number."""
     parts = _WITH_UNIT.fullmatch(text)
-    found = None if parts is None else size_of_unit(parts["unit"])
-    if parts is None or found is None or (unit in ANGLES and text.endswith("deg")):
+    written_unit = None if parts is None else size_of_unit(parts["unit"])
+    if parts is None or written_unit is None or (unit in ANGLES and text.endswith("deg")):
         return ""
     if unit in ("", str(DIMENSIONLESS)):
         return "has a unit; write the number alone"
-    wanted = size_of_unit("Hz" if unit == str(RATE) else unit)
-    if wanted is None:  # SI units, or a unit for each of several components
+    expected_unit = size_of_unit("Hz" if unit == str(RATE) else unit)
+    if expected_unit is None:  # SI units, or a unit for each of several components
         return f"has a unit; write the number alone, in {unit}"
-    if found.dimensions != wanted.dimensions:
+    if written_unit.dimensions != expected_unit.dimensions:
         return f"is {kind_of_unit(parts['unit']) or 'in another unit'}; expected {expected_number(unit)}"
-    converted = float(parts["number"]) * found.size / wanted.size
+    converted = float(parts["number"]) * written_unit.size / expected_unit.size
     return f"has a unit; write the number alone, in {unit}: {converted:.10g}"

@@ -14,7 +14,7 @@ from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.base.texts import on_one_line
 from vsacli.documents import tree
-from vsacli.documents.fields import Items, Kind, Pair, declared, variant_inside
+from vsacli.documents.fields import Items, PairOf, ValueKind, declared_fields, variant_inside
 from vsacli.documents.record_reader import read_value
 from vsacli.documents.record_values import entry_names
 from vsacli.documents.source import Problems
@@ -36,22 +36,22 @@ def find(content: Any, path: str) -> Any:
     Raises:
         InputError: with the first word that is not found, and the nearest valid one.
     """
-    return _found(content, path.split("."), ())
+    return _find_from(content, path.split("."), ())
 
 
-def _found(content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+def _find_from(content: Any, words: list[str], place: tuple[str, ...]) -> Any:
     if not words:
         return content
     word, *rest = words
     if word == ALL and isinstance(content, list):
-        return [_found(entry, rest, (*place, str(index))) for index, entry in enumerate(content)]
-    entries = _entries(content)
+        return [_find_from(entry, rest, (*place, str(index))) for index, entry in enumerate(content)]
+    entries = _entries_by_word(content)
     if word not in entries:
-        raise _nowhere(word, entries, place)
-    return _found(entries[word], rest, (*place, word))
+        raise _missing_word_error(word, entries, place)
+    return _find_from(entries[word], rest, (*place, word))
 
 
-def _entries(content: Any) -> dict[str, Any]:
+def _entries_by_word(content: Any) -> dict[str, Any]:
     match content:
         case Mapping():
             return dict(content)
@@ -76,10 +76,10 @@ class ReplacementError(InputError):
         self.path = path
 
 
-def _nowhere(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputError:
+def _missing_word_error(word: str, valid_words: Iterable[str], place: tuple[str, ...]) -> InputError:
     """Return the error for a word that is not among the valid words at a place."""
-    words = list(there)
-    where = f"{_joined(place)} has" if place else "there is"
+    words = list(valid_words)
+    where = f"{_dotted_path(place)} has" if place else "there is"
     names = [each for each in words if not each.isdecimal()]
     if not words:
         hint = "; it is a single value"
@@ -91,7 +91,7 @@ def _nowhere(word: str, there: Iterable[str], place: tuple[str, ...]) -> InputEr
     return InputError.one(f"{where} no {word!r}{hint}")
 
 
-def _joined(place: Iterable[str]) -> str:
+def _dotted_path(place: Iterable[str]) -> str:
     return ".".join(place)
 
 
@@ -100,7 +100,7 @@ def declared_paths(cls: type) -> Iterator[str]:
 
     Pairs of sides have none, since a path without a side changes both.
     """
-    for name, (field, _) in declared(cls).items():
+    for name, (field, _) in declared_fields(cls).items():
         yield name
         place = f"{name}.{ALL}" if isinstance(field.kind, Items) else name
         for inner in field.kind.records.values():
@@ -134,8 +134,8 @@ def replace(
             and the path to it.
     """
     scope = Scope(Problems(file), members or {}, exempt or {})
-    found: _Record = _Replacement(_node(value), scope).in_record(record, path.split("."), ())
-    return found
+    replaced: _Record = _Replacement(_node_of_value(value), scope).in_record(record, path.split("."), ())
+    return replaced
 
 
 def replace_all(
@@ -168,19 +168,19 @@ def replace_all(
     return replace_all(record, refused, members, exempt, file)
 
 
-def _node(value: Any) -> tree.Node:
+def _node_of_value(value: Any) -> tree.Node:
     """Return a value as if it had been read from a file; texts as if in quotes."""
     match value:
         case str():
-            return tree.Scalar(0, value, plain=False)
+            return tree.TextNode(0, value, plain=False)
         case bool():
-            return tree.Scalar(0, on_one_line(value), plain=True)
+            return tree.TextNode(0, on_one_line(value), plain=True)
         case Mapping():
-            entries = {str(key): _node(entry) for key, entry in value.items()}
-            return tree.Mapping(0, entries, dict.fromkeys(entries, 0))
+            entries = {str(key): _node_of_value(entry) for key, entry in value.items()}
+            return tree.MapNode(0, entries, dict.fromkeys(entries, 0))
         case Iterable():
-            return tree.Sequence(0, tuple(map(_node, value)))
-    return tree.Scalar(0, "" if value is None else str(value), plain=True)
+            return tree.ListNode(0, tuple(map(_node_of_value, value)))
+    return tree.TextNode(0, "" if value is None else str(value), plain=True)
 
 
 class _Replacement(NamedTuple):
@@ -197,9 +197,9 @@ class _Replacement(NamedTuple):
         """Return a record with the replacement in it."""
         word, *rest = words
         cls: type = type(record)
-        fields = declared(cls)
+        fields = declared_fields(cls)
         if word not in fields:
-            raise _nowhere(word, fields, place)
+            raise _missing_word_error(word, fields, place)
         kind = fields[word][0].kind
         chosen = getattr(record, getattr(cls, "unit_variant", ""), None)
         variant = variant_inside(cls, chosen, self.scope.variant)
@@ -211,63 +211,65 @@ class _Replacement(NamedTuple):
             problems = [str(problem.in_units(variant).inside(*place)) for problem in error.fields]
             raise InputError(Problem("", 0, message) for message in problems) from None
 
-    def in_value(self, kind: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+    def in_value(self, kind: ValueKind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """Return a value with the replacement in it, or the replacement itself at the end of the path."""
         if not words:
-            return self._read(kind, place)
+            return self._read_value(kind, place)
         if content is None:
-            raise InputError.one(f"there is nothing at {_joined(place)}; replace it as a whole")
-        if isinstance(kind, Pair) and words[0] not in SIDES:
+            raise InputError.one(f"there is nothing at {_dotted_path(place)}; replace it as a whole")
+        if isinstance(kind, PairOf) and words[0] not in SIDES:
             return self._in_pair(kind, content, words, place)
         if kind.item is not None:
             return self._in_list(kind, kind.item, content, words, place)
         if words == ["type"] and "" not in kind.records:
             reason = "the type cannot be changed alone, since each type has other keys"
-            example = f"'{_joined(place)}={{type: {tree.plain(self.node)}, ...}}'"
-            raise InputError.one(f"{_joined(place)}.type: {reason}; give the whole mapping, {example}")
+            example = f"'{_dotted_path(place)}={{type: {tree.plain(self.node)}, ...}}'"
+            raise InputError.one(f"{_dotted_path(place)}.type: {reason}; give the whole mapping, {example}")
         if kind.records:
             return self.in_record(content, words, place)
-        raise _nowhere(words[0], (), place)
+        raise _missing_word_error(words[0], (), place)
 
-    def _read(self, kind: Kind, place: tuple[str, ...]) -> Any:
-        label, problems = _joined(place), Problems(self.scope.problems.file)
-        if kind.records and not isinstance(kind, Items | Pair) and isinstance(self.node, tree.Scalar):
-            keys = dict.fromkeys(key for cls in kind.records.values() for key in declared(cls))
+    def _read_value(self, kind: ValueKind, place: tuple[str, ...]) -> Any:
+        label, problems = _dotted_path(place), Problems(self.scope.problems.file)
+        if kind.records and not isinstance(kind, Items | PairOf) and isinstance(self.node, tree.TextNode):
+            keys = dict.fromkeys(key for cls in kind.records.values() for key in declared_fields(cls))
             raise InputError.one(f"{label} is a mapping; set one of its keys: {', '.join(keys)}")
         content = read_value(kind, self.node, label, self.scope._replace(problems=problems))
         try:
             problems.check()
         except InputError as error:
-            messages = [found.message.removeprefix(f"{label}: ") for found in error.problems]
+            messages = [problem.message.removeprefix(f"{label}: ") for problem in error.problems]
             raise InputError(Problem("", 0, f"{label}: {message}") for message in messages) from None
         return content
 
-    def _in_pair(self, kind: Pair, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+    def _in_pair(self, kind: PairOf, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
         """Return both sides of a joint; equal sides stay one object."""
         word, *rest = words
         if content[0] == content[1]:
             both = self.in_value(kind.item, content[0], rest if word == ALL else words, place)
             return both, both
         if word != ALL:
-            choices = f"0, 1 or {ALL}, as in {_joined((*place, '0', *words))}"
-            raise InputError.one(f"{_joined(place)}: its two sides differ; say which by {choices}")
+            choices = f"0, 1 or {ALL}, as in {_dotted_path((*place, '0', *words))}"
+            raise InputError.one(f"{_dotted_path(place)}: its two sides differ; say which by {choices}")
         return self._in_list(kind, kind.item, content, words, place)
 
-    def _in_list(self, kind: Kind, each: Kind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+    def _in_list(
+        self, kind: ValueKind, entry_kind: ValueKind, content: Any, words: list[str], place: tuple[str, ...]
+    ) -> Any:
         """Return a list with the replacement in the entry that a word names, or in all entries."""
         word, *rest = words
         names = entry_names(kind, content, self.scope.members)
         indices = _indices(names)
         if word != ALL and word not in indices:
-            raise _nowhere(word, indices, place)
+            raise _missing_word_error(word, indices, place)
         entries = list(content)
         if word != ALL and entries[indices[word]] is None:
             exempt = self.scope.exempt.get(getattr(kind, "purpose", ""), {})
             reason = exempt.get(names[indices[word]], "it has none")
-            raise InputError.one(f"{_joined((*place, word))}: no value goes there: {reason}")
-        there = [index for index, entry in enumerate(entries) if entry is not None]
-        for index in there if word == ALL else [indices[word]]:
+            raise InputError.one(f"{_dotted_path((*place, word))}: no value goes there: {reason}")
+        nonempty_indices = [index for index, entry in enumerate(entries) if entry is not None]
+        for index in nonempty_indices if word == ALL else [indices[word]]:
             inside = self._replace(scope=self.scope.of_member(names[index]))
-            here = (*place, names[index] or str(index))
-            entries[index] = inside.in_value(each, content[index], rest, here)
+            entry_place = (*place, names[index] or str(index))
+            entries[index] = inside.in_value(entry_kind, content[index], rest, entry_place)
         return tuple(entries)

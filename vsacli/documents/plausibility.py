@@ -20,7 +20,7 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import ANGLES, evaluate
-from vsacli.documents.record_values import Entry, NumberPath
+from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.documents.source import Problems, Source
 from vsacli.documents.tree import parse_yaml
 
@@ -120,76 +120,76 @@ class Rule(NamedTuple, Generic[_Subject]):
 
     def sentence(self, measured: Measured, other: OtherUnit | None) -> str:
         """Return the warning: field, value, finding, and the likely unit."""
-        path = _of_unit(measured.path, other)
-        known = path == measured.path and not math.isnan(measured.value)
-        value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if known else ""
+        path = _path_to_report(measured.path, other)
+        has_value = path == measured.path and not math.isnan(measured.value)
+        value = f" = {measured.value:.6g} {measured.unit}".removesuffix(" 1") if has_value else ""
         # Three digits, with a power of ten only where there would be many zeros.
-        found = self.finding.format(size=f"{float(f'{measured.size:.3g}'):.6g}", **measured.beside)
+        finding = self.finding.format(size=f"{float(f'{measured.size:.3g}'):.6g}", **measured.beside)
         advice = self.advice
         if other is not None:
-            advice = _guess(measured, other) if known else f"is it in {other.unit}?"
-        return f"{'.'.join(map(str, path))}{_component(path)}{value} {found}; {advice}"
+            advice = _guess_unit(measured, other) if has_value else f"is it in {other.unit}?"
+        return f"{'.'.join(map(str, path))}{_component_name(path)}{value} {finding}; {advice}"
 
 
-def _component(path: NumberPath) -> str:
+def _component_name(path: NumberPath) -> str:
     """Return the name of a component that a path gives by its index only; empty if it has none."""
-    if len(path) < 3 or not isinstance(path[-1], Entry) or path[-1].name:
+    if len(path) < 3 or not isinstance(path[-1], PathIndex) or path[-1].name:
         return ""
     field = "limits" if path[-3] == "limits" else path[-2]
     words = _COMPONENTS.get(str(field), ())
     return f" ({words[path[-1].number]})" if path[-1].number < len(words) else ""
 
 
-def _guess(measured: Measured, other: OtherUnit) -> str:
+def _guess_unit(measured: Measured, other: OtherUnit) -> str:
     meant = f"did you mean {measured.value:.6g} {other.unit}"
     if measured.unit in ANGLES and other.unit == "deg":
         return f"{meant}?"
     return f"{meant}, which is {measured.value * other.factor:.4g} {measured.unit}?"
 
 
-def _of_unit(path: NumberPath, other: OtherUnit | None) -> NumberPath:
+def _path_to_report(path: NumberPath, other: OtherUnit | None) -> NumberPath:
     return (*path[:-1], *other.field) if other and other.field else path
 
 
-Moved: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
+TranslatePath: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
 """Function that returns the path in a file for its root and the path in the record made of it."""
 
 
-class Written:
+class ValuesInFile:
     """Values and lines of a YAML file, by the path to a number."""
 
-    def __init__(self, source: Source, moved: Moved | None = None) -> None:
+    def __init__(self, source: Source, translate_path: TranslatePath | None = None) -> None:
         """Store the file, and the function that translates paths of the record into paths of the file."""
         self.path = source.path
         self._text = source.text or ""
-        self._moved = moved
+        self._translate_path = translate_path
 
     @cached_property
     def _root(self) -> tree.Node:
         try:
             return parse_yaml(self._text, Problems(self.path))
         except InputError:  # not a YAML file
-            return tree.Mapping(0, {}, {})
+            return tree.MapNode(0, {}, {})
 
-    def at(self, path: NumberPath) -> tuple[tree.Node, NumberPath]:
+    def node_along(self, path: NumberPath) -> tuple[tree.Node, NumberPath]:
         """Return the deepest node along a path, and the remaining steps."""
-        steps = path if self._moved is None else self._moved(self._root, path)
+        steps = path if self._translate_path is None else self._translate_path(self._root, path)
         node = self._root
-        for taken, step in enumerate(steps):
-            inner = _inside(node, step)
+        for count, step in enumerate(steps):
+            inner = _child_node(node, step)
             if inner is None:
-                return node, steps[taken:]
+                return node, steps[count:]
             node = inner
         return node, ()
 
     def line(self, path: NumberPath) -> int:
         """Return the line of the deepest node along a path."""
-        return self.at(path)[0].line
+        return self.node_along(path)[0].line
 
-    def said(self, measured: Measured) -> Measured | None:
+    def as_in_file(self, measured: Measured) -> Measured | None:
         """Return the number with the path to its scalar, which all joints may share; None if it differs."""
-        node, left = self.at(measured.path)
-        if not isinstance(node, tree.Scalar) or math.isnan(measured.value):
+        node, left = self.node_along(measured.path)
+        if not isinstance(node, tree.TextNode) or math.isnan(measured.value):
             return measured
         try:
             value = evaluate(node.text, measured.unit)
@@ -201,26 +201,26 @@ class Written:
 
     def in_angles(self, measured: Measured) -> bool:
         """Return whether the file has this number as an expression with `deg` or `pi`."""
-        node, _ = self.at(measured.path)
-        if not isinstance(node, tree.Scalar) or self.said(measured) is None:
+        node, _ = self.node_along(measured.path)
+        if not isinstance(node, tree.TextNode) or self.as_in_file(measured) is None:
             return False
         return bool(_EXPRESSION_OF_ANGLE.search(node.text))
 
 
-def _inside(node: tree.Node, step: str | Entry) -> tree.Node | None:
+def _child_node(node: tree.Node, step: str | PathIndex) -> tree.Node | None:
     match node, step:
-        case tree.Mapping(entries=entries), _:
+        case tree.MapNode(entries=entries), _:
             return entries.get(str(step))
-        case tree.Sequence(items=items), Entry(number=number) if number < len(items):
+        case tree.ListNode(items=items), PathIndex(number=number) if number < len(items):
             return items[number]
     return None
 
 
-def strange(
+def implausible_measurements(
     rules: Sequence[Rule[_Subject]],
     subject: _Subject,
-    written: Written | None = None,
-    known: Collection[str] = (),
+    written: ValuesInFile | None = None,
+    rules_with_findings: Collection[str] = (),
 ) -> dict[str, list[Measured]]:
     """Return the implausible numbers by rule name; rules without findings have no entry.
 
@@ -228,37 +228,41 @@ def strange(
         rules: rules in an order in which each follows the rules that explain its findings.
         subject: robot or trajectory.
         written: file of the subject, if any.
-        known: names of rules with findings elsewhere.
+        rules_with_findings: names of rules with findings elsewhere.
     """
-    found: dict[str, list[Measured]] = {}
+    outside_by_rule: dict[str, list[Measured]] = {}
     with np.errstate(all="ignore"):  # extreme values may have an infinite size
         for rule in rules:
-            if {*found, *known}.isdisjoint(rule.explained_by):
+            if {*outside_by_rule, *rules_with_findings}.isdisjoint(rule.explained_by):
                 outside = [measured for measured in rule.measure(subject) if not rule.admits(measured.size)]
                 if rule.in_angles and written is not None:
                     outside = [measured for measured in outside if not written.in_angles(measured)]
-                found |= {rule.name: outside} if outside else {}
-    return found
+                outside_by_rule |= {rule.name: outside} if outside else {}
+    return outside_by_rule
 
 
-def findings(
+def implausible_values(
     rules: Sequence[Rule[_Subject]],
     subject: _Subject,
-    written: Written | None = None,
-    known: Collection[str] = (),
+    written: ValuesInFile | None = None,
+    rules_with_findings: Collection[str] = (),
 ) -> tuple[Problem, ...]:
     """Return the warnings about implausible values, with file and line if the file has the same value."""
     named = {rule.name: rule for rule in rules}
-    found = strange(rules, subject, written, known)
-    problems = (_problem(named[name], each, written) for name, several in found.items() for each in several)
+    outside_by_rule = implausible_measurements(rules, subject, written, rules_with_findings)
+    problems = (
+        _warning_about(named[name], each, written)
+        for name, several in outside_by_rule.items()
+        for each in several
+    )
     return tuple(dict.fromkeys(problems))
 
 
-def _problem(rule: Rule[Any], measured: Measured, written: Written | None) -> Problem:
+def _warning_about(rule: Rule[Any], measured: Measured, written: ValuesInFile | None) -> Problem:
     """Return the warning about a number."""
     other = rule.other_unit(measured)
-    said = written.said(measured) if written is not None else None
-    if written is None or said is None:
+    in_file = written.as_in_file(measured) if written is not None else None
+    if written is None or in_file is None:
         return Problem("", 0, rule.sentence(measured, other))
-    line = written.line(_of_unit(measured.path, other))
-    return Problem(written.path, line, rule.sentence(said, other))
+    line = written.line(_path_to_report(measured.path, other))
+    return Problem(written.path, line, rule.sentence(in_file, other))

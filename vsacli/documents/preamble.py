@@ -13,11 +13,11 @@ from vsacli.base.texts import counted
 from vsacli.documents.csv_file import (
     SEPARATORS,
     Header,
-    cells_of,
     filled_lines,
     is_missing,
     is_number,
     separator_of,
+    split_cells,
     split_heading,
 )
 from vsacli.documents.time_column import NAMES, read_clock
@@ -62,7 +62,7 @@ def find_surroundings(path: str | os.PathLike[str]) -> Surroundings:
 def _texts_below(lines: Sequence[str], top: int) -> list[tuple[str, ...]] | None:
     """Return the rows of texts below a line if it is a header or the first row of a table; else None."""
     separator = separator_of(lines[top])
-    rows = [tuple(cell.strip() for cell in cells_of(line, separator)) for line in lines]
+    rows = [tuple(cell.strip() for cell in split_cells(line, separator)) for line in lines]
     width = len(rows[top])
     if width < 2 or any(len(row) != width for row in rows[top:]):
         return None

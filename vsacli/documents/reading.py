@@ -52,7 +52,7 @@ def read_document(
         source, text = read_source(path, expected=expected)
         problems = Problems(source.path)
         root = parse_yaml(text, problems)
-        if not isinstance(root, tree.Mapping):
+        if not isinstance(root, tree.MapNode):
             problems.fail(root.line, f"{expected}, found {root}")
         _check_format(root, format_name, problems)
     record = read_record(cls, root, "", Scope(problems, members or {}, exempt or {}), beside=("format",))
@@ -62,7 +62,7 @@ def read_document(
 
 def survey_document(
     path: str | os.PathLike[str], cls: type[DeclaredRecord]
-) -> tuple[tree.Mapping, list[tuple[Quantity, tree.Node]]]:
+) -> tuple[tree.MapNode, list[tuple[Quantity, tree.Node]]]:
     """Return the root of a YAML file, and its PerJoint values as written, for any joints.
 
     Args:
@@ -75,7 +75,7 @@ def survey_document(
     source, text = read_source(path)
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
-    if not isinstance(root, tree.Mapping):
+    if not isinstance(root, tree.MapNode):
         problems.fail(root.line, f"expected a mapping, found {root}")
     survey: list[tuple[Quantity, tree.Node]] = []
     with suppress(InputError):  # too many problems; reading the document reports them
@@ -83,11 +83,11 @@ def survey_document(
     return root, survey
 
 
-def _check_format(root: tree.Mapping, expected: str, problems: Problems) -> None:
+def _check_format(root: tree.MapNode, expected: str, problems: Problems) -> None:
     node = root.entries.get("format")
     if node is None:
         problems.add(root.line, f"missing key 'format'; the file must begin with `format: {expected}`")
-    elif not (isinstance(node, tree.Scalar) and node.text == expected):
+    elif not (isinstance(node, tree.TextNode) and node.text == expected):
         problems.fail(node.line, f"format: expected {expected!r}, found {node}")
 
 
@@ -115,28 +115,28 @@ def read_changes(texts: Iterable[str]) -> dict[str, Any]:
         ChangeError: a text has no `=`, a value is not YAML, or a path is changed twice.
     """
     changes: dict[str, Any] = {}
-    given: dict[str, str] = {}
+    texts_by_path: dict[str, str] = {}
     for text in texts:
-        path, equals, written = (part.strip() for part in text.partition("="))
-        if not (path and equals and written):
+        path, equals, value_text = (part.strip() for part in text.partition("="))
+        if not (path and equals and value_text):
             raise ChangeError.of(text, "expected PATH=VALUE, e.g. joints.*.link.mass=2.5")
-        if path in given:
-            raise ChangeError.of(text, f"{path} is also set to {quoted(given[path])}; set it once")
-        given[path], changes[path] = written, _value(text, written)
+        if path in texts_by_path:
+            raise ChangeError.of(text, f"{path} is also set to {quoted(texts_by_path[path])}; set it once")
+        texts_by_path[path], changes[path] = value_text, _parse_change_value(text, value_text)
     return changes
 
 
-def written(changes: Changes) -> list[str]:
+def format_changes(changes: Changes) -> list[str]:
     """Return changes as texts that `read_changes` accepts."""
-    return [f"{path}={_text(value)}" for path, value in changes.items()]
+    return [f"{path}={_format_change_value(value)}" for path, value in changes.items()]
 
 
-def _text(value: Any) -> str:
+def _format_change_value(value: Any) -> str:
     """Return a value as YAML: JSON, without the quotes of texts that begin with a digit."""
     return value if isinstance(value, str) else _NUMBER.sub(r"\1", json.dumps(value))
 
 
-def _value(change: str, text: str) -> Any:
+def _parse_change_value(change: str, text: str) -> Any:
     problems = Problems("")
     try:
         node = parse_yaml(text, problems)
@@ -156,7 +156,7 @@ def check_path_of_change(path: str, change: str = "") -> None:
         raise ChangeError.of(change, f"the {key} of a file cannot be changed here; edit the file")
 
 
-def changed(
+def apply_changes(
     document: _Document,
     source: Source,
     changes: Changes,
@@ -179,11 +179,11 @@ def changed(
         return document, source
     from vsacli.documents.paths import ReplacementError, replace_all  # 3 % of the start of a run
 
-    for path, change in zip(changes, written(changes), strict=True):
+    for path, change in zip(changes, format_changes(changes), strict=True):
         check_path_of_change(path, change)
     try:
         document = replace_all(document, changes, members, exempt, source.path)
     except ReplacementError as error:
-        (change,) = written({error.path: changes[error.path]})
+        (change,) = format_changes({error.path: changes[error.path]})
         raise ChangeError(error.problems, change) from None
     return document, source._replace(changes=json.dumps(changes))

@@ -21,18 +21,18 @@ from vsacli.documents.fields import (
     SMALLEST,
     Boolean,
     Check,
-    Choice,
     FieldPath,
     Interval,
     Items,
-    Kind,
     Name,
     NamedNumbers,
+    NumberList,
     OwnKind,
-    Pair,
+    PairOf,
     Text,
-    Vector,
-    declared,
+    ValueKind,
+    WordChoice,
+    declared_fields,
 )
 from vsacli.documents.tree import quoted
 
@@ -92,17 +92,19 @@ _defaults: Callable[[type], Mapping[str, Any]] = cache(
 
 def field_problems(cls: type, values: Mapping[str, Any]) -> Iterator[FieldProblem]:
     """Yield the problems of each field of a record by itself; fields without a value have none."""
-    for name, (field, default) in declared(cls).items():
+    for name, (field, default) in declared_fields(cls).items():
         content = values.get(name)
         if not (content is None and (default is None or name not in values)):
             yield from value_problems(field.kind, field.check, content, (name,))
 
 
-def value_problems(kind: Kind, check: Check | None, content: Any, path: FieldPath) -> Iterator[FieldProblem]:
+def value_problems(
+    kind: ValueKind, check: Check | None, content: Any, path: FieldPath
+) -> Iterator[FieldProblem]:
     """Yield the problems of a value at a path; its numbers must meet the condition."""
     fault = fault_of(kind, content)
     if fault is not None:
-        yield _problem(kind, path, fault)
+        yield _problem_in_units(kind, path, fault)
     elif isinstance(kind, OwnKind):
         yield from kind.problems(path, content)
     elif isinstance(kind, Items) and kind.unique is not None:  # of records, which are checked
@@ -110,7 +112,7 @@ def value_problems(kind: Kind, check: Check | None, content: Any, path: FieldPat
     elif isinstance(kind, NamedNumbers):
         for name, entry in content:
             yield from _number_problems(kind.number, check, entry, (*path, name))
-    elif isinstance(content, tuple) or isinstance(kind, Items | Pair):
+    elif isinstance(content, tuple) or isinstance(kind, Items | PairOf):
         for index, entry in enumerate(content):
             yield from value_problems(kind.item or kind, check, entry, (*path, index))
     else:
@@ -118,14 +120,14 @@ def value_problems(kind: Kind, check: Check | None, content: Any, path: FieldPat
 
 
 def _number_problems(
-    kind: Kind, check: Check | None, content: Any, path: FieldPath
+    kind: ValueKind, check: Check | None, content: Any, path: FieldPath
 ) -> Iterator[FieldProblem]:
     """Yield the problem of a single value, if it is a number that does not meet the condition."""
     if content is None or not (check or (kind.unit and isinstance(content, float | int))):
         return
     fault = fault_of_number(content, check or _ANY)
     if fault:
-        yield _problem(kind, path, f"{fault} {{}}" if _has_unit(kind) else fault)
+        yield _problem_in_units(kind, path, f"{fault} {{}}" if _has_unit(kind) else fault)
 
 
 def _repeated_entries(key: str, content: Iterable[Any], path: FieldPath) -> Iterator[FieldProblem]:
@@ -135,12 +137,12 @@ def _repeated_entries(key: str, content: Iterable[Any], path: FieldPath) -> Iter
         yield FieldProblem((*path, index, key), already_used(words[index], f"by entry {first}"))
 
 
-def _has_unit(kind: Kind) -> bool:
+def _has_unit(kind: ValueKind) -> bool:
     """Return whether numbers have a unit to show after them, at joints of any type."""
     return kind.unit is not None and _WITHOUT_UNIT.isdisjoint((kind.unit.revolute, kind.unit.prismatic))
 
 
-def _problem(kind: Kind, path: FieldPath, message: str) -> FieldProblem:
+def _problem_in_units(kind: ValueKind, path: FieldPath, message: str) -> FieldProblem:
     """Return a problem; each `{}` in the message stands for the unit."""
     quantities = (kind.unit,) * message.count("{}") if kind.unit is not None else ()
     return FieldProblem(path, message, quantities=quantities)
@@ -159,7 +161,7 @@ def already_used(word: str, where: str) -> str:
     return f"{quoted(word)} is already used {where}; choose another one"
 
 
-def fault_of(kind: Kind, content: Any) -> str | None:
+def fault_of(kind: ValueKind, content: Any) -> str | None:
     """Return the problem of a value as a whole, apart from the condition on its numbers, or None."""
     match kind:
         case Boolean() if not isinstance(content, bool):
@@ -171,9 +173,9 @@ def fault_of(kind: Kind, content: Any) -> str | None:
             return f"must be made of {requirement}, not {quoted(content)}"
         case Text():
             return _unprintable(content, allowed="" if isinstance(kind, Name) else "\n")
-        case Choice(options=options) if content not in options:
+        case WordChoice(options=options) if content not in options:
             return unknown_word(content, options, kind.not_yet)
-        case Vector(length=length) if len(content) != length:
+        case NumberList(length=length) if len(content) != length:
             return f"expected {length} numbers in {{}}, found {len(content)}"
         case Interval() if not content[0] <= content[1]:
             (lower, upper), unit = content, " {}" if _has_unit(kind) else ""

@@ -20,27 +20,27 @@ from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import (
     REQUIRED,
     Boolean,
-    Choice,
     Field,
     FieldPath,
     Integer,
     Interval,
     Items,
-    Kind,
     Name,
     NamedNumbers,
-    Number,
+    NumberList,
+    NumberWithUnit,
     OneOf,
     OneOrMore,
     OwnKind,
-    Pair,
+    PairOf,
     PerJoint,
-    Record,
+    RecordOf,
     Share,
-    TableFile,
+    TablePath,
     Text,
-    Vector,
-    declared,
+    ValueKind,
+    WordChoice,
+    declared_fields,
     variant_inside,
 )
 from vsacli.documents.number import BOOLEANS, DECIMAL, PER_CENT, evaluate, expected_number
@@ -51,21 +51,21 @@ from vsacli.documents.record_checks import (
     repetitions,
     unknown_word,
 )
-from vsacli.documents.tree import INVALID, NULLS, Node, Scalar, Scope, all_valid, quoted
+from vsacli.documents.tree import INVALID, NULLS, Node, Scope, TextNode, all_valid, quoted
 
 TRUTHS = ("true", "false")
-WITHOUT_UNIT = Number(DIMENSIONLESS)
+WITHOUT_UNIT = NumberWithUnit(DIMENSIONLESS)
 NOT_TEXTS = BOOLEANS | NULLS
 """Words without quotes that are no texts in YAML, in lower case."""
 
 
 def read_record(
-    cls: type[DeclaredRecord], node: tree.Mapping, label: str, scope: Scope, beside: tuple[str, ...] = ()
+    cls: type[DeclaredRecord], node: tree.MapNode, label: str, scope: Scope, beside: tuple[str, ...] = ()
 ) -> Any:
     """Return a mapping as a record, or INVALID; the additional keys `beside` are left to the caller."""
     prefix = f"{label}: " if label else ""
     scope = scope_inside(scope, cls, node)
-    fields = declared(cls)
+    fields = declared_fields(cls)
     mistyped = _refuse_unknown_keys(cls, node, (*fields, *beside), scope)
     values: dict[str, Any] = {}
     for name, (field, default) in fields.items():
@@ -77,19 +77,19 @@ def read_record(
     valid = {name: content for name, content in values.items() if content is not INVALID}
     problems = list(field_problems(cls, valid))
     if problems:
-        _note_of_fields(problems, fields, node, scope)
+        _note_field_problems(problems, fields, node, scope)
     if problems or len(valid) < len(values) or not mistyped.isdisjoint(fields):
         return INVALID
     try:
         return cls.of_valid_fields(valid)
     except InvalidRecordError as error:
-        _note_of_record(error.fields, node, prefix, scope)
+        _note_record_problems(error.fields, node, prefix, scope)
     except InputError as error:
         scope.problems.include(error)
     return INVALID
 
 
-def scope_inside(scope: Scope, cls: type, node: tree.Mapping) -> Scope:
+def scope_inside(scope: Scope, cls: type, node: tree.MapNode) -> Scope:
     """Return the scope of the values in a record."""
     if not hasattr(cls, "unit_variant"):
         return scope
@@ -97,34 +97,36 @@ def scope_inside(scope: Scope, cls: type, node: tree.Mapping) -> Scope:
     return scope._replace(variant=variant_inside(cls, chosen.text if chosen else None, scope.variant))
 
 
-def _scalar_entry(node: Node, key: str) -> Scalar | None:
-    entry = node.entries.get(key) if isinstance(node, tree.Mapping) else None
-    return entry if isinstance(entry, Scalar) else None
+def _scalar_entry(node: Node, key: str) -> TextNode | None:
+    entry = node.entries.get(key) if isinstance(node, tree.MapNode) else None
+    return entry if isinstance(entry, TextNode) else None
 
 
-def _refuse_unknown_keys(cls: type, node: tree.Mapping, known: Collection[str], scope: Scope) -> set[str]:
+def _refuse_unknown_keys(
+    cls: type, node: tree.MapNode, valid_keys: Collection[str], scope: Scope
+) -> set[str]:
     """Note unknown keys; return the known keys probably meant, which are then not reported as missing."""
     meant: set[str] = set()
     for key, line in node.key_lines.items():
-        if key in known:
+        if key in valid_keys:
             continue
         if key in getattr(cls, "not_yet", ()):
             scope.problems.add(line, f"{key!r} is not supported yet")
         else:
-            scope.problems.add(line, f"unknown key {quoted(key)}{did_you_mean(key, known)}")
-            meant.update(filter(None, [nearest(key, known)]))
+            scope.problems.add(line, f"unknown key {quoted(key)}{did_you_mean(key, valid_keys)}")
+            meant.update(filter(None, [nearest(key, valid_keys)]))
     return meant - node.entries.keys()
 
 
-def _note_missing(name: str, field: Field, node: tree.Mapping, prefix: str, scope: Scope) -> None:
+def _note_missing(name: str, field: Field, node: tree.MapNode, prefix: str, scope: Scope) -> None:
     example = f", e.g. {name}: {{type: constant, value: ...}}" if "constant" in field.kind.records else ""
     scope.problems.add(node.line, f"{prefix}missing key {name!r} ({field.doc}){example}")
 
 
-def _note_of_fields(
+def _note_field_problems(
     problems: Iterable[FieldProblem],
     fields: Mapping[str, tuple[Field, Any]],
-    node: tree.Mapping,
+    node: tree.MapNode,
     scope: Scope,
 ) -> None:
     """Note the problems of fields; joints with the same problem of a field share a message."""
@@ -138,17 +140,19 @@ def _note_of_fields(
         fault = "" if of_joints else f"{name}: {problem.message}"
         equal.setdefault((name, line_along(problem.path, node, scope), message, fault), []).append(joint)
     for (name, line, message, fault), joints in equal.items():
-        scope.problems.add(line, f"{name}{_of_joints(joints, members)}: {message}", fault)
+        scope.problems.add(line, f"{name}{_joints_with_problem(joints, members)}: {message}", fault)
 
 
-def _of_joints(joints: Sequence[str], members: Sequence[str]) -> str:
+def _joints_with_problem(joints: Sequence[str], members: Sequence[str]) -> str:
     """Return the joints that share a problem, after the name of a field; empty if all joints do."""
     if not joints[0] or (len(joints) > 1 and len(joints) == len(members)):
         return ""
     return f" of {'joint' if len(joints) == 1 else 'joints'} {', '.join(joints)}"
 
 
-def _note_of_record(problems: Iterable[FieldProblem], node: tree.Mapping, prefix: str, scope: Scope) -> None:
+def _note_record_problems(
+    problems: Iterable[FieldProblem], node: tree.MapNode, prefix: str, scope: Scope
+) -> None:
     """Note the problems of a record whose fields are valid."""
     for problem in problems:
         message = problem.in_units(scope.variant).in_file(list(scope.members))
@@ -159,33 +163,33 @@ def _note_of_record(problems: Iterable[FieldProblem], node: tree.Mapping, prefix
 def line_along(path: FieldPath, node: Node, scope: Scope) -> int:
     """Return the line of the deepest node along a path; a scalar counts for all entries of its value."""
     for step in path:
-        if isinstance(node, tree.Mapping):
+        if isinstance(node, tree.MapNode):
             key = list(scope.members)[step] if isinstance(step, int) else step
             if key not in node.entries:
                 break
             node = node.entries[key]
-        elif isinstance(node, tree.Sequence) and isinstance(step, int):
+        elif isinstance(node, tree.ListNode) and isinstance(step, int):
             node = node.items[step]
     return node.line
 
 
-def read_value(kind: Kind, node: Node, label: str, scope: Scope) -> Any:
+def read_value(kind: ValueKind, node: Node, label: str, scope: Scope) -> Any:
     """Return the value of a node, named `label` in messages; INVALID after noting a problem."""
     if isinstance(kind, OwnKind):
         return kind.read(node, label, scope)
     return _READERS[type(kind)](kind, node, label, scope)
 
 
-def _read_number(kind: Number, node: Node, label: str, scope: Scope) -> Any:
+def _read_number(kind: NumberWithUnit, node: Node, label: str, scope: Scope) -> Any:
     """Return the number in SI units; an unknown variant, itself a problem, counts as revolute."""
     if (
-        isinstance(node, Scalar)
+        isinstance(node, TextNode)
         and DECIMAL.fullmatch(node.text)
         and math.isfinite(decimal := float(node.text))
     ):
         return decimal
     unit = kind.unit.unit(scope.variant or "revolute")
-    if not isinstance(node, Scalar) or node.is_null:
+    if not isinstance(node, TextNode) or node.is_null:
         return scope.unexpected(node, expected_number(unit), label)
     try:
         return evaluate(node.text, unit)
@@ -195,10 +199,10 @@ def _read_number(kind: Number, node: Node, label: str, scope: Scope) -> Any:
 
 
 def _read_share(kind: Share, node: Node, label: str, scope: Scope) -> Any:
-    share = PER_CENT.fullmatch(node.text) if isinstance(node, Scalar) else None
+    share = PER_CENT.fullmatch(node.text) if isinstance(node, TextNode) else None
     if share is None:
         return _read_number(kind, node, label, scope)
-    number = _read_number(kind, Scalar(node.line, share["number"], plain=True), label, scope)
+    number = _read_number(kind, TextNode(node.line, share["number"], plain=True), label, scope)
     return number if number is INVALID else number / 100
 
 
@@ -210,28 +214,28 @@ def _read_integer(_kind: Integer, node: Node, label: str, scope: Scope) -> Any:
 
 
 def _read_boolean(_kind: Boolean, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, Scalar) and node.plain and node.text in TRUTHS:
+    if isinstance(node, TextNode) and node.plain and node.text in TRUTHS:
         return node.text == "true"
     return scope.unexpected(node, "true or false", label)
 
 
-def read_text(_kind: Kind, node: Node, label: str, scope: Scope) -> Any:
+def read_text(_kind: ValueKind, node: Node, label: str, scope: Scope) -> Any:
     """Return a text as written, unless YAML reads it as another type; see `read_value`."""
-    if isinstance(node, Scalar) and not (node.plain and node.text.lower() in NOT_TEXTS):
+    if isinstance(node, TextNode) and not (node.plain and node.text.lower() in NOT_TEXTS):
         return node.text
-    is_boolean = isinstance(node, Scalar) and not node.is_null
+    is_boolean = isinstance(node, TextNode) and not node.is_null
     reason = ", a boolean in YAML; put it in quotes" if is_boolean else ""
     return scope.unexpected(node, "a text", label, reason)
 
 
-def _read_choice(kind: Choice, node: Node, label: str, scope: Scope) -> Any:
+def _read_choice(kind: WordChoice, node: Node, label: str, scope: Scope) -> Any:
     """Return the word, which the check of the field compares with the options."""
-    if isinstance(node, Scalar) and (node.text in kind.options or not node.is_null):
+    if isinstance(node, TextNode) and (node.text in kind.options or not node.is_null):
         return node.text
     return scope.unexpected(node, f"one of {', '.join(kind.options)}", label)
 
 
-def _read_table(kind: TableFile, node: Node, label: str, scope: Scope) -> Any:
+def _read_table_file(kind: TablePath, node: Node, label: str, scope: Scope) -> Any:
     """Return the table in a file, whose problems are noted under the name of that file."""
     name = read_text(kind, node, label, scope)
     if name is INVALID:
@@ -249,24 +253,24 @@ def _read_table(kind: TableFile, node: Node, label: str, scope: Scope) -> Any:
     return table
 
 
-def _read_vector(kind: Vector, node: Node, label: str, scope: Scope) -> Any:
+def _read_vector(kind: NumberList, node: Node, label: str, scope: Scope) -> Any:
     """Return the numbers, which the check of the field counts."""
-    if not isinstance(node, tree.Sequence):
+    if not isinstance(node, tree.ListNode):
         return scope.unexpected(node, f"a list of {kind.length} numbers in {kind.unit}", label)
     return all_valid(_read_number(kind.item, item, label, scope) for item in node.items)
 
 
 def _read_interval(kind: Interval, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, Scalar):
+    if isinstance(node, TextNode):
         upper = _read_number(kind.item, node, label, scope)
         return upper if upper is INVALID else (-upper if kind.lowest is None else kind.lowest, upper)
-    if isinstance(node, tree.Sequence) and len(node.items) == 2:
+    if isinstance(node, tree.ListNode) and len(node.items) == 2:
         return all_valid(_read_number(kind.item, item, label, scope) for item in node.items)
     return scope.unexpected(node, "[lower, upper] or one number", label)
 
 
 def _read_named_numbers(kind: NamedNumbers, node: Node, label: str, scope: Scope) -> Any:
-    if not isinstance(node, tree.Mapping):
+    if not isinstance(node, tree.MapNode):
         return scope.unexpected(node, "a mapping from names to numbers", label)
     numbers = all_valid(
         _read_number(kind.number, entry, f"{label}.{name}", scope) for name, entry in node.entries.items()
@@ -275,13 +279,13 @@ def _read_named_numbers(kind: NamedNumbers, node: Node, label: str, scope: Scope
 
 
 def _read_items(kind: Items, node: Node, label: str, scope: Scope) -> Any:
-    if not isinstance(node, tree.Sequence) or not node.items:
+    if not isinstance(node, tree.ListNode) or not node.items:
         return scope.unexpected(node, "a list with at least one entry", label)
     values = all_valid([read_value(kind.item, item, label, scope) for item in node.items])
     return INVALID if kind.unique and _note_repeated(kind.unique, node, label, scope) else values
 
 
-def _note_repeated(key: str, node: tree.Sequence, label: str, scope: Scope) -> bool:
+def _note_repeated(key: str, node: tree.ListNode, label: str, scope: Scope) -> bool:
     """Note the entries of a list whose text under a key occurred before; return whether there are any."""
     entries = [_scalar_entry(item, key) for item in node.items]
     repeated = list(repetitions(entry.text if entry else None for entry in entries))
@@ -293,19 +297,19 @@ def _note_repeated(key: str, node: tree.Sequence, label: str, scope: Scope) -> b
 
 
 def _read_one_or_more(kind: OneOrMore, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, tree.Sequence):
+    if isinstance(node, tree.ListNode):
         return _read_items(kind, node, label, scope)
     one = read_value(kind.item, node, label, scope)
     return one if one is INVALID else (one,)
 
 
-def _read_pair(kind: Pair, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, tree.Mapping) and _names_sides(kind, node):
+def _read_pair(kind: PairOf, node: Node, label: str, scope: Scope) -> Any:
+    if isinstance(node, tree.MapNode) and _names_sides(kind, node):
         keys = ", ".join(map(quoted, node.entries))
         expected = "one mapping for both sides or a list of two"
         scope.problems.add(node.line, f"{label}: expected {expected}, found the keys {keys}")
         return INVALID
-    if not isinstance(node, tree.Sequence):
+    if not isinstance(node, tree.ListNode):
         both = read_value(kind.item, node, label, scope)
         return both if both is INVALID else (both, both)
     if len(node.items) != 2:
@@ -313,12 +317,12 @@ def _read_pair(kind: Pair, node: Node, label: str, scope: Scope) -> Any:
     return all_valid([read_value(kind.item, item, label, scope) for item in node.items])
 
 
-def _names_sides(kind: Pair, node: tree.Mapping) -> bool:
+def _names_sides(kind: PairOf, node: tree.MapNode) -> bool:
     """Return whether mappings stand under unknown keys, as in `{flexor: {...}, extensor: {...}}`."""
-    if not node.entries or not all(isinstance(value, tree.Mapping) for value in node.entries.values()):
+    if not node.entries or not all(isinstance(value, tree.MapNode) for value in node.entries.values()):
         return False
-    known = {"type", *(name for cls in kind.records.values() for name in declared(cls))}
-    return known.isdisjoint(node.entries)
+    item_keys = {"type", *(name for cls in kind.records.values() for name in declared_fields(cls))}
+    return item_keys.isdisjoint(node.entries)
 
 
 def _read_per_joint(kind: PerJoint, node: Node, label: str, scope: Scope) -> Any:
@@ -327,42 +331,44 @@ def _read_per_joint(kind: PerJoint, node: Node, label: str, scope: Scope) -> Any
         scope.survey.append((kind.unit, node))
         return INVALID
     exempt = scope.exempt.get(kind.purpose, {})
-    nodes = _by_joint(node, label, scope, exempt)
+    nodes = _nodes_by_joint(node, label, scope, exempt)
     if nodes is None:
         return INVALID
     return all_valid(
-        _no_number(nodes.get(name), name, exempt[name], label, scope)
+        _refuse_number(nodes.get(name), name, exempt[name], label, scope)
         if name in exempt
         else _read_number(kind.item, nodes[name], label, scope.of_member(name))
         for name in scope.members
     )
 
 
-def _no_number(node: Node | None, name: str, reason: str, label: str, scope: Scope) -> Any:
+def _refuse_number(node: Node | None, name: str, reason: str, label: str, scope: Scope) -> Any:
     """Return None for an exempt joint; note a problem if it has a value."""
-    if node is None or (isinstance(node, Scalar) and node.is_null):
+    if node is None or (isinstance(node, TextNode) and node.is_null):
         return None
     return scope.unexpected(node, f"no value for {name}", label, f": {reason}")
 
 
-def _by_joint(node: Node, label: str, scope: Scope, exempt: Mapping[str, str]) -> Mapping[str, Node] | None:
+def _nodes_by_joint(
+    node: Node, label: str, scope: Scope, exempt: Mapping[str, str]
+) -> Mapping[str, Node] | None:
     """Return the node for each joint (a scalar for all except exempt ones); None if joints are wrong."""
     names = scope.members
     match node:
-        case tree.Scalar():
+        case tree.TextNode():
             return {name: node for name in names if name not in exempt}
-        case tree.Sequence(items=items) if len(items) != len(names):
+        case tree.ListNode(items=items) if len(items) != len(names):
             expected = f"{counted(len(names), 'value')}, one for each joint ({', '.join(names)})"
-            found = f"found {len(items)}; is the file for another robot?"
-            scope.problems.add(node.line, f"{label}: expected {expected}, {found}")
+            mismatch = f"found {len(items)}; is the file for another robot?"
+            scope.problems.add(node.line, f"{label}: expected {expected}, {mismatch}")
             return None
-        case tree.Sequence(items=items):
+        case tree.ListNode(items=items):
             return dict(zip(names, items, strict=True))
-        case tree.Mapping(entries=entries):
+        case tree.MapNode(entries=entries):
             return entries if _check_names(node, label, scope, exempt) else None
 
 
-def _check_names(node: tree.Mapping, label: str, scope: Scope, exempt: Mapping[str, str]) -> bool:
+def _check_names(node: tree.MapNode, label: str, scope: Scope, exempt: Mapping[str, str]) -> bool:
     """Note names of unknown joints, and joints without a value."""
     names = scope.members
     unknown = [name for name in node.entries if name not in names]
@@ -375,22 +381,22 @@ def _check_names(node: tree.Mapping, label: str, scope: Scope, exempt: Mapping[s
     return not unknown and not missing
 
 
-def _read_mapping(kind: Record, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, tree.Mapping):
+def _read_mapping(kind: RecordOf, node: Node, label: str, scope: Scope) -> Any:
+    if isinstance(node, tree.MapNode):
         return read_record(kind.cls, node, label, scope)
-    keys = [name for name, (_, default) in declared(kind.cls).items() if default is REQUIRED]
+    keys = [name for name, (_, default) in declared_fields(kind.cls).items() if default is REQUIRED]
     needed = f" with the {'key' if len(keys) == 1 else 'keys'} {', '.join(keys)}" if keys else ""
     return scope.unexpected(node, f"a mapping{needed}", label)
 
 
 def _read_one_of(kind: OneOf, node: Node, label: str, scope: Scope) -> Any:
-    if not isinstance(node, tree.Mapping):
+    if not isinstance(node, tree.MapNode):
         return scope.unexpected(node, "a mapping with the key 'type'", label)
     selector = node.entries.get("type")
     if selector is None:
         scope.problems.add(node.line, f"{label}: missing key 'type', one of {', '.join(kind.records)}")
         return INVALID
-    if not isinstance(selector, Scalar) or (selector.text not in kind.records and selector.is_null):
+    if not isinstance(selector, TextNode) or (selector.text not in kind.records and selector.is_null):
         return scope.unexpected(selector, f"one of {', '.join(kind.records)}", f"{label}.type")
     if selector.text not in kind.records:
         reason = unknown_word(selector.text, kind.records, kind.not_yet)
@@ -399,23 +405,23 @@ def _read_one_of(kind: OneOf, node: Node, label: str, scope: Scope) -> Any:
     return read_record(kind.records[selector.text], node, label, scope, beside=("type",))
 
 
-_READERS: Mapping[type[Kind], Callable[[Any, Node, str, Scope], Any]] = {
-    Number: _read_number,
+_READERS: Mapping[type[ValueKind], Callable[[Any, Node, str, Scope], Any]] = {
+    NumberWithUnit: _read_number,
     Share: _read_share,
     Integer: _read_integer,
     Boolean: _read_boolean,
     Text: read_text,
     Name: read_text,
-    Choice: _read_choice,
-    TableFile: _read_table,
-    Vector: _read_vector,
+    WordChoice: _read_choice,
+    TablePath: _read_table_file,
+    NumberList: _read_vector,
     Interval: _read_interval,
     NamedNumbers: _read_named_numbers,
     Items: _read_items,
     OneOrMore: _read_one_or_more,
-    Pair: _read_pair,
+    PairOf: _read_pair,
     PerJoint: _read_per_joint,
-    Record: _read_mapping,
+    RecordOf: _read_mapping,
     OneOf: _read_one_of,
 }
 """The reader of each kind that more than one module declares."""

@@ -14,14 +14,14 @@ from vsacli.documents import tree
 from vsacli.documents.csv_file import (
     HEADER,
     Header,
-    cells_of,
     filled_lines,
     header_of,
+    split_cells,
     split_heading,
     wrong_count,
 )
 from vsacli.documents.expression import conversion_factor
-from vsacli.documents.fields import REQUIRED, Kind, Number, declared
+from vsacli.documents.fields import REQUIRED, NumberWithUnit, ValueKind, declared_fields
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_reader import read_record
 from vsacli.documents.source import Problems, Source, read_source
@@ -39,17 +39,17 @@ class RecordTable(NamedTuple, Generic[_Record]):
     Attributes:
         records: one record a row.
         lines: line numbers of the rows in the file.
-        others: names of columns without a field, which were not read.
+        unknown_columns: names of columns without a field, which were not read.
         source: file that was read.
     """
 
     records: tuple[_Record, ...]
     lines: tuple[int, ...]
-    others: tuple[str, ...]
+    unknown_columns: tuple[str, ...]
     source: Source
 
 
-class _Columns(NamedTuple):
+class _ColumnsByField(NamedTuple):
     """The columns of a table, assigned to fields.
 
     Attributes:
@@ -57,14 +57,14 @@ class _Columns(NamedTuple):
         places: index of the column of each field that has one.
         factors: factors that convert the numbers of a field to SI units.
         units: units of the numbers of a field, as written and SI, where they differ.
-        others: names of columns without a field.
+        unknown_columns: names of columns without a field.
     """
 
     width: int
     places: dict[str, int]
     factors: dict[str, float]
     units: dict[str, tuple[str, str]]
-    others: list[str]
+    unknown_columns: list[str]
 
 
 def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) -> RecordTable[_Record]:
@@ -85,15 +85,15 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     source, text = read_source(path, MAX_BYTES, HEADER)
     problems = Problems(source.path)
     header = header_of(BytesIO(text.encode()), source.path)
-    columns = _columns(header, cls, problems)
+    columns = _assign_columns(header, cls, problems)
     problems.check()
     records: dict[int, _Record] = {}
     first: dict[Any, int] = {}
     for number, content in filled_lines(text.splitlines(), header):
-        cells = [cell.strip() for cell in cells_of(content, header.separator)]
+        cells = [cell.strip() for cell in split_cells(content, header.separator)]
         if not any(cells):
             continue
-        record = _record(cells, columns, cls, Scope(problems, {}, {}), number)
+        record = _read_row(cells, columns, cls, Scope(problems, {}, {}), number)
         if record is not None:
             records[number] = record
             key = getattr(record, unique)
@@ -102,24 +102,24 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
     problems.check()
     if not records:
         raise InputError.one("has a header but no rows of values", source.path)
-    return RecordTable(tuple(records.values()), tuple(records), tuple(columns.others), source)
+    return RecordTable(tuple(records.values()), tuple(records), tuple(columns.unknown_columns), source)
 
 
-def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
+def _assign_columns(header: Header, cls: type, problems: Problems) -> _ColumnsByField:
     """Return the columns of a header by field; refuse an unknown name that is close to a field's."""
-    fields = declared(cls)
-    columns = _Columns(len(header.columns), {}, {}, {}, [])
+    fields = declared_fields(cls)
+    columns = _ColumnsByField(len(header.columns), {}, {}, {}, [])
     meant = set()
     for index, (name, unit) in enumerate(map(split_heading, header.columns)):
         if name in columns.places:
             problems.add(header.line, f"column {name!r} appears more than once")
         elif name in fields:
             columns.places[name] = index
-            columns.factors[name] = _factor(name, unit, fields[name][0].kind, header.line, problems)
+            columns.factors[name] = _factor_to_si(name, unit, fields[name][0].kind, header.line, problems)
             if columns.factors[name] != 1 and unit is not None:
                 columns.units[name] = unit, fields[name][0].quantity.revolute
         else:
-            columns.others.append(name)
+            columns.unknown_columns.append(name)
             near = nearest(name, fields)
             if near is not None:
                 problems.add(header.line, f"unknown column {tree.quoted(name)}; did you mean {near!r}?")
@@ -136,11 +136,11 @@ def _columns(header: Header, cls: type, problems: Problems) -> _Columns:
     return columns
 
 
-def _factor(name: str, unit: str | None, kind: Kind, line: int, problems: Problems) -> float:
+def _factor_to_si(name: str, unit: str | None, kind: ValueKind, line: int, problems: Problems) -> float:
     if unit is None:
         return 1.0
     try:
-        if not isinstance(kind, Number):
+        if not isinstance(kind, NumberWithUnit):
             raise InputError.one("holds texts, which have no unit")
         return 1.0 if unit == kind.unit.revolute else conversion_factor(unit, kind.unit.revolute)
     except InputError as error:
@@ -148,38 +148,40 @@ def _factor(name: str, unit: str | None, kind: Kind, line: int, problems: Proble
         return math.nan
 
 
-def _record(
-    cells: Sequence[str], columns: _Columns, cls: type[_Record], scope: Scope, line: int
+def _read_row(
+    cells: Sequence[str], columns: _ColumnsByField, cls: type[_Record], scope: Scope, line: int
 ) -> _Record | None:
     """Return the record of a row; None if its problems were noted."""
     if len(cells) != columns.width:
         hint = "; names with the separator in them go in double quotes" if len(cells) > columns.width else ""
         scope.problems.add(line, f"{wrong_count(columns.width, len(cells))}{hint}")
         return None
-    given = {
-        field: tree.Scalar(line, _in_si(cells[index], columns.factors[field]), plain=False)
+    cell_nodes = {
+        field: tree.TextNode(line, _in_si(cells[index], columns.factors[field]), plain=False)
         for field, index in columns.places.items()
         if cells[index]
     }
     missing = [
-        name for name, (_, default) in declared(cls).items() if default is REQUIRED and name not in given
+        name
+        for name, (_, default) in declared_fields(cls).items()
+        if default is REQUIRED and name not in cell_nodes
     ]
     for name in missing:
         scope.problems.add(line, f"column {name!r} is empty")
     if missing:
         return None
     problems = Problems(scope.problems.file)
-    mapping = tree.Mapping(line, given, dict.fromkeys(given, line))
+    mapping = tree.MapNode(line, cell_nodes, dict.fromkeys(cell_nodes, line))
     record = read_record(cls, mapping, "", scope._replace(problems=problems))
     try:
         problems.check()
     except InputError as error:
         for problem in error.problems:
-            scope.problems.add(line, _as_written(problem.message, cells, columns))
+            scope.problems.add(line, _in_file_units(problem.message, cells, columns))
     return None if record is INVALID else record
 
 
-def _as_written(message: str, cells: Sequence[str], columns: _Columns) -> str:
+def _in_file_units(message: str, cells: Sequence[str], columns: _ColumnsByField) -> str:
     """Return a message about a converted number with the number and unit of the file."""
     field = message.partition(":")[0]
     if field not in columns.units:

@@ -13,16 +13,16 @@ from vsacli.base.texts import on_one_line
 from vsacli.base.units import Quantity
 from vsacli.documents.fields import (
     Items,
-    Kind,
     NamedNumbers,
     OneOf,
     OwnKind,
-    Pair,
+    PairOf,
     PerJoint,
-    Record,
-    TableFile,
+    RecordOf,
+    TablePath,
     Text,
-    declared,
+    ValueKind,
+    declared_fields,
     variant_inside,
 )
 from vsacli.documents.record_checks import DeclaredRecord
@@ -46,8 +46,8 @@ class ResolvedField(NamedTuple):
     values: np.ndarray[Any, np.dtype[Any]]
 
 
-def arrays(
-    kind: Kind, content: Any, of_record: Callable[[Any], Iterable[ResolvedField]]
+def resolve_values(
+    kind: ValueKind, content: Any, of_record: Callable[[Any], Iterable[ResolvedField]]
 ) -> Iterator[ResolvedField]:
     """Yield a value of a kind as arrays; `of_record` yields the arrays of a nested record.
 
@@ -55,33 +55,33 @@ def arrays(
         TypeError: the kind has no array form.
     """
     match kind:
-        case Record():
+        case RecordOf():
             yield from of_record(content)
         case OneOf():
-            yield _single(Text(), kind.word_of(content))._replace(path=("type",))
+            yield _resolve_single(Text(), kind.word_of(content))._replace(path=("type",))
             yield from of_record(content)
         case NamedNumbers():
             for name, entry in content:
-                yield _single(kind.number, entry)._replace(path=(name,))
-        case Pair(item, dim):
-            yield from _stacked(dim, (arrays(item, side, of_record) for side in content))
+                yield _resolve_single(kind.number, entry)._replace(path=(name,))
+        case PairOf(item, dim):
+            yield from _stack_members(dim, (resolve_values(item, side, of_record) for side in content))
         case Items(item=item, records=records) if records:
-            yield from _stacked("joint", (arrays(item, joint, of_record) for joint in content))
+            yield from _stack_members("joint", (resolve_values(item, joint, of_record) for joint in content))
         case _:
-            yield _single(kind, content)
+            yield _resolve_single(kind, content)
 
 
-def _single(kind: Kind, content: Any) -> ResolvedField:
+def _resolve_single(kind: ValueKind, content: Any) -> ResolvedField:
     """Return one text, one number, or numbers along dimensions; the caller sets path and description."""
     if kind.dims is None:
         raise TypeError(f"a field of the kind {type(kind).__name__} has no array form")
     if kind.unit is None:  # booleans too, which some HDF5 readers lack
-        text = content.source.path if isinstance(kind, TableFile) else on_one_line(content)
+        text = content.source.path if isinstance(kind, TablePath) else on_one_line(content)
         return ResolvedField((), kind.dims, None, "", np.array(text, dtype=object))
     return ResolvedField((), kind.dims, kind.unit, "", np.array(content, dtype=np.float64))
 
 
-def _stacked(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[ResolvedField]:
+def _stack_members(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[ResolvedField]:
     """Join the fields of all joints, or of both sides of a joint, along a new first axis.
 
     The variant of a field with most dimensions determines the shape: joints may have one or two motors or
@@ -95,11 +95,11 @@ def _stacked(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[R
             prototypes[part.path] = part
     for path, part in prototypes.items():
         absent = np.full_like(part.values, "" if part.quantity is None else np.nan)
-        values = np.stack([_fitted(table.get(path, absent), absent) for table in tables])
+        values = np.stack([_pad_to_both_sides(table.get(path, absent), absent) for table in tables])
         yield part._replace(dims=(dim, *part.dims), values=values)
 
 
-def _fitted(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+def _pad_to_both_sides(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     """Return the values in the shape of two sides; values of one side become the first."""
     if values.shape == absent.shape:
         return values
@@ -111,30 +111,30 @@ def _fitted(values: np.ndarray[Any, Any], absent: np.ndarray[Any, Any]) -> np.nd
 def json_fields(record: DeclaredRecord) -> dict[str, Any]:
     """Return the declared fields of a record as JSON values, except that numbers may be non-finite."""
     return {
-        name: None if (content := getattr(record, name)) is None else json_value(field.kind, content)
-        for name, (field, _) in declared(type(record)).items()
+        name: None if (content := getattr(record, name)) is None else value_as_json(field.kind, content)
+        for name, (field, _) in declared_fields(type(record)).items()
     }
 
 
-def json_value(kind: Kind, content: Any, of_record: Callable[[Any], Any] = json_fields) -> Any:
+def value_as_json(kind: ValueKind, content: Any, of_record: Callable[[Any], Any] = json_fields) -> Any:
     """Return a value of a kind as JSON value, except that numbers may be non-finite."""
     match kind:
         case OwnKind():
             return kind.json_value(content, of_record)
-        case Record():
+        case RecordOf():
             return of_record(content)
         case OneOf():
             return {"type": kind.word_of(content), **of_record(content)}
         case NamedNumbers():
             return dict(content)
-        case TableFile():
+        case TablePath():
             return content.source.path
-        case Kind(item=Kind() as item):
-            return [json_value(item, entry, of_record) for entry in content]
+        case ValueKind(item=ValueKind() as item):
+            return [value_as_json(item, entry, of_record) for entry in content]
     return content
 
 
-class Entry(NamedTuple):
+class PathIndex(NamedTuple):
     """An element of a path into a list or values by joint: index from 0, and the name if it has one."""
 
     number: int
@@ -144,11 +144,11 @@ class Entry(NamedTuple):
         return self.name or str(self.number)
 
 
-NumberPath: TypeAlias = tuple[str | Entry, ...]
+NumberPath: TypeAlias = tuple[str | PathIndex, ...]
 """Path to a number of a file; users write it joined by dots."""
 
 
-class Number(NamedTuple):
+class NumberAtPath(NamedTuple):
     """A number of a record.
 
     Attributes:
@@ -164,12 +164,12 @@ class Number(NamedTuple):
     requirement: str
 
 
-def numbers(
+def numbers_in_record(
     record: Any,
     members: Mapping[str, str] = MappingProxyType({}),
     path: NumberPath = (),
     variant: str | None = None,
-) -> Iterator[Number]:
+) -> Iterator[NumberAtPath]:
     """Yield every finite number in the declared fields of a record, nested records included.
 
     Args:
@@ -181,34 +181,38 @@ def numbers(
     cls = type(record)
     if hasattr(cls, "unit_variants"):
         variant = variant_inside(cls, getattr(record, cls.unit_variant), variant)
-    for name, (field, _) in declared(cls).items():
+    for name, (field, _) in declared_fields(cls).items():
         requirement = "" if field.check is None else field.check.requirement
-        yield from _numbers(field.kind, getattr(record, name), requirement, members, (*path, name), variant)
+        yield from _numbers_in_value(
+            field.kind, getattr(record, name), requirement, members, (*path, name), variant
+        )
 
 
-def _numbers(
-    kind: Kind,
+def _numbers_in_value(
+    kind: ValueKind,
     content: Any,
     requirement: str,
     members: Mapping[str, str],
     path: NumberPath,
     variant: str | None,
-) -> Iterator[Number]:
+) -> Iterator[NumberAtPath]:
     if content is None:
         return
-    if isinstance(kind, Pair) and content[0] is content[1]:
-        yield from _numbers(kind.item, content[0], requirement, members, path, variant)
+    if isinstance(kind, PairOf) and content[0] is content[1]:
+        yield from _numbers_in_value(kind.item, content[0], requirement, members, path, variant)
     elif kind.item is not None:
         names = entry_names(kind, content, members)
         for number, (name, entry) in enumerate(zip(names, content, strict=True)):
-            yield from _numbers(kind.item, entry, requirement, members, (*path, Entry(number, name)), variant)
+            yield from _numbers_in_value(
+                kind.item, entry, requirement, members, (*path, PathIndex(number, name)), variant
+            )
     elif kind.records:
-        yield from numbers(content, members, path, variant)
+        yield from numbers_in_record(content, members, path, variant)
     elif kind.unit is not None and math.isfinite(content):
-        yield Number(path, kind.unit.inside(variant), float(content), requirement)
+        yield NumberAtPath(path, kind.unit.inside(variant), float(content), requirement)
 
 
-def entry_names(kind: Kind, content: Any, members: Mapping[str, str]) -> list[str]:
+def entry_names(kind: ValueKind, content: Any, members: Mapping[str, str]) -> list[str]:
     """Return the names of a value's entries, "" if an entry has none; `members` are the joints, if known."""
     if isinstance(kind, PerJoint) and members:
         return list(members)

@@ -140,14 +140,14 @@ def _refusing(name: str) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError:
-        raise InputError.one(f"no such file{_sibling(name)}", name) from None
+        raise InputError.one(f"no such file{_hint_for_missing_file(name)}", name) from None
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror}", name) from None
     except ValueError:
         raise InputError.one("the path holds a NUL character", name) from None
 
 
-def _sibling(name: str) -> str:
+def _hint_for_missing_file(name: str) -> str:
     if name.startswith(IN_PACKAGE):
         package, _, rest = name.removeprefix(IN_PACKAGE).partition("/")
         return f"; of a file in a ROS package give the path, $(ros2 pkg prefix --share {package})/{rest}"
@@ -166,7 +166,7 @@ class Problems:
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self._found: list[Problem] = []
+        self._problems: list[Problem] = []
         self._faults: set[tuple[int, str]] = set()
 
     def add(self, line: int, message: str, fault: str = "") -> None:
@@ -184,16 +184,16 @@ class Problems:
         if fault and (line, fault) in self._faults:
             return
         self._faults.add((line, fault))
-        if len(self._found) == MAX_PROBLEMS:
-            self._found.append(
+        if len(self._problems) == MAX_PROBLEMS:
+            self._problems.append(
                 Problem(self.file, line, f"more than {MAX_PROBLEMS} problems; reading stopped here")
             )
             self.check()
-        self._found.append(Problem(self.file, line, message))
+        self._problems.append(Problem(self.file, line, message))
 
     def include(self, error: InputError) -> None:
         """Note the problems of another file that this file refers to."""
-        self._found.extend(error.problems)
+        self._problems.extend(error.problems)
 
     def fail(self, line: int, message: str) -> NoReturn:
         """Raise this problem, after which nothing can be read, with all problems found so far."""
@@ -205,12 +205,12 @@ class Problems:
         Raises:
             InputError: with every problem once, ordered by line.
         """
-        if self._found:
+        if self._problems:
             raise InputError(self._in_order())
 
     def _in_order(self, *last: Problem) -> list[Problem]:
         return sorted(
-            dict.fromkeys([*self._found, *last]), key=lambda problem: (problem.file != self.file, problem)
+            dict.fromkeys([*self._problems, *last]), key=lambda problem: (problem.file != self.file, problem)
         )
 
 
@@ -301,7 +301,7 @@ def refuse_other_formats(path: str | os.PathLike[str]) -> None:
     name = os.fspath(path)
     if noun := unreadable(name):
         raise InputError.one(f"is a {noun}; expected text", name) from None
-    sentence = SENTENCES.get(_format(name))
+    sentence = SENTENCES.get(_recognize_format(name))
     if sentence is None:
         return
     stem = PurePath(name).name.split(".")[0] or "arm"
@@ -319,10 +319,10 @@ def refuse_other_formats(path: str | os.PathLike[str]) -> None:
 
 def unreadable(path: str | os.PathLike[str]) -> str:
     """Return what a file is that no command reads, such as `PNG image`; empty for other files."""
-    return UNREADABLE.get(_format(os.fspath(path)), "")
+    return UNREADABLE.get(_recognize_format(os.fspath(path)), "")
 
 
-def _format(name: str) -> str:
+def _recognize_format(name: str) -> str:
     """Return the format by the content, or else by the ending; empty if unknown."""
     ending = PurePath(name).suffix.lower().removeprefix(".")
     try:
@@ -333,25 +333,27 @@ def _format(name: str) -> str:
             beginning = file.read(BEGINNING_BYTES)
     except (OSError, ValueError):
         return ""  # reported before
-    found = next((known for signature, known in SIGNATURES.items() if beginning.startswith(signature)), "")
+    by_content = next(
+        (format_name for signature, format_name in SIGNATURES.items() if beginning.startswith(signature)), ""
+    )
     by_name = ENDINGS.get(ending, ending)
-    if found:  # spreadsheets and the like are ZIP archives
-        return by_name if found == "zip" and by_name in SENTENCES else found
+    if by_content:  # spreadsheets and the like are ZIP archives
+        return by_name if by_content == "zip" and by_name in SENTENCES else by_content
     text = beginning.decode("latin-1").lstrip("\ufeffï»¿ \t\r\n")
     if text.startswith("<"):
-        return _of_xml(text, ending)
+        return _recognize_xml(text, ending)
     if by_name in SENTENCES:
         return by_name if b"\0" in beginning else ""
-    return "" if beginning.startswith((HDF5_SIGNATURE, *UTF16_MARKS)) else _binary(beginning)
+    return "" if beginning.startswith((HDF5_SIGNATURE, *UTF16_MARKS)) else _binary_if_nul_bytes(beginning)
 
 
-def _binary(beginning: bytes) -> str:
+def _binary_if_nul_bytes(beginning: bytes) -> str:
     """Return `binary` for a first line with many NUL bytes; other lines of a damaged table may have some."""
     first = beginning.partition(b"\n")[0]
     return "binary" if len(first) <= 3 * first.count(0) > 0 else ""
 
 
-def _of_xml(text: str, ending: str) -> str:
+def _recognize_xml(text: str, ending: str) -> str:
     tag = _ROOT_TAG.search(_COMMENT.sub("", text))
     root = tag[1] if tag else ""
     if root != "robot":

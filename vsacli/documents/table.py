@@ -19,7 +19,7 @@ from vsacli.documents.csv_file import (
     CHUNK,
     MAX_BYTES,
     Header,
-    Rows,
+    RowsToRead,
     filled_lines,
     header_of,
     read_numbers,
@@ -42,7 +42,7 @@ it if there are 100 rows in a second."""
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class CsvTable:
     """A table read from a file.
 
     Attributes:
@@ -51,7 +51,7 @@ class Table:
             cells, if these are allowed.
         source: file that was read.
         header: header of the file.
-        others: names of columns that were not read because they are unknown.
+        unknown_columns: names of columns that were not read because they are unknown.
         ignored: names of columns that the mapping leaves out.
         first_stamp: first time, which was subtracted, if times were too large for floating point or clock
             texts.
@@ -65,7 +65,7 @@ class Table:
     values: FloatArray = field(repr=False)
     source: Source
     header: Header = NO_HEADER
-    others: tuple[str, ...] = ()
+    unknown_columns: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
     first_stamp: int | str | None = None
     kept: IndexArray | None = field(repr=False, default=None)
@@ -74,27 +74,27 @@ class Table:
     joined: int = 0
 
     @cached_property
-    def lines(self) -> Lines:
+    def lines(self) -> RowLines:
         """Line numbers of the rows in the file."""
-        return Lines(self.source.path, self.header, self.kept)
+        return RowLines(self.source.path, self.header, self.kept)
 
     def line_of(self, row: int) -> int:
         """Return the line number of a row counted from 0; 0 if the file no longer exists."""
         return self.lines.of(row)
 
-    def without_empty_rows(self, *, stamped: bool = False) -> Table:
+    def without_empty_rows(self, *, stamped: bool = False) -> CsvTable:
         """Return the rows with a number in any column but the time; others are of other topics of a log.
 
         Args:
             stamped: whether to keep rows with no number but the time, which may be the beginning of the log.
         """
         cells = self.values if stamped else self.values[:, self._signals]
-        there = ~np.isnan(cells).all(axis=1)
-        if there.all() or not there.any():
+        has_number = ~np.isnan(cells).all(axis=1)
+        if has_number.all() or not has_number.any():
             return self
-        return replace(self, values=self.values[there], kept=np.flatnonzero(there))
+        return replace(self, values=self.values[has_number], kept=np.flatnonzero(has_number))
 
-    def without_hollow_columns(self) -> Table:
+    def without_hollow_columns(self) -> CsvTable:
         """Return the columns that hold a number; the others become `hollow`."""
         empty = np.isnan(self.values).all(axis=0) & (len(self.values) > 0)
         if not empty.any():
@@ -105,28 +105,28 @@ class Table:
             self, columns=tuple(self.columns[at] for at in full), values=self.values[:, full], hollow=hollow
         )
 
-    def with_joined_rows(self) -> Table:
+    def with_joined_rows(self) -> CsvTable:
         """Return the table with rows joined whose stamps are nearly equal, and that fill different columns.
 
         Some loggers write one row for each signal of a message, a nanosecond apart. Nothing is joined if two
         of such rows hold numbers in the same column.
         """
-        there = ~np.isnan(self.values[:, self._signals])
-        at = next((index for index in range(len(self.columns)) if index not in self._signals), None)
-        if at is None or there.all() or not there.any():
+        has_number = ~np.isnan(self.values[:, self._signals])
+        time_column = next((index for index in range(len(self.columns)) if index not in self._signals), None)
+        if time_column is None or has_number.all() or not has_number.any():
             return self
-        stamps = self.values[:, at]
-        intervals = np.abs(np.diff(stamps[there[:, int(np.argmax(there.sum(axis=0)))]]))
+        stamps = self.values[:, time_column]
+        intervals = np.abs(np.diff(stamps[has_number[:, int(np.argmax(has_number.sum(axis=0)))]]))
         # seconds since 1970 have 7 decimals in floating point
         rounding = 2 * float(np.spacing(np.abs(stamps).max()))
         near = max(rounding, SAME_STAMP * float(np.median(intervals)) if intervals.size else 0.0)
         starts = np.append(0, np.flatnonzero(~(np.abs(np.diff(stamps)) <= near)) + 1)
-        filled = np.add.reduceat(there.astype(int), starts, axis=0)
+        filled = np.add.reduceat(has_number.astype(int), starts, axis=0)
         if len(starts) == len(stamps) or filled.max() > 1:
             return self
         values = np.add.reduceat(np.nan_to_num(self.values), starts, axis=0)
         values[:, self._signals] = np.where(filled > 0, values[:, self._signals], np.nan)
-        values[:, at] = stamps[starts]
+        values[:, time_column] = stamps[starts]
         kept = starts if self.kept is None else self.kept[starts]
         return replace(self, values=values, kept=kept, joined=len(stamps) - len(starts))
 
@@ -137,7 +137,7 @@ class Table:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class RowLines:
     """Line numbers of the rows of a table, found by reading the file once more.
 
     Attributes:
@@ -168,10 +168,10 @@ class Lines:
 def read_table(
     path: str | os.PathLike[str],
     mapping: ColumnMapping = AS_NAMED,
-    known: Collection[str] | None = None,
+    readable_names: Collection[str] | None = None,
     *,
     empty_cells: bool = False,
-) -> Table:
+) -> CsvTable:
     """Read a CSV file, at about the cost in time and memory of `numpy.loadtxt`.
 
     The first line names the columns, quoted or not; a tab, semicolon or comma in it is the separator, else
@@ -181,7 +181,7 @@ def read_table(
     Args:
         path: path of the file; UTF-8, with or without a byte order mark.
         mapping: names of foreign columns, and columns to leave out.
-        known: names of columns to read, if present; all if None.
+        readable_names: names of columns to read, if present; all if None.
         empty_cells: whether cells may be empty, or hold `nan`, `NA` or the like.
 
     Raises:
@@ -199,9 +199,9 @@ def read_table(
                     numbered=mapping.numbers,
                     skipped=mapping.skip_rows,
                 )
-                digest, text = _survey(content, name)
-            chosen = mapping.applied(header, known, name)
-            headings, values, first_stamp = _values(name, header, chosen, empty_cells)
+                digest, text = _digest_and_text(content, name)
+            chosen = mapping.choose_columns(header, readable_names, name)
+            headings, values, first_stamp = _read_values(name, header, chosen, empty_cells)
             rated = mapping.rate is not None and chosen.time is None and len(values) > 0
             if rated:
                 headings = (*headings, TIME)
@@ -211,19 +211,19 @@ def read_table(
         raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None
     if not chosen.places:
         refuse_other_formats(name)
-    return Table(
+    return CsvTable(
         headings,
         values,
         source,
         header,
-        chosen.others,
+        chosen.unknown_columns,
         chosen.ignored,
         first_stamp=first_stamp,
         rated=rated,
     )
 
 
-def _survey(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
+def _digest_and_text(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
     """Return the SHA-256 of a file, and its content if kept; refuse NUL characters and very long lines."""
     content.seek(0)
     digest, line, text = hashlib.sha256(), 1, b""
@@ -241,33 +241,33 @@ def _survey(content: BinaryIO, name: str) -> tuple[str, bytes | None]:
     return digest.hexdigest(), text if len(text) <= MAX_DOCUMENT_BYTES else None
 
 
-def _values(
+def _read_values(
     name: str, header: Header, chosen: ChosenColumns, empty_cells: bool
 ) -> tuple[tuple[str, ...], FloatArray, int | str | None]:
     """Return headings and numbers of the columns, and the first stamp if it was subtracted from the times."""
     if not chosen.places:
         return chosen.headings, np.empty((0, 0)), None
-    rows = Rows(name, header, chosen.places, empty_cells)
+    rows = RowsToRead(name, header, chosen.places, empty_cells)
     if chosen.time is None:
-        return chosen.headings, _scaled(read_numbers(rows), chosen), None
+        return chosen.headings, _apply_factors(read_numbers(rows), chosen), None
     headings, column = chosen.headings, chosen.places.index(chosen.time)
     times = rows._replace(used=(chosen.time,))
     if shows_a_clock(times._replace(empty_cells=True)):
-        others = [place for place in chosen.places if place != chosen.time]
-        numbers = read_numbers(rows._replace(used=others)) if others else np.empty((0, 0))
+        other_places = [place for place in chosen.places if place != chosen.time]
+        numbers = read_numbers(rows._replace(used=other_places)) if other_places else np.empty((0, 0))
         first, stamps = read_clocks(times)
-        values = np.insert(numbers, column, stamps, axis=1) if others else stamps[:, None]
+        values = np.insert(numbers, column, stamps, axis=1) if other_places else stamps[:, None]
         heading = f"{split_heading(headings[column])[0]} [ns]"
         headings = (*headings[:column], heading, *headings[column + 1 :])
-        return headings, _scaled(values, chosen), first
+        return headings, _apply_factors(values, chosen), first
     values = read_numbers(rows)
     since, values[:, column] = read_stamps(rows, chosen.time, chosen.nanoseconds, values[:, column])
     if since is not None:
         _check_unit(since, headings[column], name, header.line)
-    return headings, _scaled(values, chosen), since
+    return headings, _apply_factors(values, chosen), since
 
 
-def _scaled(values: FloatArray, chosen: ChosenColumns) -> FloatArray:
+def _apply_factors(values: FloatArray, chosen: ChosenColumns) -> FloatArray:
     for column, factor in enumerate(chosen.factors):
         if factor != 1:
             values[:, column] *= factor

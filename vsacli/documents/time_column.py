@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.documents.csv_file import Rows, is_missing, is_number, read_integers
+from vsacli.documents.csv_file import RowsToRead, is_missing, is_number, read_integers
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -80,7 +80,7 @@ _CLOCK = re.compile(
 )
 
 
-class Clock(NamedTuple):
+class ClockTime(NamedTuple):
     """A time read from a clock text.
 
     Attributes:
@@ -92,28 +92,28 @@ class Clock(NamedTuple):
     dated: bool
 
 
-def read_clock(text: str) -> Clock | None:
+def read_clock(text: str) -> ClockTime | None:
     """Return the time of a clock text; None if the text has no supported form."""
-    found = _CLOCK.fullmatch(text.strip())
-    if found is None:
+    match = _CLOCK.fullmatch(text.strip())
+    if match is None:
         return None
-    hours = int(found["hours"])
-    if hours > (12 if found["half"] else 23):
+    hours = int(match["hours"])
+    if hours > (12 if match["half"] else 23):
         return None
-    if found["half"]:
-        hours = hours % 12 + 12 * (found["half"].upper() == "PM")
-    fraction = (found["fraction"] or found["after_colon"] or "").ljust(DIGITS, "0")[:DIGITS]
-    whole = hours * 3600 + int(found["minutes"]) * 60 + int(found["seconds"]) - _offset(found["zone"])
-    if found["year"] is not None:
+    if match["half"]:
+        hours = hours % 12 + 12 * (match["half"].upper() == "PM")
+    fraction = (match["fraction"] or match["after_colon"] or "").ljust(DIGITS, "0")[:DIGITS]
+    whole = hours * 3600 + int(match["minutes"]) * 60 + int(match["seconds"]) - _zone_offset(match["zone"])
+    if match["year"] is not None:
         try:
-            day = date(int(found["year"]), int(found["month"]), int(found["day"]))
+            day = date(int(match["year"]), int(match["month"]), int(match["day"]))
         except ValueError:
             return None
         whole += (day.toordinal() - date(1970, 1, 1).toordinal()) * 86400
-    return Clock(whole * NANOSECONDS + int(fraction), found["year"] is not None)
+    return ClockTime(whole * NANOSECONDS + int(fraction), match["year"] is not None)
 
 
-def _offset(zone: str | None) -> int:
+def _zone_offset(zone: str | None) -> int:
     """Return the offset of a time zone from UTC, s."""
     if zone is None or zone.upper() == "Z":
         return 0
@@ -121,7 +121,7 @@ def _offset(zone: str | None) -> int:
     return -60 * minutes if zone[0] == "-" else 60 * minutes
 
 
-def elapsed(clocks: Sequence[Clock]) -> npt.NDArray[np.int64]:
+def nanoseconds_since_first(clocks: Sequence[ClockTime]) -> npt.NDArray[np.int64]:
     """Return the time from the first clock to each one, ns.
 
     A time of day that is more than twelve hours earlier than the one before it belongs to the next day.
@@ -160,13 +160,13 @@ def are_seconds_and_nanoseconds(seconds: Sequence[float], rest: Sequence[float],
     )
 
 
-def shows_a_clock(times: Rows) -> bool:
+def shows_a_clock(times: RowsToRead) -> bool:
     """Return whether the only column of these rows, the times, begins with a clock text.
 
     Raises:
         InputError: the column begins with a text that is neither a clock text nor a number.
     """
-    line, cell = next(_cells(times), (0, ""))
+    line, cell = next(_time_cells(times), (0, ""))
     if is_number(cell.replace(",", ".")) or is_missing(cell):
         return False
     if read_clock(cell) is None:
@@ -175,28 +175,28 @@ def shows_a_clock(times: Rows) -> bool:
     return True
 
 
-def read_clocks(times: Rows) -> tuple[str, FloatArray]:
+def read_clocks(times: RowsToRead) -> tuple[str, FloatArray]:
     """Return the first clock text of the only column of these rows, and the time since then in each row, ns.
 
     Raises:
         InputError: a cell is not a clock text, or not all cells have a date, or none.
     """
-    cells, clocks = list(_cells(times)), list[Clock]()
+    cells, clocks = list(_time_cells(times)), list[ClockTime]()
     for line, cell in cells:
         clock = read_clock(cell)
         if clock is None or clock.dated != (clocks or [clock])[0].dated:
             message = f"expected a time as in the rows above, found {cell[:40]!r}"
             raise InputError.one(message, times.path, line)
         clocks.append(clock)
-    return cells[0][1], elapsed(clocks).astype(float)
+    return cells[0][1], nanoseconds_since_first(clocks).astype(float)
 
 
-def _cells(times: Rows) -> Iterator[tuple[int, str]]:
+def _time_cells(times: RowsToRead) -> Iterator[tuple[int, str]]:
     return ((line, cells[times.used[0]].strip()) for line, cells in times.texts())
 
 
 def read_stamps(
-    times: Rows, time: int, nanoseconds: int | None, stamps: FloatArray
+    times: RowsToRead, time: int, nanoseconds: int | None, stamps: FloatArray
 ) -> tuple[int | None, FloatArray]:
     """Return the first stamp and the exact times since then; None and the stamps if they are small.
 

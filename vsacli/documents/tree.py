@@ -8,8 +8,7 @@ constructed. Plain anchors and aliases are supported.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from collections.abc import Mapping as AbstractMapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple, NoReturn, TypeAlias
 
 import yaml
@@ -40,7 +39,7 @@ NULLS = frozenset({"", "~", "null"})
 """Texts without quotes that stand for nothing, in lower case."""
 
 
-class Scalar(NamedTuple):
+class TextNode(NamedTuple):
     """A text as written.
 
     Attributes:
@@ -64,7 +63,7 @@ class Scalar(NamedTuple):
         return self.plain and self.text.lower() in NULLS
 
 
-class Sequence(NamedTuple):
+class ListNode(NamedTuple):
     """A list."""
 
     line: int
@@ -74,29 +73,29 @@ class Sequence(NamedTuple):
         return f"a list of {counted(len(self.items), 'value')}" if self.items else "an empty list"
 
 
-class Mapping(NamedTuple):
+class MapNode(NamedTuple):
     """Keys with their lines and values, in the order of the file."""
 
     line: int
-    entries: AbstractMapping[str, Node]
-    key_lines: AbstractMapping[str, int]
+    entries: Mapping[str, Node]
+    key_lines: Mapping[str, int]
 
     def __str__(self) -> str:
         return "a mapping"
 
 
-Node: TypeAlias = Scalar | Sequence | Mapping
+Node: TypeAlias = TextNode | ListNode | MapNode
 """A node of a document; its string completes "found ..." in messages. Aliases share one node."""
 
 
 def plain(node: Node) -> Any:
     """Return a node as plain data: texts as written; unquoted null, true and false as Python values."""
     match node:
-        case Mapping(entries=entries):
+        case MapNode(entries=entries):
             return {key: plain(entry) for key, entry in entries.items()}
-        case Sequence(items=items):
+        case ListNode(items=items):
             return [plain(item) for item in items]
-        case Scalar(text="true" | "false" as word, plain=True):
+        case TextNode(text="true" | "false" as word, plain=True):
             return word == "true"
     return None if node.is_null else node.text
 
@@ -118,8 +117,8 @@ class Scope(NamedTuple):
     """
 
     problems: Problems
-    members: AbstractMapping[str, str]
-    exempt: AbstractMapping[str, AbstractMapping[str, str]]
+    members: Mapping[str, str]
+    exempt: Mapping[str, Mapping[str, str]]
     variant: str | None = None
     survey: list[tuple[Quantity, Node]] | None = None
 
@@ -129,7 +128,7 @@ class Scope(NamedTuple):
 
     def unexpected(self, node: Node, expected: str, label: str, reason: str = "") -> Any:
         """Note that something else than expected was found, unless noted before, and return INVALID."""
-        if isinstance(node, Scalar) and node.noted:
+        if isinstance(node, TextNode) and node.noted:
             return INVALID
         self.problems.add(node.line, f"{label}: expected {expected}, found {node}{reason}")
         return INVALID
@@ -159,10 +158,10 @@ def parse_yaml(text: str, problems: Problems) -> Node:
         problems.fail(
             line, f"the character U+{ord(unprintable[0]):04X} is not allowed in YAML; is this a text file?"
         )
-    builder = _Builder(problems)
+    builder = _TreeBuilder(problems)
     try:
         for event in yaml.parse(text, Loader=_LOADER):
-            builder.take(event)
+            builder.add_event(event)
     except yaml.MarkedYAMLError as error:
         _fail_with_syntax(error, text, problems)
     if builder.root is None:
@@ -202,7 +201,7 @@ class _OpenSequence:
         self._items.append(node)
 
     def close(self) -> Node:
-        return Sequence(self.line, tuple(self._items))
+        return ListNode(self.line, tuple(self._items))
 
 
 class _OpenMapping:
@@ -228,12 +227,12 @@ class _OpenMapping:
         problem = self._key_problem(key)
         if problem:
             self._problems.add(key.line, problem)
-        elif isinstance(key, Scalar):
+        elif isinstance(key, TextNode):
             self._entries[key.text] = node
             self._key_lines[key.text] = key.line
 
     def _key_problem(self, key: Node) -> str | None:
-        if not isinstance(key, Scalar):
+        if not isinstance(key, TextNode):
             return f"a key must be a word, found {key}"
         if key.plain and key.text == "<<":
             return "merge keys (<<) are not allowed; write the entries out, or alias the whole value"
@@ -242,7 +241,7 @@ class _OpenMapping:
         return None
 
     def close(self) -> Node:
-        return Mapping(self.line, self._entries, self._key_lines)
+        return MapNode(self.line, self._entries, self._key_lines)
 
 
 _Open: TypeAlias = _OpenSequence | _OpenMapping
@@ -254,7 +253,7 @@ class _Anchored(NamedTuple):
     height: int
 
 
-class _Builder:
+class _TreeBuilder:
     """A builder that receives events one by one and stores the document in `root`."""
 
     def __init__(self, problems: Problems) -> None:
@@ -264,22 +263,22 @@ class _Builder:
         self._anchors: dict[str, _Anchored] = {}
         self._nodes = 0
 
-    def take(self, event: yaml.Event) -> None:
+    def add_event(self, event: yaml.Event) -> None:
         line = event.start_mark.line + 1 if event.start_mark else 0
         match event:
             case yaml.DocumentStartEvent() if self.root is not None:
                 self._problems.fail(line, "a second document begins here; a file holds exactly one")
             case yaml.ScalarEvent():
                 self._refuse_tag(event, line)
-                node = Scalar(line, event.value, plain=not event.style)
-                self._place(_Anchored(node, 1, 0), line, event.anchor)
+                node = TextNode(line, event.value, plain=not event.style)
+                self._add_value(_Anchored(node, 1, 0), line, event.anchor)
             case yaml.AliasEvent():
-                self._place(self._resolve(str(event.anchor), line), line)
+                self._add_value(self._resolve(str(event.anchor), line), line)
             case yaml.CollectionStartEvent():
                 self._refuse_tag(event, line)
-                self._begin(event, line)
+                self._open_collection(event, line)
             case yaml.CollectionEndEvent():
-                self._end()
+                self._close_collection()
 
     def _refuse_tag(self, event: yaml.ScalarEvent | yaml.CollectionStartEvent, line: int) -> None:
         if event.tag is not None:
@@ -293,12 +292,14 @@ class _Builder:
             self._problems.add(line, f"the alias *{name} is inside the value of its own anchor &{name}")
         else:
             near = nearest(name, self._anchors)
-            known = f" (line {self._anchors[near].node.line})" if near else ""
-            hint = f"; did you mean *{near}{known}?" if near else f"; write &{name} before a value above"
+            anchor_line = f" (line {self._anchors[near].node.line})" if near else ""
+            hint = (
+                f"; did you mean *{near}{anchor_line}?" if near else f"; write &{name} before a value above"
+            )
             self._problems.add(line, f"the alias *{name} has no anchor{hint}")
-        return _Anchored(Scalar(line, "", plain=True, noted=True), 1, 0)
+        return _Anchored(TextNode(line, "", plain=True, noted=True), 1, 0)
 
-    def _begin(self, event: yaml.CollectionStartEvent, line: int) -> None:
+    def _open_collection(self, event: yaml.CollectionStartEvent, line: int) -> None:
         line = self._open[-1].child_line(line) if self._open else line
         self._check_limits(line, nodes=1, levels=1)
         first_node = self._nodes
@@ -308,12 +309,12 @@ class _Builder:
         else:
             self._open.append(_OpenSequence(line, first_node, event.anchor))
 
-    def _end(self) -> None:
+    def _close_collection(self) -> None:
         closed = self._open.pop()
         anchored = _Anchored(closed.close(), self._nodes - closed.first_node, closed.height)
         self._attach(anchored, closed.anchor)
 
-    def _place(self, child: _Anchored, line: int, anchor: str | None = None) -> None:
+    def _add_value(self, child: _Anchored, line: int, anchor: str | None = None) -> None:
         self._check_limits(line, child.size, child.height)
         self._nodes += child.size
         self._attach(child, anchor)

@@ -21,7 +21,7 @@ from vsacli.actuators.motor import JointMotor
 from vsacli.actuators.transmission import JointVariables
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.variables import VARIABLES, Block, Variable
 from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
@@ -152,7 +152,7 @@ def _damper_velocity_by_motor(joint: Joint, of_joint: JointVariables) -> dict[in
         return {}
     if joint.damper_at("link"):
         return {None: of_joint.dq}
-    behind = joint.actuator.has(VARIABLES["phi"])
+    behind = joint.actuator.has_columns(VARIABLES["phi"])
     return {motor: of_joint.dphi[motor] for motor, there in enumerate(behind) if there}
 
 
@@ -284,7 +284,7 @@ def _joint_balance_errors(joint: Joint, of_joint: JointVariables) -> tuple[Float
 
     With a parallel damper the torque error is in N m, and its size is returned, which is None otherwise.
     """
-    regular = ~has(of_joint.flags, Flag.INFEASIBLE | Flag.SINGULAR)
+    regular = ~has_flag(of_joint.flags, Flag.INFEASIBLE | Flag.SINGULAR)
     tau_e, stiffness = of_joint.tau_e, of_joint.stiffness
     if not joint.actuator.sprung:
         return None, None, None, shaft_error(joint, of_joint, tau_e[None], regular)

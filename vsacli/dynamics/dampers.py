@@ -46,7 +46,9 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
     """Return the velocity of each damper of a joint from dq and dphi; or accelerations."""
     if joint.damper_at("link"):
         return [dq]
-    return [rate for rate, there in zip(dphi, joint.actuator.has(VARIABLES["phi"]), strict=True) if there]
+    return [
+        rate for rate, there in zip(dphi, joint.actuator.has_columns(VARIABLES["phi"]), strict=True) if there
+    ]
 
 
 def parallel_damper_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
@@ -58,7 +60,7 @@ def parallel_damper_torques(joint: Joint, of_joint: JointVariables) -> tuple[Flo
         of_joint.ddtheta,
     )
     torque, rate = np.zeros_like(dphi), np.zeros_like(dphi)
-    for motor, has_spring in enumerate(joint.actuator.has(VARIABLES["phi"])):
+    for motor, has_spring in enumerate(joint.actuator.has_columns(VARIABLES["phi"])):
         if has_spring:
             torque[motor] = damping * dphi[motor]
             rate[motor] = ddamping * dphi[motor] + damping * (ddtheta[motor] - of_joint.ddq)

@@ -15,7 +15,7 @@ from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import ELECTRICAL, Windings
 from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import MIN_MARGIN, Flag, finite, has, not_finite_flags
+from vsacli.base.flags import MIN_MARGIN, Flag, finite, has_flag, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.dynamics.limits import limit_flags
@@ -118,7 +118,7 @@ def _damper_torques(
     damping = command.commanded[DAMPING.key]
     if joint.damper_at("link"):
         return damping * command.dq, None
-    has_spring = joint.actuator.has(VARIABLES["phi"])
+    has_spring = joint.actuator.has_columns(VARIABLES["phi"])
     on_motors = [
         damping * rate if sprung else 0 * damping for rate, sprung in zip(dphi, has_spring, strict=True)
     ]
@@ -143,7 +143,7 @@ def _motors_not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
         finite(rows[: joint.actuator.motor_count])
         for rows in (of_joint.theta, of_joint.tau_transmission, of_joint.motor_power)
     )
-    infeasible, singular = (has(of_joint.flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
+    infeasible, singular = (has_flag(of_joint.flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
     explained = infeasible | (theta & tau_transmission & (singular | power))
     demand = finite([of_joint.tau_e, *(getattr(of_joint, key) for key in joint.commanded)])
     return ~(demand & explained)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.friction import Friction, FrictionLaws, direction_of
+from vsacli.actuators.friction import Friction, FrictionLaws, sign_of_motion
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.vector import Scalar, exact, mul, sub
 from vsacli.dynamics.chain import TorqueDerivatives
@@ -75,7 +75,7 @@ def response_with_friction(
     def under(direction: FloatArray) -> tuple[Response, FloatArray]:
         friction = laws.torque(velocity, direction)
         ddq, ddtheta, holding = accelerate(torque - friction, laws.sharp & (direction == 0))
-        return Response(ddq, ddtheta, friction + holding), laws.beyond(friction + holding)
+        return Response(ddq, ddtheta, friction + holding), laws.direction_beyond(friction + holding)
 
     if not laws.sharp.any():
         friction = laws.torque(velocity)
@@ -83,7 +83,7 @@ def response_with_friction(
         return Response(ddq, ddtheta, friction)
     if slip is not None:
         return under(np.broadcast_to(slip, velocity.shape))[0]
-    direction = direction_of(velocity)
+    direction = sign_of_motion(velocity)
     response, beyond = under(direction)
     # A motor at rest whose holding torque exceeds its friction begins to slide in that direction.
     released = np.where(direction == 0, beyond, 0.0)

@@ -161,14 +161,14 @@ class EnergyMeter:
 
 
 def _dissipated_energies(robot: Robot, totals: Mapping[str, FloatArray]) -> list[float | None]:
-    if not robot.has(VARIABLES["dissipated_power"]):
+    if not robot.has_variable(VARIABLES["dissipated_power"]):
         return [None] * len(robot.joints)
     return list(map(float, totals["dissipated"]))
 
 
 def _copper_losses(robot: Robot, totals: Mapping[str, FloatArray]) -> Iterator[float | None]:
     for index, joint in enumerate(robot.joints):
-        heated = joint.has(VARIABLES["copper_loss"])
+        heated = joint.has_columns(VARIABLES["copper_loss"])
         yield float(np.sum(totals["copper"][index, heated])) if any(heated) else None
 
 
@@ -276,7 +276,7 @@ class RunEnergy:
     def __init__(self, robot: Robot, engine: Engine) -> None:
         self._robot, self._engine = robot, engine
         actuators = [joint.actuator for joint in robot.joints]
-        lossy = any(robot.has(VARIABLES[name]) for name in ("dissipated_power", "copper_loss"))
+        lossy = any(robot.has_variable(VARIABLES[name]) for name in ("dissipated_power", "copper_loss"))
         self._losses = LossMeter(robot) if lossy else None
         self._kernel = IntervalEnergy(
             tuple(tuple(motor.inertia for motor in actuator.motors) for actuator in actuators),

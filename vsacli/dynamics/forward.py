@@ -98,7 +98,7 @@ def state_derivative(
         DAMPING.key, np.broadcast_to(least, q.shape) if damping is None else damping, len(robot.joints)
     )
     ddq, ddtheta, _ = plant.accelerations(q, dq, theta, dtheta, torque, wrench, commanded)
-    merged = plant.drivetrain.merged
+    merged = plant.drivetrain.of_motors_by_joint
     return Rates(dq, ddq, merged(dtheta, dq), merged(ddtheta, ddq))
 
 
@@ -125,9 +125,9 @@ class Plant:
         self.drivetrain = Drivetrain(robot.actuators)
         self.chain = link_dynamics(robot, frame)
         self.dampers = Dampers(robot, self.drivetrain)
-        self._rigid_inertia = self.drivetrain.direct(self.drivetrain.inertia)
+        self._rigid_inertia = self.drivetrain.of_rigid_joints(self.drivetrain.inertia)
         self._rigid_matrix = np.diag(self._rigid_inertia)
-        self._rigid_damping = self.drivetrain.direct(self.drivetrain.damping)
+        self._rigid_damping = self.drivetrain.of_rigid_joints(self.drivetrain.damping)
         self._sprung_damping = self.drivetrain.damping[self.drivetrain.sprung]
 
     def unpacked(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -179,12 +179,12 @@ class Plant:
         damper = self.dampers.parallel(commanded, dq, dtheta)
         resistance = add(self.chain.bias(q, dq, wrench), self.dampers.of_links(commanded, dq).tau)
         matrix = self.chain.mass_matrix(q) + self._rigid_matrix
-        laws, velocity = self.drivetrain.friction, self.drivetrain.of_all(dq, dtheta)
+        laws, velocity = self.drivetrain.friction, self.drivetrain.of_all_motors(dq, dtheta)
 
         def accelerate(
             torque: FloatArray, held: BoolArray | None
         ) -> tuple[FloatArray, FloatArray, FloatArray]:
-            drive = add(tau_e, damper.links) + self.drivetrain.direct(torque)
+            drive = add(tau_e, damper.links) + self.drivetrain.of_rigid_joints(torque)
             on_joints = drive - resistance - self._rigid_damping * dq  # (5a)
             left = torque[..., self.drivetrain.sprung] - self._sprung_damping * dtheta
             on_motors = left - add(spring, damper.motors)  # (5b), (5c)
@@ -203,13 +203,13 @@ class Plant:
         if held is None or not held.any():
             still = np.zeros((*on_motors.shape[:-1], len(self.drivetrain.joint)))
             return self.chain.solve(matrix, on_joints), rotors.accelerations(on_motors), still
-        held_joints = self.drivetrain.direct(held.astype(np.float64)) > 0
+        held_joints = self.drivetrain.of_rigid_joints(held.astype(np.float64)) > 0
         decoupled = held_joints[..., :, None] | held_joints[..., None, :]
         free = np.where(decoupled, np.eye(on_joints.shape[-1]), matrix)
         ddq = self.chain.solve(free, np.where(held_joints, 0.0, on_joints))
         holding_joints = on_joints - (matrix @ ddq[..., None])[..., 0]
-        ddtheta, holding_motors = rotors.held(on_motors, held[..., self.drivetrain.sprung])
-        holding = self.drivetrain.of_all(holding_joints, holding_motors)
+        ddtheta, holding_motors = rotors.accelerations_with_held(on_motors, held[..., self.drivetrain.sprung])
+        holding = self.drivetrain.of_all_motors(holding_joints, holding_motors)
         return ddq, ddtheta, np.where(held, holding, 0.0)
 
     def link_torque(
@@ -224,4 +224,4 @@ class Plant:
             torque: Torques of all motors minus their dry friction, (..., motors).
         """
         rotor_torque = self._rigid_inertia * ddq + self._rigid_damping * dq
-        return tau_e + self.drivetrain.direct(torque) - rotor_torque
+        return tau_e + self.drivetrain.of_rigid_joints(torque) - rotor_torque

@@ -19,7 +19,7 @@ from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.reach import reach_flags
 from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.inverse import DeflectionStop, command_of, link_torques_along
 from vsacli.robot.joint import Joint
@@ -111,8 +111,8 @@ def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.ND
     at_phi, on_branch = (
         np.sign(actuator.springs(each, command.q).determinant) for each in (phi, solution.deflections)
     )
-    singular = has(flags, Flag.SINGULAR) | (at_phi != on_branch)
-    return np.where(has(flags, Flag.INFEASIBLE), UNATTAINABLE, np.where(singular, SINGULAR, FOLLOWED))
+    singular = has_flag(flags, Flag.SINGULAR) | (at_phi != on_branch)
+    return np.where(has_flag(flags, Flag.INFEASIBLE), UNATTAINABLE, np.where(singular, SINGULAR, FOLLOWED))
 
 
 MOST_PIECES = 500

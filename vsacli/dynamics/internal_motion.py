@@ -257,8 +257,8 @@ class March:
         spread, phi = initial_spread + 0 * command.q, start + 0 * command.q
         converged, rounding = False, POSITION_ROUNDING * _largest_size(command.q)
         for _ in range(NEWTON_STEPS):
-            phi = springs.settled(spread, phi, command)
-            if np.isnan(phi[0]).any() or not springs.within(phi).all():
+            phi = springs.deflections_at_spread(spread, phi, command)
+            if np.isnan(phi[0]).any() or not springs.laws_hold(phi).all():
                 return LOST
             springs_at_phi = springs.springs_at(phi, command.q)
             if (np.sign(springs_at_phi.pivot) != side).any():
@@ -267,7 +267,7 @@ class March:
                 fastest = np.max(np.abs(springs_at_phi.slope) / damping)
                 return _CellSolution(
                     np.hstack((start, phi)),
-                    np.stack(springs.driven(phi, command)),
+                    np.stack(springs.damper_motion(phi, command)),
                     float(np.max(np.abs(command.tau_e))),
                     float(np.max(damping)),
                     (cell.right - cell.left) * float(fastest),

@@ -112,7 +112,7 @@ class InverseDynamics(BlockKernel):
             {
                 name: (joints, SIDES) if "motor" in VARIABLES[name].dims else (joints,)
                 for name in COMPUTED
-                if self.robot.has(VARIABLES[name])
+                if self.robot.has_variable(VARIABLES[name])
             }
         )
 
@@ -313,7 +313,7 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
     for index, joint in damped.items():
         springs, command = DampedSprings(joint.actuator), command_of(index, commanded)
         phi = springs.equilibrium(command, joint.damper_start)
-        motions[index] = InternalMotion(phi, *springs.driven(phi, command))
+        motions[index] = InternalMotion(phi, *springs.damper_motion(phi, command))
     return motions
 
 

@@ -160,8 +160,8 @@ class LossMeter:
         self._motor_damping = np.array([side.damping if side else 0.0 for side in sides]).reshape(-1, SIDES)
         self._joint_damping = np.array([joint.damping for joint in robot.joints])
         self._robot = robot
-        heated = robot.has(VARIABLES["copper_loss"])
-        damped = robot.has(VARIABLES["damping"])
+        heated = robot.has_variable(VARIABLES["copper_loss"])
+        damped = robot.has_variable(VARIABLES["damping"])
         self._names = (*MOTION, *(["copper_loss"] if heated else []), *(DAMPED if damped else []))
         self._last: dict[str, FloatArray] = {}
 

@@ -151,13 +151,13 @@ def _document_kind(path: str | os.PathLike[str]) -> FileKind:
     source, text = read_source(path)
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
-    if not isinstance(root, tree.Mapping):
+    if not isinstance(root, tree.MapNode):
         formats = ", ".join(_DOCUMENT_KINDS)
         problems.fail(root.line, f"expected a YAML file that begins with `format:`, one of {formats}")
     node = root.entries.get("format")
     if node is None:
         problems.fail(root.line, f"missing key 'format'; {_beginning_of(root)}")
-    word = node.text if isinstance(node, tree.Scalar) else ""
+    word = node.text if isinstance(node, tree.TextNode) else ""
     if word not in _DOCUMENT_KINDS:
         problems.fail(node.line, f"format: {_unknown_format(word, node)}")
     return _DOCUMENT_KINDS[word]
@@ -167,7 +167,7 @@ _KEYS = {"joints": "robot", "position": "trajectory"}
 """Keys by which a document without `format` is recognized, and its name."""
 
 
-def _beginning_of(root: tree.Mapping) -> str:
+def _beginning_of(root: tree.MapNode) -> str:
     """Return what to write at the beginning of a document without `format`, guessed by its keys."""
     guessed = next((DOCUMENTS[word].format for key, word in _KEYS.items() if key in root.entries), None)
     if guessed is not None:

@@ -84,16 +84,16 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
     return PlaceholderRobot(_robot(names, stiffened, damped), ordered)
 
 
-def _tables(root: tree.Mapping) -> dict[str, list[str]]:
+def _tables(root: tree.MapNode) -> dict[str, list[str]]:
     """Return the CSV files of a document, each with the column names mapped in the document."""
     files: dict[str, list[str]] = {}
     for key in ("position", *COMMANDED):
         match root.entries.get(key):
-            case tree.Mapping(
-                entries={"type": tree.Scalar(text="csv"), "file": tree.Scalar(text=file), **others}
+            case tree.MapNode(
+                entries={"type": tree.TextNode(text="csv"), "file": tree.TextNode(text=file), **others}
             ):
                 columns = others.get("columns")
-                names = columns.entries if isinstance(columns, tree.Mapping) else ()
+                names = columns.entries if isinstance(columns, tree.MapNode) else ()
                 files.setdefault(file, []).extend(names)
     return files
 
@@ -121,7 +121,7 @@ def _of_nodes(positions: Sequence[tree.Node], further: Sequence[tree.Node]) -> t
     named = _keys(positions)
     if named:
         return named
-    lists = (node.items for node in (*positions, *further) if isinstance(node, tree.Sequence))
+    lists = (node.items for node in (*positions, *further) if isinstance(node, tree.ListNode))
     count = max(map(len, lists), default=1)
     named = _keys(further)
     spare = (name for name in _numbered(count + len(named)) if name not in named)
@@ -129,7 +129,7 @@ def _of_nodes(positions: Sequence[tree.Node], further: Sequence[tree.Node]) -> t
 
 
 def _keys(nodes: Sequence[tree.Node]) -> tuple[str, ...]:
-    keys = [key for node in nodes if isinstance(node, tree.Mapping) for key in node.entries]
+    keys = [key for node in nodes if isinstance(node, tree.MapNode) for key in node.entries]
     return _names(keys)
 
 
@@ -150,10 +150,10 @@ def _taking(
         return _of_suffix(columns, suffix, names) or tuple(names)
     for node in nodes:
         match node:
-            case tree.Mapping(entries=entries):
+            case tree.MapNode(entries=entries):
                 return tuple(name for name in names if name in entries)
-            case tree.Sequence(items=items) if len(items) == len(names):
-                given = [not (isinstance(item, tree.Scalar) and item.is_null) for item in items]
+            case tree.ListNode(items=items) if len(items) == len(names):
+                given = [not (isinstance(item, tree.TextNode) and item.is_null) for item in items]
                 return tuple(name for name, has in zip(names, given, strict=True) if has)
     return tuple(names)
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from vsacli.base import file_formats
 from vsacli.base.errors import InputError, check_path
-from vsacli.documents.fields import choice, declared
-from vsacli.documents.reading import Changes, changed, read_document
+from vsacli.documents.fields import choice, declared_fields
+from vsacli.documents.reading import Changes, apply_changes, read_document
 from vsacli.documents.record_checks import construct_unchecked
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
@@ -30,7 +30,7 @@ class RobotFile(Robot):
 
     def robot(self, source: Source) -> Robot:
         """Return the robot of a source, with standard rows and link frames, converted from modified ones."""
-        content = {name: getattr(self, name) for name in declared(Robot)}
+        content = {name: getattr(self, name) for name in declared_fields(Robot)}
         robot = construct_unchecked(Robot, {**content, "sources": (source, *self.spring_sources)})
         if self.convention == "standard":
             return robot
@@ -51,10 +51,10 @@ def load_robot(path: str | os.PathLike[str], changes: Changes = MappingProxyType
         TypeError: path is of another type.
     """
     check_path(path, "load_robot(path)")
-    return read_robot(path).robot(changes)
+    return read_robot_file(path).robot(changes)
 
 
-class ReadRobot(NamedTuple):
+class RobotFileWithSource(NamedTuple):
     """A robot file that was read: its content, and its source for error messages."""
 
     document: RobotFile
@@ -67,7 +67,7 @@ class ReadRobot(NamedTuple):
             ChangeError: a change cannot be made.
             InputError: the modified rows cannot be converted to standard ones.
         """
-        document, source = changed(self.document, self.source, changes)
+        document, source = apply_changes(self.document, self.source, changes)
         try:
             return document.robot(source)
         except InputError as error:
@@ -75,13 +75,13 @@ class ReadRobot(NamedTuple):
             raise InputError.one(reason, source.path) from None
 
 
-def read_robot(path: str | os.PathLike[str]) -> ReadRobot:
+def read_robot_file(path: str | os.PathLike[str]) -> RobotFileWithSource:
     """Read a robot file.
 
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    return ReadRobot(*read_document(path, RobotFile, file_formats.ROBOT))
+    return RobotFileWithSource(*read_document(path, RobotFile, file_formats.ROBOT))
 
 
 def text_to_change(robot: Robot) -> tuple[str, Path]:

@@ -21,7 +21,7 @@ from vsacli.documents.fields import (
     NON_NEGATIVE,
     SMALLEST,
     OneOf,
-    Record,
+    RecordOf,
     choice,
     interval,
     number,
@@ -101,7 +101,7 @@ class Link(DeclaredRecord):
 
     mass: float = number(units.MASS, "mass of the link with the motors mounted on it", check=NON_NEGATIVE)
     com: tuple[float, float, float] = vector(3, units.LENGTH, "center of mass in the link frame (DH frame i)")
-    inertia: Inertia = value(Record(Inertia), "inertia tensor about the center of mass, link axes")
+    inertia: Inertia = value(RecordOf(Inertia), "inertia tensor about the center of mass, link axes")
 
 
 @dataclass(frozen=True)
@@ -121,17 +121,17 @@ class Joint(DeclaredRecord):
 
     name: str = text("name of the joint, used in reports and CSV headers", identifier=True)
     type: str = choice(("revolute", "prismatic"), "kind of joint")
-    dh: DenavitHartenberg = value(Record(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")
-    link: Link = value(Record(Link), "link that the joint moves")
+    dh: DenavitHartenberg = value(RecordOf(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")
+    link: Link = value(RecordOf(Link), "link that the joint moves")
     damping: float = number(
         units.DAMPING, "viscous damping between the links", check=NON_NEGATIVE, default=0.0
     )
     friction: Friction | None = value(
-        Record(Friction), "dry friction between the links, smooth: with a width", default=None
+        RecordOf(Friction), "dry friction between the links, smooth: with a width", default=None
     )
     actuator: Actuator = value(OneOf(ACTUATORS), "actuator that drives the joint")
-    damper: Damper | None = value(Record(Damper), "damper whose damping is commanded", default=None)
-    limits: Limits = value(Record(Limits), "limits of the commanded motion", default=Limits())
+    damper: Damper | None = value(RecordOf(Damper), "damper whose damping is commanded", default=None)
+    limits: Limits = value(RecordOf(Limits), "limits of the commanded motion", default=Limits())
 
     unit_variant = "type"
 
@@ -182,16 +182,18 @@ class Joint(DeclaredRecord):
             return f"it has no {signal.device}"
         return self.actuator.uncommanded.get(signal.key, f"its actuator takes no {signal.key}")
 
-    def has(self, variable: Variable) -> list[bool]:
+    def has_columns(self, variable: Variable) -> list[bool]:
         """Return a mask of the columns that a result variable has: of motors 1 and 2, or of the joint."""
         if variable.requires in OF_ANY_ROBOT:
-            return self.actuator.has(variable)
-        of_kind = self.actuator.has(variable._replace(requires=None))
+            return self.actuator.has_columns(variable)
+        of_kind = self.actuator.has_columns(variable._replace(requires=None))
         if variable.requires in MOTOR_CONSTANTS:
-            given = [getattr(side, variable.requires, None) is not None for side in self.actuator.sides]
-            return [kind and motor for kind, motor in zip(of_kind, given, strict=True)]
-        there = variable.requires == LOSSES or variable.requires in self.commanded
-        return [there and column for column in of_kind]
+            has_constant = [
+                getattr(side, variable.requires, None) is not None for side in self.actuator.sides
+            ]
+            return [kind and motor for kind, motor in zip(of_kind, has_constant, strict=True)]
+        is_commanded = variable.requires == LOSSES or variable.requires in self.commanded
+        return [is_commanded and column for column in of_kind]
 
     @property
     def has_friction(self) -> bool:
@@ -226,10 +228,10 @@ class Joint(DeclaredRecord):
         yield from (f"spring of joint {self.name}: {warning}" for warning in self.actuator.warnings)
 
 
-def existing(variable: Variable, kinds: Iterable[str]) -> list[list[bool]]:
+def existing_columns(variable: Variable, kinds: Iterable[str]) -> list[list[bool]]:
     """Return a mask of the columns of a variable that exist, for each joint by its kind of actuator.
 
     All columns count as existing for an unknown kind.
     """
-    every = [True] * (2 if "motor" in variable.dims else 1)
-    return [ACTUATORS[kind].has(variable) if kind in ACTUATORS else every for kind in kinds]
+    all_columns = [True] * (2 if "motor" in variable.dims else 1)
+    return [ACTUATORS[kind].has_columns(variable) if kind in ACTUATORS else all_columns for kind in kinds]

@@ -16,7 +16,7 @@ from vsacli.base.variables import LOSSES, OF_ANY_ROBOT, VARIABLES, Variable
 from vsacli.documents.fields import (
     Items,
     Name,
-    Record,
+    RecordOf,
     boolean,
     text,
     value,
@@ -49,9 +49,11 @@ class Robot(DeclaredRecord):
     gravity: tuple[float, float, float] = vector(
         3, units.ACCELERATION, "gravity acceleration in the base frame", default=(0.0, 0.0, -9.81)
     )
-    base: Pose = value(Record(Pose), "DH frame 0 in the base frame", default=Pose())
-    tool: Pose = value(Record(Pose), "end effector in the last DH frame (frame N)", default=Pose())
-    joints: tuple[Joint, ...] = value(Items(Record(Joint), unique="name"), "joints from the base to the tip")
+    base: Pose = value(RecordOf(Pose), "DH frame 0 in the base frame", default=Pose())
+    tool: Pose = value(RecordOf(Pose), "end effector in the last DH frame (frame N)", default=Pose())
+    joints: tuple[Joint, ...] = value(
+        Items(RecordOf(Joint), unique="name"), "joints from the base to the tip"
+    )
     sources: tuple[Source, ...] = field(default=(), kw_only=True, repr=False, compare=False)
 
     def __hash__(self) -> int:
@@ -107,17 +109,17 @@ class Robot(DeclaredRecord):
         """Actuator of each joint."""
         return tuple(joint.actuator for joint in self.joints)
 
-    def has(self, variable: Variable) -> bool:
+    def has_variable(self, variable: Variable) -> bool:
         """Return whether results of the robot contain a variable of joints."""
         if variable.requires == LOSSES:
             return any(joint.has_friction or joint.damper is not None for joint in self.joints)
         required_of_none = variable.requires in OF_ANY_ROBOT
-        return required_of_none or any(any(joint.has(variable)) for joint in self.joints)
+        return required_of_none or any(any(joint.has_columns(variable)) for joint in self.joints)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
         """Commanded signals in results, in addition to the motion; each commands at least one joint."""
-        return tuple(each for each in COMMANDED.values() if self.has(VARIABLES[each.key]))
+        return tuple(each for each in COMMANDED.values() if self.has_variable(VARIABLES[each.key]))
 
     @property
     def spring_sources(self) -> tuple[Source, ...]:
@@ -128,10 +130,12 @@ class Robot(DeclaredRecord):
     @cached_property
     def checked(self) -> CheckedRobot:
         """The robot's data that plausibility rules need."""
-        from vsacli.documents.record_values import numbers
+        from vsacli.documents.record_values import numbers_in_record
         from vsacli.robot.plausibility.checked_robot import CheckedRobot
 
-        return CheckedRobot(self.joints, self.base, self.gravity, tuple(numbers(self)), self.placeholder)
+        return CheckedRobot(
+            self.joints, self.base, self.gravity, tuple(numbers_in_record(self)), self.placeholder
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:

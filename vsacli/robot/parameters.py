@@ -13,7 +13,7 @@ from vsacli.base.units import Quantity
 from vsacli.compute.duals import seeds
 from vsacli.compute.vector import Scalar
 from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
-from vsacli.documents.record_values import Entry, Number, NumberPath, numbers
+from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex, numbers_in_record
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
@@ -51,7 +51,7 @@ class Parameter(NamedTuple):
     @property
     def by_index(self) -> tuple[str, ...]:
         """Words of the path, with entries of lists by their index."""
-        return tuple(str(step.number) if isinstance(step, Entry) else step for step in self.path)
+        return tuple(str(step.number) if isinstance(step, PathIndex) else step for step in self.path)
 
     @property
     def of_every_joint(self) -> str:
@@ -87,52 +87,62 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
     Raises:
         InputError: a pattern matches no parameter.
     """
-    found = [_parameter(robot, number) for number in numbers(robot) if _matters(number.path)]
-    chosen = [each for each in found if not patterns or any(_fits(each, pattern) for pattern in patterns)]
+    available = [
+        _parameter_at(robot, number) for number in numbers_in_record(robot) if _affects_results(number.path)
+    ]
+    chosen = [
+        each
+        for each in available
+        if not patterns or any(_matches_pattern(each, pattern) for pattern in patterns)
+    ]
     for pattern in patterns:
-        if not any(_fits(each, pattern) for each in found):
-            raise InputError.one(no_match(pattern, found))
+        if not any(_matches_pattern(each, pattern) for each in available):
+            raise InputError.one(no_match(pattern, available))
     return tuple(chosen)
 
 
-def no_match(pattern: str, found: Sequence[Parameter]) -> str:
+def no_match(pattern: str, available: Sequence[Parameter]) -> str:
     """Return the problem of a pattern that no parameter matches, with patterns that do.
 
     A path is compared word by word. Of a pattern with `*` only the last word counts, since `*` also stands
     for several words.
     """
-    near = [] if "*" in pattern else [path for path in map(str, found) if _similar(pattern, path)][:1]
-    patterns = list(dict.fromkeys(each.of_every_joint for each in found))
-    word = nearest(_last(pattern), dict.fromkeys(map(_last, patterns)))
-    near = near or [each for each in patterns if _last(each) == word]
+    near = (
+        []
+        if "*" in pattern
+        else [path for path in map(str, available) if _are_similar_paths(pattern, path)][:1]
+    )
+    patterns = list(dict.fromkeys(each.of_every_joint for each in available))
+    word = nearest(_last_word(pattern), dict.fromkeys(map(_last_word, patterns)))
+    near = near or [each for each in patterns if _last_word(each) == word]
     problem = f"no parameter of the robot matches {pattern!r}"
     if 0 < len(near) <= MOST_NEAR:
         return f"{problem}; did you mean {' or '.join(map(repr, near))}?"
-    return f"{problem}; valid: {', '.join(dict.fromkeys(each.of_its_part for each in found))}"
+    return f"{problem}; valid: {', '.join(dict.fromkeys(each.of_its_part for each in available))}"
 
 
-def _last(path: str) -> str:
+def _last_word(path: str) -> str:
     return path.rpartition(".")[2]
 
 
-def _similar(one: str, other: str) -> bool:
-    words, others = one.split("."), other.split(".")
-    return len(words) == len(others) and all(map(nearest, words, ([each] for each in others)))
+def _are_similar_paths(one: str, other: str) -> bool:
+    words, other_words = one.split("."), other.split(".")
+    return len(words) == len(other_words) and all(map(nearest, words, ([each] for each in other_words)))
 
 
-def _matters(path: NumberPath) -> bool:
+def _affects_results(path: NumberPath) -> bool:
     bounds = LIMITS in path or path[2:4] == OF_DAMPER
     return not bounds and not str(path[-1]).startswith(LARGEST)
 
 
-def _fits(parameter: Parameter, pattern: str) -> bool:
+def _matches_pattern(parameter: Parameter, pattern: str) -> bool:
     words = (str(parameter), ".".join(parameter.by_index))
     return any(fnmatchcase(path, pattern) for path in words)
 
 
-def _parameter(robot: Robot, number: Number) -> Parameter:
+def _parameter_at(robot: Robot, number: NumberAtPath) -> Parameter:
     entry = number.path[1] if number.path[0] == JOINTS else None
-    if not isinstance(entry, Entry):
+    if not isinstance(entry, PathIndex):
         return Parameter(*number, None, "")
     return Parameter(*number, entry.number, robot.joints[entry.number].type)
 
@@ -156,7 +166,7 @@ def _with_number(content: Any, path: NumberPath, scalar: Scalar) -> Any:
     """Return a record or list with another number at a path, or at both sides of an equal pair."""
     if isinstance(content, tuple):
         chosen = path[0] if path else ""
-        if not isinstance(chosen, Entry):
+        if not isinstance(chosen, PathIndex):
             return (_with_number(content[0], path, scalar),) * len(content)
         return tuple(
             _with_number(entry, path[1:], scalar) if index == chosen.number else entry
@@ -165,15 +175,15 @@ def _with_number(content: Any, path: NumberPath, scalar: Scalar) -> Any:
     if not path:
         return scalar
     word = str(path[0])
-    return _remade(content, {word: _with_number(getattr(content, word), path[1:], scalar)})
+    return _replace_unchecked(content, {word: _with_number(getattr(content, word), path[1:], scalar)})
 
 
-def apart(joint: Joint) -> Joint:
+def with_copied_actuator(joint: Joint) -> Joint:
     """Return the joint with its own copy of the actuator, which several robots may share."""
-    return _remade(joint, {"actuator": _remade(joint.actuator, {})})
+    return _replace_unchecked(joint, {"actuator": _replace_unchecked(joint.actuator, {})})
 
 
-def _remade(record: _Record, contents: Mapping[str, Any]) -> _Record:
+def _replace_unchecked(record: _Record, contents: Mapping[str, Any]) -> _Record:
     """Return a record with other values in some fields, without its checks and cached values."""
     fields = dataclasses.fields(record)  # type: ignore[arg-type]  # records are dataclasses
     same = {field.name: getattr(record, field.name) for field in fields}

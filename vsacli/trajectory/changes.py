@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from vsacli.base.did_you_mean import MOST_NEAR, did_you_mean, nearest
 from vsacli.base.texts import listed
-from vsacli.documents.fields import declared
+from vsacli.documents.fields import declared_fields
 from vsacli.documents.paths import declared_paths
-from vsacli.documents.reading import KEPT, ChangeError, Changes, check_path_of_change, written
+from vsacli.documents.reading import KEPT, ChangeError, Changes, check_path_of_change, format_changes
 from vsacli.robot.file import RobotFile
 from vsacli.trajectory.file import OF_ANY_ROBOT
 
@@ -29,9 +29,9 @@ def divide_changes_by_file(changes: Changes) -> ChangesByFile:
     Raises:
         ChangeError: neither file has such a key, or the key is in `KEPT`.
     """
-    robot, trajectory = declared(RobotFile), declared(OF_ANY_ROBOT)
+    robot, trajectory = declared_fields(RobotFile), declared_fields(OF_ANY_ROBOT)
     by_file = ChangesByFile({}, {})
-    for (path, value), change in zip(changes.items(), written(changes), strict=True):
+    for (path, value), change in zip(changes.items(), format_changes(changes), strict=True):
         check_path_of_change(path, change)
         first = path.partition(".")[0]
         if first not in robot and first not in trajectory:

@@ -17,9 +17,9 @@ from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.documents.fields import POSITIVE, REQUIRED, Name, number, value
-from vsacli.documents.reading import ChangeError, Changes, changed, read_document, written
+from vsacli.documents.reading import ChangeError, Changes, apply_changes, format_changes, read_document
 from vsacli.documents.record_checks import DeclaredRecord
-from vsacli.documents.record_values import numbers
+from vsacli.documents.record_values import numbers_in_record
 from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
@@ -41,7 +41,7 @@ DEFAULT_RATE = 1000.0
 class TrajectoryFile(DeclaredRecord):
     """The content of a trajectory file.
 
-    The declaration of each signal is an attribute named by its key; see `content`.
+    The declaration of each signal is an attribute named by its key; see `trajectory_file_class`.
     """
 
     name: str = value(Name(), "name of the trajectory")
@@ -77,8 +77,10 @@ class TrajectoryFile(DeclaredRecord):
     def declared(self) -> dict[Signal, Declaration]:
         """Declarations of the signals that have one."""
         signals = (POSITION, *COMMANDED.values(), WRENCH)
-        found = {signal: getattr(self, signal.key) for signal in signals}
-        return {signal: declaration for signal, declaration in found.items() if declaration is not None}
+        declarations = {signal: getattr(self, signal.key) for signal in signals}
+        return {
+            signal: declaration for signal, declaration in declarations.items() if declaration is not None
+        }
 
     @property
     def recorded(self) -> dict[Signal, Recorded]:
@@ -131,7 +133,9 @@ class TrajectoryFile(DeclaredRecord):
 
 
 @cache
-def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] = ()) -> type[TrajectoryFile]:
+def trajectory_file_class(
+    taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] = ()
+) -> type[TrajectoryFile]:
     """Return the class of trajectory files for joints that need these signals.
 
     Args:
@@ -150,7 +154,7 @@ def content(taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] =
     return make_dataclass("TrajectoryFile", signals, bases=(TrajectoryFile,), namespace=further, frozen=True)
 
 
-OF_ANY_ROBOT = content(frozenset(), rigid=True)
+OF_ANY_ROBOT = trajectory_file_class(frozenset(), rigid=True)
 """Class of trajectory files for an unknown robot: accepts a file that some robot accepts."""
 
 
@@ -177,7 +181,7 @@ def load_trajectory(
     """
     check_path(path, "load_trajectory(path, robot)")
     check_robot(robot)
-    return _with_devices(declared_trajectory(path, robot, changes, progress), robot)
+    return _add_device_signals(declared_trajectory(path, robot, changes, progress), robot)
 
 
 def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tuple[TrajectoryFile, Source]:
@@ -186,7 +190,9 @@ def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tu
     Raises:
         InputError: the file has problems; lists each with its line.
     """
-    cls = content(joints.commanding_signals, rigid=joints.rigid, untaken=joints.absent_device_signals)
+    cls = trajectory_file_class(
+        joints.commanding_signals, rigid=joints.rigid, untaken=joints.absent_device_signals
+    )
     return read_document(path, cls, file_formats.TRAJECTORY, joints.types, joints.exempt)
 
 
@@ -214,16 +220,18 @@ def declared_trajectory(
         from vsacli.trajectory.recorded.recording import recorded_trajectory
 
         return recorded_trajectory(path, joints, progress, _rate_of_table(path, changes))
-    document, source = changed(*read_trajectory(path, joints), changes, joints.types, joints.exempt)
+    document, source = apply_changes(*read_trajectory(path, joints), changes, joints.types, joints.exempt)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
-    with _blaming(changes, "rate"):
-        declared = _times(document, recordings, source.path)
+    with _blaming_change(changes, "rate"):
+        declared = _declared_times(document, recordings, source.path)
     if recordings:
         _check_lasting(document, declared, source.path, joints.names)
-    times, profiles = _slowed(document.slow_down, declared, _profiles(document, declared, recordings))
+    times, profiles = _stretch_profiles(
+        document.slow_down, declared, _declared_profiles(document, declared, recordings)
+    )
     wrench = document.declared.get(WRENCH)
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
-    checked = CheckedTrajectory(robot, tuple(numbers(document, joints.types)), times, motion)
+    checked = CheckedTrajectory(robot, tuple(numbers_in_record(document, joints.types)), times, motion)
     return Trajectory(
         times,
         profiles[POSITION.key],
@@ -232,10 +240,13 @@ def declared_trajectory(
         name=document.name,
         warnings=[
             *(warning for recording in recordings for warning in recording.warnings),
-            *_warnings(document, declared, joints),
+            *_formula_warnings(document, declared, joints),
             *trajectory_findings(checked, source),
         ],
-        notes=[*(note for recording in recordings for note in recording.notes), *_notes(document, declared)],
+        notes=[
+            *(note for recording in recordings for note in recording.notes),
+            *_formula_notes(document, declared),
+        ],
         sources=[source, *(recording.source for recording in recordings)],
     )
 
@@ -246,19 +257,21 @@ def _rate_of_table(path: str | os.PathLike[str], changes: Changes) -> float | No
     Raises:
         ChangeError: something else is changed, or the rate is not valid.
     """
-    if others := {key: value for key, value in changes.items() if key != "rate"}:
+    if other_changes := {key: value for key, value in changes.items() if key != "rate"}:
         reason = f"{os.fspath(path)} is a CSV table, whose rate alone can be set"
-        raise ChangeError.of(written(others)[0], f"{reason}; name it in a YAML trajectory and set its keys")
+        raise ChangeError.of(
+            format_changes(other_changes)[0], f"{reason}; name it in a YAML trajectory and set its keys"
+        )
     if not changes:
         return None
-    from vsacli.documents.columns_file import checked_rate
+    from vsacli.documents.columns_file import parse_rate
 
-    with _blaming(changes, "rate"):
-        return checked_rate(changes["rate"])
+    with _blaming_change(changes, "rate"):
+        return parse_rate(changes["rate"])
 
 
 @contextmanager
-def _blaming(changes: Changes, path: str) -> Iterator[None]:
+def _blaming_change(changes: Changes, path: str) -> Iterator[None]:
     """Raise errors of a value as errors of its change, if it was changed."""
     try:
         yield
@@ -266,10 +279,10 @@ def _blaming(changes: Changes, path: str) -> Iterator[None]:
         if path not in changes:
             raise
         problems = [each._replace(file="", line=0) for each in error.problems]
-        raise ChangeError(problems, written({path: changes[path]})[0]) from None
+        raise ChangeError(problems, format_changes({path: changes[path]})[0]) from None
 
 
-def _with_devices(trajectory: Trajectory, robot: Robot) -> Trajectory:
+def _add_device_signals(trajectory: Trajectory, robot: Robot) -> Trajectory:
     try:
         return set_uncommanded_dampers(trajectory, robot)
     except InputError as error:
@@ -289,8 +302,8 @@ def _read_recordings(
     mappings: dict[Path, ColumnMapping] = defaultdict(lambda: ColumnMapping(rate=document.rate))
     for signal, declared in document.recorded.items():
         file = folder / declared.file
-        wanted[file][signal] = declared.chosen
-        mappings[file] = mappings[file].joined(declared.mapping)
+        wanted[file][signal] = declared.fit_choice
+        mappings[file] = mappings[file].combined_with(declared.mapping)
 
     resampled, unwrap = document.rate is not None, getattr(document.recorded.get(POSITION), "unwrap", False)
     recordings = [
@@ -304,14 +317,14 @@ def _read_recordings(
     return recordings
 
 
-def _times(document: TrajectoryFile, recordings: Sequence[RecordedSignals], file: str) -> Times:
+def _declared_times(document: TrajectoryFile, recordings: Sequence[RecordedSignals], file: str) -> Times:
     if recordings:
         return recordings[0].times_at(document.rate, file)
     assert document.lasts is not None, "see TrajectoryFile"
     return UniformTimes(document.lasts, document.rate or DEFAULT_RATE)
 
 
-def _profiles(
+def _declared_profiles(
     document: TrajectoryFile, times: Times, recordings: Sequence[RecordedSignals]
 ) -> dict[str, Profile]:
     """Return the profiles by signal key, at the declared pace."""
@@ -322,7 +335,9 @@ def _profiles(
     return {**formulas, **{each.signal.key: each for one in recordings for each in one.profiles}}
 
 
-def _slowed(factor: float, times: Times, profiles: dict[str, Profile]) -> tuple[Times, dict[str, Profile]]:
+def _stretch_profiles(
+    factor: float, times: Times, profiles: dict[str, Profile]
+) -> tuple[Times, dict[str, Profile]]:
     if factor == 1:
         return times, profiles
     return times.stretched(factor), {key: each.stretched(factor) for key, each in profiles.items()}
@@ -336,12 +351,12 @@ def _check_lasting(document: TrajectoryFile, times: Times, file: str, joint_name
         raise InputError(Problem(file, 0, problem.in_file(joint_names)) for problem in problems)
 
 
-def _warnings(document: TrajectoryFile, times: Times, joints: CommandedJoints) -> Iterator[str]:
+def _formula_warnings(document: TrajectoryFile, times: Times, joints: CommandedJoints) -> Iterator[str]:
     for signal, formula in document.formulas.items():
         for warning in formula.warnings_over(times.span, joints.types):
             yield f"{signal.key}: {warning}"
 
 
-def _notes(document: TrajectoryFile, times: Times) -> Iterator[str]:
+def _formula_notes(document: TrajectoryFile, times: Times) -> Iterator[str]:
     for signal, formula in document.formulas.items():
         yield from (f"{signal.key}: {note}" for note in formula.notes_over(times.span))

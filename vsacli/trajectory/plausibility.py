@@ -14,8 +14,8 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import Problem
 from vsacli.base.signals import POSITION
 from vsacli.base.units import Quantity
-from vsacli.documents.plausibility import Measured, OtherUnit, Rule, Written, findings
-from vsacli.documents.record_values import Entry, Number
+from vsacli.documents.plausibility import Measured, OtherUnit, Rule, ValuesInFile, implausible_values
+from vsacli.documents.record_values import NumberAtPath, PathIndex
 from vsacli.documents.source import Source
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
@@ -65,7 +65,7 @@ POSITIONS = ("positions of revolute joints", "positions of prismatic joints", *R
 def trajectory_findings(checked: CheckedTrajectory, source: Source) -> tuple[Problem, ...]:
     """Return the findings of the rules, each with its line of the trajectory file."""
     robot_rules = robot_rules_with_findings(checked.robot.checked, checked.robot.sources)
-    return findings(TRAJECTORY_RULES, checked, Written(source), robot_rules)
+    return implausible_values(TRAJECTORY_RULES, checked, ValuesInFile(source), robot_rules)
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class CheckedTrajectory:
     """
 
     robot: Robot
-    numbers: Sequence[Number]
+    numbers: Sequence[NumberAtPath]
     times: Times
     motion: Profile | None
 
@@ -118,7 +118,7 @@ class CheckedTrajectory:
     def of_joints(self, quantity: Quantity) -> Iterator[tuple[Measured, int]]:
         """Yield the numbers with this quantity, with magnitude as size, and the index of the joint."""
         for path, measured, value, _ in self.numbers:
-            if measured == quantity and isinstance(path[-1], Entry):
+            if measured == quantity and isinstance(path[-1], PathIndex):
                 joint = path[-1].number
                 unit = quantity.unit(self.robot.joints[joint].type)
                 yield Measured(path, value, unit, abs(value)), joint
@@ -172,7 +172,7 @@ def _measure_wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[M
     scale = checked.sizes.weight * (1.0 if forces else checked.sizes.extent)
     common, unit = (COMMON_FORCE, "N") if forces else (COMMON_MOMENT, "N m")
     for path, quantity, value, _ in checked.numbers if not checked.robot.placeholder else ():
-        if quantity == units.WRENCH and isinstance(path[-1], Entry) and (path[-1].number < 3) == forces:
+        if quantity == units.WRENCH and isinstance(path[-1], PathIndex) and (path[-1].number < 3) == forces:
             size = ratio_or_nan(abs(value), scale) if value else math.nan
             yield Measured(path, value, unit, min(size, 1.0) if abs(value) < common else size)
 

@@ -65,7 +65,7 @@ class Trajectory:
         """
         self.times, self.position, self.wrench, self.name = times, position, wrench, name
         self.commanded = {
-            key: commanded[key] if key in commanded else self._nothing(signal)
+            key: commanded[key] if key in commanded else self._commanding_no_joint(signal)
             for key, signal in COMMANDED.items()
             if key in commanded or signal.device is None
         }
@@ -119,7 +119,7 @@ class Trajectory:
                     f"the {signal.key} spans {start:g} to {end:g} s, the steps 0 to {self.duration:g} s"
                 )
 
-    def _nothing(self, signal: Signal) -> ConstantProfile:
+    def _commanding_no_joint(self, signal: Signal) -> ConstantProfile:
         """Return the profile of a signal that commands no joint."""
         return ConstantProfile(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
 
@@ -176,12 +176,12 @@ class Trajectory:
         """
         from vsacli.trajectory.recorded.arrays import profiles_of_arrays
 
-        given = {
+        arrays_by_signal = {
             POSITION: (q, dq, ddq, d3q, d4q),
-            **_by_signal({"stiffness": stiffness, **commanded}),
+            **_arrays_by_signal({"stiffness": stiffness, **commanded}),
             WRENCH: (wrench, dwrench, ddwrench),
         }
-        times, profiles, warnings = profiles_of_arrays(time, given, fit)
+        times, profiles, warnings = profiles_of_arrays(time, arrays_by_signal, fit)
         exerted = WrenchProfile(profiles[WRENCH.key], wrench_frame) if WRENCH.key in profiles else None
         return cls(times, profiles[POSITION.key], profiles, wrench=exerted, name=name, warnings=warnings)
 
@@ -256,8 +256,8 @@ class Trajectory:
     @property
     def estimates(self) -> dict[Signal, SampledProfile]:
         """Profiles of the signals of which any value at the samples comes from a fit of recorded samples."""
-        found = ((signal, profile.estimate) for signal, profile in self.profiles())
-        return {signal: estimate for signal, estimate in found if estimate is not None}
+        estimates = ((signal, profile.estimate) for signal, profile in self.profiles())
+        return {signal: estimate for signal, estimate in estimates if estimate is not None}
 
     @property
     def uncertain(self) -> tuple[str, ...]:
@@ -266,8 +266,14 @@ class Trajectory:
         They are the variables that such fits estimate, and all that are computed from them.
         """
         estimated = {name for estimate in self.estimates.values() for name in estimate.estimated}
-        given = {name for signal in (POSITION, *COMMANDED.values(), WRENCH) for name in signal.names}
-        return tuple(name for name in UNCERTAIN if estimated and (name in estimated or name not in given))
+        trajectory_variables = {
+            name for signal in (POSITION, *COMMANDED.values(), WRENCH) for name in signal.names
+        }
+        return tuple(
+            name
+            for name in UNCERTAIN
+            if estimated and (name in estimated or name not in trajectory_variables)
+        )
 
     def stretched(self, factor: float) -> Trajectory:
         """Return the trajectory slowed down by a factor; a uniform sample rate is kept."""
@@ -332,7 +338,7 @@ class Trajectory:
         return time, np.minimum(time - left, right - time)
 
 
-def _by_signal(
+def _arrays_by_signal(
     of_joints: Mapping[str, ArrayLike | None],
 ) -> dict[Signal, tuple[ArrayLike | None, ...]]:
     """Return commanded signals with their derivatives, from arrays by name.

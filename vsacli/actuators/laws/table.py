@@ -16,10 +16,10 @@ from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.compute.control_flow import subroutine
-from vsacli.documents.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TableFile, value
+from vsacli.documents.fields import FINITE, LARGEST, NON_ZERO, SMALLEST, TablePath, value
 from vsacli.documents.record_checks import fault_of_number
 from vsacli.documents.source import Source
-from vsacli.documents.table import Table
+from vsacli.documents.table import CsvTable
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -81,8 +81,8 @@ class MeasuredSpring(SpringLaw):
     A table that begins at zero deflection describes a tendon.
     """
 
-    file: Table = value(
-        TableFile(("deflection", "torque")),
+    file: CsvTable = value(
+        TablePath(("deflection", "torque")),
         "CSV file with the header deflection,torque in rad,N m (m,N), path relative to the robot file",
     )
 
@@ -182,7 +182,7 @@ class MeasuredSpring(SpringLaw):
         return FirstGuess(self, np.unique(np.concatenate((low * shares, high * shares))))
 
 
-def misfit_warnings(table: Table, misfit: FloatArray) -> tuple[str, ...]:
+def misfit_warnings(table: CsvTable, misfit: FloatArray) -> tuple[str, ...]:
     """Return warnings if the misfit of a curve at the points of a table, (rows,), is large."""
     row, share = worst_misfit(table, misfit)
     if share < NO_MISFIT:
@@ -196,13 +196,13 @@ def misfit_warnings(table: Table, misfit: FloatArray) -> tuple[str, ...]:
     return (f"{missed}{amount}, {where}: near a kink or an outlier, which the curve does not follow",)
 
 
-def worst_misfit(table: Table, misfit: FloatArray) -> tuple[int, float]:
+def worst_misfit(table: CsvTable, misfit: FloatArray) -> tuple[int, float]:
     """Return the row with the largest misfit, and the misfit as a share of the range."""
     row = int(np.abs(misfit).argmax())
     return row, float(abs(misfit[row]) / np.ptp(table.values[:, 1]))
 
 
-def wrong_rows(table: Table) -> Iterator[Problem]:
+def wrong_rows(table: CsvTable) -> Iterator[Problem]:
     """Yield why the rows are no curve over the deflection: too few, out of bounds or out of order."""
     deflection, path = table.values[:, 0], table.source.path
     if len(deflection) < MIN_ROWS:
@@ -214,7 +214,7 @@ def wrong_rows(table: Table) -> Iterator[Problem]:
         yield Problem(path, table.line_of(steps[0] + 1), message)
 
 
-def _hardening_problems(table: Table) -> Iterator[Problem]:
+def _hardening_problems(table: CsvTable) -> Iterator[Problem]:
     """Yield why the rows are no hardening spring, with the lines."""
     deflection, torque = table.values.T
     path = table.source.path
@@ -236,7 +236,7 @@ def _hardening_problems(table: Table) -> Iterator[Problem]:
         yield from (at(row, message) for row, message in _wrong_bends(deflection, torque))
 
 
-def _wrong_sizes(table: Table) -> Iterator[Problem]:
+def _wrong_sizes(table: CsvTable) -> Iterator[Problem]:
     """Yield rows with values too large, or an end of the curve too near to zero, as in declared fields."""
     for name, column in zip(table.columns, table.values.T, strict=True):
         for row in np.flatnonzero(np.abs(column) > LARGEST)[:1]:

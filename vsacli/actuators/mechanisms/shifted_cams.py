@@ -17,7 +17,7 @@ from vsacli.actuators.pairs.pair_on_branch import BRANCHES, PairOnBranch
 from vsacli.actuators.spring_elements import SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
-from vsacli.documents.fields import OneOf, Pair, choice, value
+from vsacli.documents.fields import OneOf, PairOf, choice, value
 from vsacli.documents.source import Source
 
 
@@ -32,7 +32,7 @@ class ShiftedCams(Mechanism):
     """
 
     spring: tuple[SpringLaw, SpringLaw] = value(
-        Pair(OneOf(LAWS)),
+        PairOf(OneOf(LAWS)),
         "torque of cams 1 and 2 over phi + theta_2 and phi - theta_2; one mapping applies to both",
     )
     branch: str = choice(BRANCHES, "sign of theta_2 on the branch that is used", default="positive")

@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution, SpringLaw
 from vsacli.actuators.pairs import make_pair
-from vsacli.actuators.reach import reach
+from vsacli.actuators.reach import classify_stiffness
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 
@@ -70,4 +70,4 @@ class PairOnBranch:
         if self.opposite is None:
             return np.zeros(tau_e.shape, dtype=bool)
         other = replace(self, branch=self.opposite)
-        return ~reach(stiffness, other.solve(tau_e, stiffness)).infeasible
+        return ~classify_stiffness(stiffness, other.solve(tau_e, stiffness)).infeasible

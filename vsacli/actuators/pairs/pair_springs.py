@@ -7,7 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, MotorMatrix, Torques
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, MotorMatrix, SpringTorques
 from vsacli.actuators.laws.law import SpringLaw, SpringRows, SpringState
 from vsacli.base.arrays import FloatArray
 
@@ -106,14 +106,14 @@ class PairElasticity(Elasticity):
     def __init__(self, pairs: Sequence[tuple[SpringLaw, SpringLaw]], coupling: SpringLaw | None) -> None:
         self._springs, self._coupling = SpringRows(pairs), coupling
 
-    def torques(self, phi: FloatArray) -> Torques:
+    def torques(self, phi: FloatArray) -> SpringTorques:
         """Return the torques; each spring exerts the same torque on the link as against its motor."""
         tau = self._springs.torque(phi)
         tau_e = tau[..., 0] + tau[..., 1]
         if self._coupling is None:
-            return Torques(tau_e, tau)
+            return SpringTorques(tau_e, tau)
         between = self._coupling.torque(phi[..., 0] - phi[..., 1])
-        return Torques(tau_e, tau + np.stack((between, -between), axis=-1))
+        return SpringTorques(tau_e, tau + np.stack((between, -between), axis=-1))
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the sum over all springs."""

@@ -115,7 +115,7 @@ class _Law:
         tau_motor = self._of_joints(torque)
         values = {**state, "phi": state["theta"] - state["q"][:, None], "tau_motor": tau_motor}
         if drivetrain.windings is not None:
-            velocity = drivetrain.of_all(state["dq"], dtheta)
+            velocity = drivetrain.of_all_motors(state["dq"], dtheta)
             electrical = drivetrain.windings.variables(torque, velocity)
             values |= {name: self._of_joints(each) for name, each in electrical.items()}
         singular = drivetrain.determinant(state["q"], theta) == 0

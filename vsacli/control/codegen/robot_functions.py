@@ -153,7 +153,7 @@ def _inside(robot: Robot, computed: Mapping[str, Sequence[Scalar]], name: str) -
     """Yield deflections or their rates; for a motor that sets the springs, its own position or velocity."""
     of_motor = {"phi": "theta", "dphi": "dtheta"}[name]
     for index, joint in enumerate(robot.joints):
-        for side, there in enumerate(joint.actuator.has(VARIABLES["phi"])):
+        for side, there in enumerate(joint.actuator.has_columns(VARIABLES["phi"])):
             yield computed[name if there else of_motor][SIDES * index + side]
 
 

@@ -46,7 +46,7 @@ class Packing:
         self.entries: int = ends[-1]
         places: AnyArray = np.arange(self.entries)
         dq, dtheta = places[self._parts[1]], places[self._parts[3]]
-        self.motor_velocities = drivetrain.of_all(dq, dtheta)
+        self.motor_velocities = drivetrain.of_all_motors(dq, dtheta)
 
     def pack(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """Return the vector of a state with zero integrals of the errors."""

@@ -203,7 +203,7 @@ def _history(
     reference = loop.reference(integrated.time).of_joints
     commanded = {name: reference[name] for name in TRACKED}
     found = _simulated(loop, integrated, work)
-    if robot.has(VARIABLES["dissipated_power"]):
+    if robot.has_variable(VARIABLES["dissipated_power"]):
         of_joints = (JointVariables.of(of_joint(found, index)) for index in range(len(robot.joints)))
         found["dissipated_power"] = np.stack(list(map(dissipated_power, robot.joints, of_joints)), axis=1)
     chosen = np.isin(np.arange(len(robot.joints)), loop.plant.drivetrain.chosen)
@@ -233,7 +233,10 @@ def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[st
     dampers = plant.dampers.parallel(loop.reference.damping(integrated.time), phase.dq, phase.dtheta)
     tau_e = plant.link_torque(phase.dq, ddq, add(springs.tau_e, dampers.links), passed_on)
     deflected = drivetrain.deflected
-    theta, dtheta = drivetrain.merged(phase.theta, phase.q), drivetrain.merged(phase.dtheta, phase.dq)
+    theta, dtheta = (
+        drivetrain.of_motors_by_joint(phase.theta, phase.q),
+        drivetrain.of_motors_by_joint(phase.dtheta, phase.dq),
+    )
     tau_motor = drivetrain.of_joints(torque)
     found = {
         "q": phase.q,
@@ -246,7 +249,7 @@ def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[st
         "dphi": np.where(deflected, dtheta - phase.dq[..., None], np.nan),
         "theta": theta,
         "dtheta": dtheta,
-        "tau_transmission": drivetrain.merged(springs.tau_transmission, tau_e),
+        "tau_transmission": drivetrain.of_motors_by_joint(springs.tau_transmission, tau_e),
         "tau_motor": tau_motor,
         "elastic_energy": drivetrain.energy(phase.q, phase.theta),
         "motor_power": tau_motor * dtheta,
@@ -255,7 +258,7 @@ def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[st
         **plant.dampers.variables(loop.reference.damping(integrated.time), phase.dq, phase.dtheta),
     }
     if drivetrain.windings is not None:
-        electrical = drivetrain.windings.variables(torque, drivetrain.of_all(phase.dq, phase.dtheta))
+        electrical = drivetrain.windings.variables(torque, drivetrain.of_all_motors(phase.dq, phase.dtheta))
         found |= {name: drivetrain.of_joints(values) for name, values in electrical.items()}
     return found
 

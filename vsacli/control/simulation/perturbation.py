@@ -18,7 +18,15 @@ from vsacli.base.errors import InputError, InvalidRecordError
 from vsacli.base.interrupts import leave_interrupts_to_others, starting_worker
 from vsacli.control.simulation.simulate import SimulationRun
 from vsacli.control.simulation.simulation_report import SimulationReport
-from vsacli.documents.fields import Kind, NamedNumbers, Number, OneOf, Pair, Record, declared
+from vsacli.documents.fields import (
+    NamedNumbers,
+    NumberWithUnit,
+    OneOf,
+    PairOf,
+    RecordOf,
+    ValueKind,
+    declared_fields,
+)
 from vsacli.robot.joint import Inertia, Joint, Link
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -80,7 +88,9 @@ class _Wrong:
 
     def _inertia(self, inertia: Inertia) -> Inertia:
         factor = self._number(1.0)
-        return replace(inertia, **{name: factor * getattr(inertia, name) for name in declared(Inertia)})
+        return replace(
+            inertia, **{name: factor * getattr(inertia, name) for name in declared_fields(Inertia)}
+        )
 
     def _record(self, record: Any) -> Any:
         """Return a record with errors in its motors, springs, mechanisms and numbers, except limits.
@@ -89,22 +99,22 @@ class _Wrong:
         """
         wrong = {
             name: self._value(field.kind, getattr(record, name))
-            for name, (field, _) in declared(type(record)).items()
+            for name, (field, _) in declared_fields(type(record)).items()
             if name != "max_deflection"
         }
         return replace(record, **wrong)
 
-    def _value(self, kind: Kind, value: Any) -> Any:
+    def _value(self, kind: ValueKind, value: Any) -> Any:
         if value is None:
             return None
         match kind:
-            case Pair(item):
+            case PairOf(item):
                 return tuple(self._value(item, side) for side in value)
-            case Record(cls) if cls is Motor:
+            case RecordOf(cls) if cls is Motor:
                 return self._motor(value)
             case OneOf():
                 return self._record(value)
-            case Number():
+            case NumberWithUnit():
                 return self._number(value)
             case NamedNumbers():
                 return tuple((name, self._number(each)) for name, each in value)

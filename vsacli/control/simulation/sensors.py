@@ -124,7 +124,7 @@ class Readings:
 
     def positions(self, truth: Phase, rows: int | slice) -> tuple[FloatArray, FloatArray]:
         """Return readings of joints, (..., joints), and of all motors, (..., motors), at samples `rows`."""
-        theta = self._drivetrain.of_all(truth.q, truth.theta)
+        theta = self._drivetrain.of_all_motors(truth.q, truth.theta)
         return (
             _rounded(truth.q + self._q[rows], self._q_step),
             _rounded(theta + self._theta[rows], self._theta_step),

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from vsacli.base.arrays import AnyArray, FloatArray, by_joint, of_joint
-from vsacli.base.flags import LIMITS, has
+from vsacli.base.flags import LIMITS, has_flag
 from vsacli.base.simulation_variables import COMMANDS
 from vsacli.base.units import STIFFNESS
 from vsacli.control.simulation.history import History
@@ -113,11 +113,13 @@ class _JointTrackingSummary:
         self._peaks = np.fmax(self._peaks, np.fmax.reduce(np.abs(block.tau_motor[:, index]), axis=0))
         self._lowest = min(self._lowest, float(block.q_ref[:, index].min()))
         self._highest = max(self._highest, float(block.q_ref[:, index].max()))
-        self._over_limit += int(np.count_nonzero(has(flags, LIMITS)))
+        self._over_limit += int(np.count_nonzero(has_flag(flags, LIMITS)))
         names = {check.variable: _checked(check.variable) for check in self._checks}
         values = of_joint({variable: getattr(block, name) for variable, name in names.items()}, index)
         for check in self._checks:
-            keep_worse(self._worst, worst_excess(self._joint, check, values, time, has(flags, check.flag)))
+            keep_worse(
+                self._worst, worst_excess(self._joint, check, values, time, has_flag(flags, check.flag))
+            )
 
     def report(self, energy: JointEnergy, goal: GoalTolerance) -> JointTracking:
         """Return the findings, with the energy of the joint."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.texts import distinguish
 from vsacli.base.units import STIFFNESS
 from vsacli.dynamics.forward import State
@@ -58,7 +58,7 @@ def start_state(robot: Robot, trajectory: Trajectory, error: InitialError) -> St
     arrays = motion.of_joints
     shifted = {**arrays, **{name: arrays[name] + offset for name, offset in offsets.items()}}
     block = compute_block(robot, Motion.of(motion.time, shifted, motion.wrench))
-    failing, singular = (has(block.flags[0], flags) for flags in (UNUSABLE, Flag.SINGULAR))
+    failing, singular = (has_flag(block.flags[0], flags) for flags in (UNUSABLE, Flag.SINGULAR))
     if failing.any():
         file = trajectory.sources[0].path if trajectory.sources and error.is_zero else ""
         advice = "" if error.is_zero else ", or choose smaller initial errors"

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vsacli.actuators.friction import FrictionLaws, direction_of
+from vsacli.actuators.friction import FrictionLaws, sign_of_motion
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.control.simulation.closed_loop import ClosedLoop
 
@@ -58,7 +58,7 @@ class StickSlip:
 
     def start(self, time: float, vector: FloatArray) -> FloatArray:
         """Initialize the directions in a state; return it with exactly zero velocity of motors at rest."""
-        direction = direction_of(vector[self._velocity])
+        direction = sign_of_motion(vector[self._velocity])
         self._loop.slip = np.where(self._laws.sharp, direction, np.nan)
         self.settle(time, vector)
         return self._stopped(vector, self._laws.sharp & (direction == 0))
@@ -105,7 +105,7 @@ class StickSlip:
     def settle(self, time: float, vector: FloatArray) -> None:
         """Release held motors, one after the other, that friction cannot hold under the present torques."""
         while True:
-            beyond = self._laws.beyond(self._friction(time, vector)) * (self._slip == 0)
+            beyond = self._laws.direction_beyond(self._friction(time, vector)) * (self._slip == 0)
             if not beyond.any():
                 return
             motor = int(np.argmin(np.where(beyond != 0, self.distances(time, vector), np.inf)))

@@ -8,7 +8,7 @@ from typing import Any
 from vsacli.base.tables import aligned
 from vsacli.base.texts import counted
 from vsacli.base.units import Quantity
-from vsacli.documents.reading import written
+from vsacli.documents.reading import format_changes
 from vsacli.files.stored_reports import stored_report
 from vsacli.results.store.reader import StoredResult
 
@@ -67,7 +67,7 @@ def result_lines(result: Mapping[str, Any]) -> Iterator[str]:
         yield f"values stored in {source['precision']} precision"
     for each in source["inputs"]:
         yield f"input {each['path']}, SHA-256 {each['sha256']}"
-        yield from (f"  with --set {change}" for change in written(each.get("changes", {})))
+        yield from (f"  with --set {change}" for change in format_changes(each.get("changes", {})))
     rows = [("joint", "type", "actuator")]
     rows += [(joint["name"], joint["type"], joint["actuator"]) for joint in result["joints"]]
     yield from ("", *aligned(rows), "")

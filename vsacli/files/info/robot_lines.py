@@ -10,7 +10,7 @@ from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.tables import aligned
 from vsacli.base.texts import counted, together, warnings_and_notes
 from vsacli.base.units import DAMPING, DIMENSIONLESS, POSITION, STIFFNESS, TORQUE, Quantity
-from vsacli.documents.fields import Field, declared, variant_inside
+from vsacli.documents.fields import Field, declared_fields, variant_inside
 from vsacli.files.info.numbers_in_text import row, short, span
 
 Values = Mapping[str, Any]
@@ -126,7 +126,7 @@ def _parts(cls: type, values: Values, joint_type: str) -> Iterator[str]:
 
 def _given(cls: type, values: Values) -> Iterator[tuple[str, Field, Any]]:
     """Yield the fields with a value that is neither absent, infinite nor the default."""
-    for name, (field, default) in declared(cls).items():
+    for name, (field, default) in declared_fields(cls).items():
         value = values.get(name)
         if value is not None and value != default and value != math.inf:
             yield name, field, value

@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.documents.column_mapping import MappedColumn
-from vsacli.documents.csv_file import Header, Rows, is_missing, is_number, read_header, split_heading
+from vsacli.documents.csv_file import Header, RowsToRead, is_missing, is_number, read_header, split_heading
 from vsacli.documents.preamble import find_surroundings
 from vsacli.documents.time_column import (
     EXPECTED,
@@ -26,7 +26,7 @@ from vsacli.documents.time_column import (
     STEPS,
     UNIT_WORDS_OF_TIMES,
     UNITS_IN_NAMES,
-    Clock,
+    ClockTime,
     are_seconds_and_nanoseconds,
     guessed_unit,
     read_clock,
@@ -106,7 +106,7 @@ class FirstRows:
         cells = self.filled(place)
         return [float(cell) for cell in cells] if all(map(is_number, cells)) else []
 
-    def clocks(self, place: int) -> list[Clock]:
+    def clocks(self, place: int) -> list[ClockTime]:
         """Return the times of a column of clock texts; an empty list if it holds anything else."""
         clocks = [clock for cell in self.filled(place) if (clock := read_clock(cell)) is not None]
         return clocks if len(clocks) == len(self.filled(place)) else []
@@ -160,7 +160,7 @@ def read_first_rows(path: str | os.PathLike[str]) -> FirstRows:
     lines, _, units = find_surroundings(name)
     header = read_header(name, numbered=(1,), skipped=lines)
     point = "," if header.separator == "," else "."
-    rows = islice(Rows(name, header, (), empty_cells=True).texts(), FIRST_ROWS)
+    rows = islice(RowsToRead(name, header, (), empty_cells=True).texts(), FIRST_ROWS)
     cells = [[cell.replace(",", point) for cell in row] for _, row in rows]
     if not cells:
         raise InputError.one("has a header but no rows of values", name)
@@ -220,7 +220,7 @@ def _described(rows: FirstRows, place: int, reason: str) -> TimeColumn:
     column = rows.called(place)
     if rows.clocks(place):
         return TimeColumn(place, MappedColumn(column=column), "as a clock shows it")
-    own = rows.unit(place) or MappedColumn(column=column).doubt(rows.columns[place])
+    own = rows.unit(place) or MappedColumn(column=column).undeclared_unit(rows.columns[place])
     unit, why = guessed_unit(rows.numbers(place)) if own is None else (own, "")
     by_steps = unit is not None and STEPS in why
     why = f"unit {GUESSED}: {why}" if by_steps else why

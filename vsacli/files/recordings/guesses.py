@@ -298,7 +298,7 @@ def _source(rows: FirstRows, column: _Column) -> tuple[MappedColumn, str]:
     heading = rows.columns[column.place]
     own = rows.unit(column.place)
     source = MappedColumn(column=rows.called(column.place), unit=own)
-    spoken = source.doubt(heading)
+    spoken = source.undeclared_unit(heading)
     if spoken is not None:
         return MappedColumn(column=source.column, unit=spoken), f"its name speaks of {spoken}"
     largest = max(map(abs, rows.numbers(column.place)), default=math.nan)

@@ -21,11 +21,11 @@ from vsacli.base.simulation_variables import measured
 from vsacli.base.texts import for_yaml, joined
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.column_mapping import REST, ColumnMapping, MappedColumn
-from vsacli.documents.columns_file import checked_rate
+from vsacli.documents.columns_file import parse_rate
 from vsacli.documents.csv_file import read_header, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.preamble import find_surroundings
-from vsacli.documents.table import Table, read_table
+from vsacli.documents.table import CsvTable, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.files.recordings.first_rows import (
     GUESSED,
@@ -75,7 +75,7 @@ class _Clock:
     """
 
     column: TimeColumn
-    table: Table
+    table: CsvTable
     stamps: FloatArray
     disorder: Disorder | None
 
@@ -102,7 +102,7 @@ def describe_recording(
     clock = _choose_clock(rows, joint_names)
     time = clock.column if clock and clock.disorder is None else None
     if rate is not None:
-        rate = checked_rate(rate)
+        rate = parse_rate(rate)
         if time is not None and not time.reason.startswith(GUESSED):
             name = rows.columns[time.place] or time.place + 1
             raise InputError.one(f"has times in column {name!r}; leave --rate out", rows.path)
@@ -144,7 +144,7 @@ def _choose_clock(rows: FirstRows, joint_names: Sequence[str]) -> _Clock | None:
 
 def _read_columns(
     rows: FirstRows, places: Sequence[int], time: TimeColumn | None, rate: float | None = None
-) -> Table:
+) -> CsvTable:
     """Return columns of all rows under their positions, as written, and the times."""
     columns = {str(place): MappedColumn(column=place + 1, unit=AS_WRITTEN) for place in places}
     if time is not None:
@@ -153,7 +153,7 @@ def _read_columns(
     return read_table(rows.path, mapping, set(columns), empty_cells=True)
 
 
-def _seconds(table: Table) -> FloatArray:
+def _seconds(table: CsvTable) -> FloatArray:
     at = next(i for i, name in enumerate(table.columns) if split_heading(name)[0] == TIME)
     unit = split_heading(table.columns[at])[1] or "s"
     return np.asarray(table.values[:, at] * conversion_factor(unit, "s"))
@@ -325,7 +325,7 @@ class _Survey:
             "rows": None,
         }
 
-    def _look(self, places: Sequence[int], table: Table) -> None:
+    def _look(self, places: Sequence[int], table: CsvTable) -> None:
         self.rows = len(table.values)
         headings = [split_heading(heading)[0] for heading in table.columns]
         stamps = _seconds(table) if TIME in headings else None
@@ -382,7 +382,7 @@ class _Survey:
                 self.rate = mean_rate(stamps)
 
     def _judge(
-        self, place: int, stamps: FloatArray, values: FloatArray, table: Table, rows: IndexArray
+        self, place: int, stamps: FloatArray, values: FloatArray, table: CsvTable, rows: IndexArray
     ) -> None:
         """Add the faults of a column, unless it holds commands or errors, or its stamps do not increase."""
         if role_of(self._rows.columns[place])[0] in (COMMANDED, ERROR) or not np.all(np.diff(stamps) > 0):

@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from vsacli.base.arrays import FLAG_TYPE, BoolArray, FloatArray
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.units import TIME
 from vsacli.results.charts.reduction import Curve
 from vsacli.results.store.reader import StoredResult
@@ -112,7 +112,9 @@ class Failures:
             none = np.zeros((len(result.joint_names), time.size), dtype=np.bool_)
             return cls(time, none, none, none)
         flags = np.ascontiguousarray(result.read("flags").T, dtype=FLAG_TYPE)
-        return cls(time, *(has(flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR, Flag.NEAR_SINGULAR)))
+        return cls(
+            time, *(has_flag(flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR, Flag.NEAR_SINGULAR))
+        )
 
     def calm(self, joint: int, time: FloatArray) -> BoolArray:
         """Return where no sample of a joint fails or is near-singular within `APPROACH`; (points,).

@@ -279,23 +279,23 @@ RESULT_DRAWINGS: dict[str, Drawing] = {
 """Figures of a result of `invdyn`, by name."""
 
 
-def result_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
+def result_drawings(has_variable: Callable[[Variable], bool]) -> dict[str, Drawing]:
     """Return the figures whose variables the results of a robot have."""
     return {
         name: drawing
         for name, drawing in RESULT_DRAWINGS.items()
-        if all(has(VARIABLES[needed]) for needed in drawing.needs)
+        if all(has_variable(VARIABLES[needed]) for needed in drawing.needs)
     }
 
 
-def simulation_drawings(has: Callable[[Variable], bool]) -> dict[str, Drawing]:
+def simulation_drawings(has_variable: Callable[[Variable], bool]) -> dict[str, Drawing]:
     """Return the figures of a simulation whose variables at least one joint has."""
     return {
         "motion": Drawing((*map(COMMANDS.__getitem__, _FOLLOWED), *_FOLLOWED), _simulated_motion),
         **{
             name: _of_parts(part)
             for name, part in _OF_SIMULATIONS.items()
-            if has(SIMULATION_VARIABLES[part[0]])
+            if has_variable(SIMULATION_VARIABLES[part[0]])
         },
     }
 
@@ -304,7 +304,7 @@ def drawings_of(stored: StoredResult) -> dict[str, Drawing]:
     """Return the figures of a file by name, according to its kind."""
     if stored.kind == "simulation":
         return simulation_drawings(lambda variable: bool(stored.existing(variable).any()))
-    return result_drawings(stored.has)
+    return result_drawings(stored.has_variable)
 
 
 def drawable_figures(
@@ -389,9 +389,9 @@ def _undrawable(result: StoredResult, variable: Variable) -> str:
 def _missing(result: StoredResult, variable: Variable) -> str:
     """Return why a file does not hold a variable."""
     name, robot = variable.name, result.robot_name
-    if variable.requires in MOTOR_CONSTANTS and not result.has(variable):
+    if variable.requires in MOTOR_CONSTANTS and not result.has_variable(variable):
         return f"has no {name}: no motor of {robot} has a {variable.requires}"
-    if variable.requires not in OF_ANY_ROBOT and not result.has(variable):
+    if variable.requires not in OF_ANY_ROBOT and not result.has_variable(variable):
         return f"has no {name}: no joint of {robot} has {variable.requires}, or --variables left it out"
     if name.endswith(ending := deviation("")) and not any(each.endswith(ending) for each in result.variables):
         return f"has no {name}: no signal of its trajectory was recorded, or --variables left it out"

@@ -20,7 +20,7 @@ from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import MIN_MARGIN, Flag, has
+from vsacli.base.flags import MIN_MARGIN, Flag, has_flag
 from vsacli.base.signals import COMMANDED
 from vsacli.base.variables import VARIABLES
 from vsacli.results.charts.arm_chart import home_position
@@ -198,7 +198,7 @@ class ActuatorChart:
         """Return the distances to limits, and the coordinates of the springs, as in `StiffnessMap`."""
         torques = np.broadcast_to(tau_e, levels.shape).ravel()
         state = self.at_rest(torques, levels.ravel())
-        infeasible = has(state.flags, Flag.INFEASIBLE).reshape(levels.shape)
+        infeasible = has_flag(state.flags, Flag.INFEASIBLE).reshape(levels.shape)
         clearance: dict[str, FloatArray] = {}
         for check in self.actuator.limits:
             if check.variable in LIMITS and math.isfinite(check.range[1]):

@@ -30,7 +30,7 @@ from vsacli.results.charts.reduction import (
     visible_range,
 )
 from vsacli.results.store.reader import StoredResult
-from vsacli.robot.joint import existing
+from vsacli.robot.joint import existing_columns
 
 BOUNDS = ("stiffness_min", "stiffness_max")
 
@@ -367,5 +367,5 @@ class _Components:
 
 def compliant_joints(actuators: Sequence[str]) -> list[int]:
     """Return the joints with a stiffness, by the types of their actuators."""
-    there = existing(VARIABLES["stiffness"], actuators)
+    there = existing_columns(VARIABLES["stiffness"], actuators)
     return [joint for joint, [has_stiffness] in enumerate(there) if has_stiffness]

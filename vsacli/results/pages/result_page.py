@@ -14,7 +14,7 @@ import numpy as np
 
 from vsacli.base.arrays import FLAG_TYPE, evenly
 from vsacli.base.errors import InputError
-from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.simulation_variables import ERRORS, SIMULATED_NAMES, error
 from vsacli.base.tables import ReportText
@@ -183,7 +183,7 @@ def troubles(result: StoredResult) -> dict[str, list[list[list[float]]]]:
     if "flags" not in result.variables:
         return {}
     flags = np.asarray(result.read("flags"), dtype=FLAG_TYPE)
-    marked = {kind: has(flags, bits) for kind, bits in TROUBLES.items()}
+    marked = {kind: has_flag(flags, bits) for kind, bits in TROUBLES.items()}
     return {
         kind: [marked_spans(result.time, of_joint).tolist() for of_joint in where.T]
         for kind, where in marked.items()

@@ -73,10 +73,10 @@ class Excerpt(StoredResult):
         """See `StoredResult.existing`."""
         return self._original.existing(variable)[self._joints]
 
-    def has(self, variable: Variable) -> bool:
+    def has_variable(self, variable: Variable) -> bool:
         """Return whether these joints have the variable, as far as that depends on the robot file."""
         one_of_them = variable.requires in OF_ANY_ROBOT or bool(self.existing(variable).any())
-        return one_of_them and super().has(variable)
+        return one_of_them and super().has_variable(variable)
 
 
 def steps_between(time: FloatArray, span: Span, path: str | Path) -> slice:

@@ -19,8 +19,8 @@ from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import MOTORS, OF_ANY_ROBOT, VARIABLES, Variable
 from vsacli.base.version import __version__
 from vsacli.base.wrench import WRENCH_AXES
-from vsacli.documents.fields import declared
-from vsacli.documents.record_values import ResolvedField, arrays
+from vsacli.documents.fields import declared_fields
+from vsacli.documents.record_values import ResolvedField, resolve_values
 from vsacli.results.store.inputs import write_sources
 from vsacli.results.store.new_file import chunk_rows
 from vsacli.results.store.schema import (
@@ -159,7 +159,7 @@ def _create_variable(
     )
     dataset.attrs.update(variable_attributes(variable, robot.joint_types))
     if variable.requires not in OF_ANY_ROBOT:
-        there = [joint.has(variable) for joint in robot.joints]
+        there = [joint.has_columns(variable) for joint in robot.joints]
         dataset.attrs[EXISTING] = np.array(there, dtype=np.uint8)
     return dataset
 
@@ -189,10 +189,10 @@ def resolve(robot: Robot) -> list[ResolvedField]:
 
 def _resolved(record: Any) -> Iterator[ResolvedField]:
     record = getattr(record, "at_joint", record)  # motor values on the joint side
-    for name, (field, _) in declared(type(record)).items():
+    for name, (field, _) in declared_fields(type(record)).items():
         content = getattr(record, name)
         if content is not None:
-            for part in arrays(field.kind, content, _resolved):
+            for part in resolve_values(field.kind, content, _resolved):
                 yield part._replace(path=(name, *part.path), doc=part.doc or field.doc)
 
 

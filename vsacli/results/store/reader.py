@@ -43,7 +43,7 @@ from vsacli.results.store.schema import (
     storage_type,
     variable_attributes,
 )
-from vsacli.robot.joint import DenavitHartenberg, Pose, existing
+from vsacli.robot.joint import DenavitHartenberg, Pose, existing_columns
 
 OF_JOINTS = "inputs/robot/joints/{}"
 """Dataset of a parameter of all joints: path in the robot file with underscores in place of dots."""
@@ -280,7 +280,7 @@ class StoredResult(StoredFile):
         with reporting_damage(self.path):
             return np.asarray(self._dataset("inputs/robot/gravity")[...], dtype=np.float64).reshape(3)
 
-    def has(self, variable: Variable) -> bool:
+    def has_variable(self, variable: Variable) -> bool:
         """Return whether runs of this robot have a variable, as far as that depends on the robot file."""
         if variable.requires in MOTOR_CONSTANTS:
             return not np.isnan(self.motor_constant(variable.requires)).all()
@@ -371,7 +371,7 @@ class StoredResult(StoredFile):
     def existing(self, variable: Variable) -> BoolArray:
         """Return a mask of the existing columns of a joint variable, (joints, 1 or 2)."""
         if variable.requires in OF_ANY_ROBOT or variable.name not in self.variables:
-            return np.array(existing(variable, self.actuators))
+            return np.array(existing_columns(variable, self.actuators))
         with reporting_damage(self.path):
             stored = np.asarray(self._file[variable.name].attrs[EXISTING], dtype=bool)
             return stored.reshape(len(self.actuators), -1)

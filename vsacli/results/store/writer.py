@@ -188,7 +188,7 @@ def _not_given(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]
     return {
         name: f"no joint of {robot.name} has {_requirement(variable)}"
         for name, variable in declared.items()
-        if not robot.has(variable)
+        if not robot.has_variable(variable)
     }
 
 

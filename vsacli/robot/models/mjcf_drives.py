@@ -275,7 +275,7 @@ def add_dampers(sections: Sections, joints: Iterable[Joint]) -> None:
         if joint.damper_at("link"):
             _add_damper(sections.actuators, f"{joint.name}.damping", joint=joint.name)
         if joint.damper_at("transmission"):
-            for number, has_spring in enumerate(joint.actuator.has(VARIABLES["phi"]), 1):
+            for number, has_spring in enumerate(joint.actuator.has_columns(VARIABLES["phi"]), 1):
                 if has_spring:
                     name = f"{joint.name}.damper_{number}"
                     add_weighted_sum(

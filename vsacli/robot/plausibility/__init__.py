@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from vsacli.base.errors import Problem
 from vsacli.documents import tree
-from vsacli.documents.plausibility import Written, findings, strange
-from vsacli.documents.record_values import Entry, NumberPath
+from vsacli.documents.plausibility import ValuesInFile, implausible_measurements, implausible_values
+from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.documents.source import Source
 from vsacli.robot.plausibility.bodies import BODY_RULES
 from vsacli.robot.plausibility.checked_robot import CheckedRobot
@@ -24,16 +24,16 @@ def robot_findings(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Pr
     The robot file is the first of the sources.
     """
     lines = _robot_file_lines(sources)
-    return (*impossible_links(checked.joints, lines), *findings(ROBOT_RULES, checked, lines))
+    return (*impossible_links(checked.joints, lines), *implausible_values(ROBOT_RULES, checked, lines))
 
 
 def robot_rules_with_findings(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
     """Return the names of the rules that have findings."""
-    return frozenset(strange(ROBOT_RULES, checked, _robot_file_lines(sources)))
+    return frozenset(implausible_measurements(ROBOT_RULES, checked, _robot_file_lines(sources)))
 
 
-def _robot_file_lines(sources: Sequence[Source]) -> Written | None:
-    return Written(sources[0], _path_in_robot_file) if sources else None
+def _robot_file_lines(sources: Sequence[Source]) -> ValuesInFile | None:
+    return ValuesInFile(sources[0], _path_in_robot_file) if sources else None
 
 
 def _path_in_robot_file(root: tree.Node, path: NumberPath) -> NumberPath:
@@ -41,12 +41,12 @@ def _path_in_robot_file(root: tree.Node, path: NumberPath) -> NumberPath:
 
     The standard row i has a and alpha of the modified row i+1; those of the first one are in the base.
     """
-    convention = root.entries.get("convention") if isinstance(root, tree.Mapping) else None
-    if not (isinstance(convention, tree.Scalar) and convention.text == "modified"):
+    convention = root.entries.get("convention") if isinstance(root, tree.MapNode) else None
+    if not (isinstance(convention, tree.TextNode) and convention.text == "modified"):
         return path
     match path:
-        case ("joints", Entry(number=number), "dh", "a" | "alpha" as word):
-            return ("joints", Entry(number + 1), "dh", word)
-        case ("base", "rpy", Entry(number=0)):
-            return ("joints", Entry(0), "dh", "alpha")
+        case ("joints", PathIndex(number=number), "dh", "a" | "alpha" as word):
+            return ("joints", PathIndex(number + 1), "dh", word)
+        case ("base", "rpy", PathIndex(number=0)):
+            return ("joints", PathIndex(0), "dh", "alpha")
     return path

@@ -13,7 +13,7 @@ import numpy as np
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.plausibility import Measured
-from vsacli.documents.record_values import Entry, Number, NumberPath
+from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex
 from vsacli.robot.joint import Joint, Link, Pose
 
 WEIGHT_PER_MASS = 9.81
@@ -53,7 +53,7 @@ class CheckedRobot:
     joints: tuple[Joint, ...]
     base: Pose
     gravity: tuple[float, float, float]
-    numbers: tuple[Number, ...]
+    numbers: tuple[NumberAtPath, ...]
     placeholder: bool
 
     @cached_property
@@ -79,14 +79,14 @@ class CheckedRobot:
 
     def _variant(self, path: NumberPath) -> str:
         """Return the joint type on which the unit of a number depends."""
-        if path[0] != "joints" or not isinstance(path[1], Entry):
+        if path[0] != "joints" or not isinstance(path[1], PathIndex):
             return "revolute"
         return self.joints[path[1].number].type
 
 
-def joint_path(number: int, joint: Joint, *steps: str | Entry) -> NumberPath:
+def joint_path(number: int, joint: Joint, *steps: str | PathIndex) -> NumberPath:
     """Return the path of a part of a joint."""
-    return ("joints", Entry(number, joint.name), *steps)
+    return ("joints", PathIndex(number, joint.name), *steps)
 
 
 def motors_in_file(joint: Joint) -> Iterator[tuple[NumberPath, Motor]]:
@@ -100,7 +100,7 @@ def records_in_file(path: NumberPath, content: Any) -> Iterator[tuple[NumberPath
     if len({id(side) for side in sides}) == 1:
         yield path, sides[0]
     else:
-        yield from (((*path, Entry(number)), side) for number, side in enumerate(sides))
+        yield from (((*path, PathIndex(number)), side) for number, side in enumerate(sides))
 
 
 class BodySizes:

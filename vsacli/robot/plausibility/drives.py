@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from vsacli.actuators.motor import SHAFT, JointMotor, Motor
 from vsacli.base.variables import VARIABLES
-from vsacli.documents.fields import declared
+from vsacli.documents.fields import declared_fields
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
-from vsacli.documents.record_values import Entry, NumberPath
+from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, RPM, SIZES, Measure
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors_in_file, ratio_or_nan
@@ -43,7 +43,11 @@ class _CheckedMotor(NamedTuple):
     def carries_load(self) -> bool:
         """Whether the motor carries the load; one that only sets the springs may be small and fast."""
         last = self.path_in_joint[-1]
-        return bool(self.joint.actuator.has(VARIABLES["phi"])[last.number if isinstance(last, Entry) else 0])
+        return bool(
+            self.joint.actuator.has_columns(VARIABLES["phi"])[
+                last.number if isinstance(last, PathIndex) else 0
+            ]
+        )
 
     @property
     def torque(self) -> float:
@@ -78,7 +82,7 @@ class _CheckedMotor(NamedTuple):
     def unit(self, name: str) -> str:
         """Return the unit of a field; a shaft is rotational at any joint."""
         variant = "revolute" if self.motor.side == SHAFT else None
-        return declared(Motor)[name][0].quantity.inside(variant).unit(self.joint.type)
+        return declared_fields(Motor)[name][0].quantity.inside(variant).unit(self.joint.type)
 
     def path(self, name: str) -> NumberPath:
         """Return the path of a field."""
@@ -144,7 +148,9 @@ def _measure_dry_friction(checked: CheckedRobot) -> Iterator[Measured]:
     for drive in _checked_motors(checked):
         if drive.motor.friction is not None:
             backward, forward = drive.motor.friction.coulomb
-            directions = {Entry(0): backward, Entry(1): forward} if backward != forward else {None: forward}
+            directions = (
+                {PathIndex(0): backward, PathIndex(1): forward} if backward != forward else {None: forward}
+            )
             for direction, torque in directions.items():
                 path = (*drive.path("friction"), "coulomb", *(() if direction is None else (direction,)))
                 size = torque / _nan_if_infinite(drive.motor.max_torque)

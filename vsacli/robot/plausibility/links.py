@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from vsacli.base.errors import Problem
-from vsacli.documents.plausibility import Measured, Written
+from vsacli.documents.plausibility import Measured, ValuesInFile
 from vsacli.documents.record_values import NumberPath
 from vsacli.robot.joint import INERTIA_ROUNDING, Inertia, Joint
 from vsacli.robot.plausibility.checked_robot import joint_path
@@ -16,7 +16,7 @@ from vsacli.robot.plausibility.checked_robot import joint_path
 UNIT = "kg m^2"
 
 
-def impossible_links(joints: Sequence[Joint], file_lines: Written | None) -> Iterator[Problem]:
+def impossible_links(joints: Sequence[Joint], file_lines: ValuesInFile | None) -> Iterator[Problem]:
     """Yield warnings about links without mass or inertia, and about broken triangle inequalities.
 
     A robot without any mass has no warnings about zeros, since one for the whole robot says so.
@@ -38,7 +38,7 @@ def impossible_links(joints: Sequence[Joint], file_lines: Written | None) -> Ite
             yield _problem_at_path((*path, "inertia"), f": {excess}, {advice}", file_lines)
 
 
-def _describe_triangle_violation(path: NumberPath, inertia: Inertia, file_lines: Written | None) -> str:
+def _describe_triangle_violation(path: NumberPath, inertia: Inertia, file_lines: ValuesInFile | None) -> str:
     """Return by how much the largest moment exceeds the sum of the others; empty if it does not.
 
     Moments are named by their axes if these are principal axes, unless the file has other axes.
@@ -57,11 +57,11 @@ def _describe_triangle_violation(path: NumberPath, inertia: Inertia, file_lines:
     return f"{moment} {high:.4g} {UNIT} exceeds {sum_of_others} {low + middle:.4g} {UNIT} {by}"
 
 
-def _is_written(path: NumberPath, value: float, file_lines: Written) -> bool:
-    return file_lines.said(Measured(path, value, UNIT, math.nan)) is not None
+def _is_written(path: NumberPath, value: float, file_lines: ValuesInFile) -> bool:
+    return file_lines.as_in_file(Measured(path, value, UNIT, math.nan)) is not None
 
 
-def _problem_at_path(path: NumberPath, message: str, file_lines: Written | None) -> Problem:
+def _problem_at_path(path: NumberPath, message: str, file_lines: ValuesInFile | None) -> Problem:
     """Return a problem with the line of a path, unless the file has another mass there: it was changed."""
     message = ".".join(map(str, path)) + message
     if file_lines is None or (path[-1] == "mass" and not _is_written(path, 0.0, file_lines)):

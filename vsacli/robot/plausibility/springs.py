@@ -12,7 +12,7 @@ from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base import units
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
-from vsacli.documents.record_values import Entry, NumberPath
+from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.robot.joint import Joint
 from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, TURN
 from vsacli.robot.plausibility.checked_robot import (
@@ -135,7 +135,7 @@ def _measure_stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
         for side, limit in enumerate(joint.limits.stiffness):
             size = ratio_or_nan(limit, attainable.lower)
             if math.isfinite(limit) and (side or limit > attainable.upper or size > 1):
-                path = joint_path(index, joint, "limits", "stiffness", Entry(side))
+                path = joint_path(index, joint, "limits", "stiffness", PathIndex(side))
                 yield Measured(path, limit, _stiffness_unit(joint), size, beside)
 
 
@@ -156,7 +156,7 @@ def _measure_largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
             )
             damping = joint.damper.range[1]
             size = damping / (2 * math.sqrt(product)) if product > 0 else math.nan
-            path = joint_path(number, joint, "damper", "range", Entry(1))
+            path = joint_path(number, joint, "damper", "range", PathIndex(1))
             yield Measured(path, damping, units.DAMPING.unit(joint.type), size)
 
 

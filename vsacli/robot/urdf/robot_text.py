@@ -10,7 +10,17 @@ from typing import Any
 from vsacli.base import file_formats
 from vsacli.base.texts import for_yaml
 from vsacli.base.units import TORQUE
-from vsacli.documents.fields import Choice, Interval, Kind, Number, OneOf, Pair, Record, Vector, declared
+from vsacli.documents.fields import (
+    Interval,
+    NumberList,
+    NumberWithUnit,
+    OneOf,
+    PairOf,
+    RecordOf,
+    ValueKind,
+    WordChoice,
+    declared_fields,
+)
 from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Limits, Link, Pose
 from vsacli.robot.urdf.conversion import Conversion
 from vsacli.robot.urdf.link_tree import UrdfJoint
@@ -103,29 +113,29 @@ def _describe_urdf_motor(joint: UrdfJoint) -> Iterator[str]:
 
 def _format_fields(record: Any) -> dict[str, str]:
     """Return the text of each field of a record, without fields at their default."""
-    values = {name: getattr(record, name) for name in declared(type(record))}
+    values = {name: getattr(record, name) for name in declared_fields(type(record))}
     return {
         name: _format_field(field.kind, values[name])
-        for name, (field, default) in declared(type(record)).items()
+        for name, (field, default) in declared_fields(type(record)).items()
         if values[name] != default
     }
 
 
-def _format_field(kind: Kind, content: Any) -> str:
+def _format_field(kind: ValueKind, content: Any) -> str:
     match kind:
-        case Pair(item):
+        case PairOf(item):
             sides = [_format_field(item, side) for side in content]
             return sides[0] if sides[0] == sides[1] else f"[{', '.join(sides)}]"
-        case Record():
+        case RecordOf():
             return _format_mapping(_format_fields(content))
         case OneOf(variants):
             word = next(word for word, variant in variants.items() if type(content) is variant)
             return _format_mapping({"type": word, **_format_fields(content)})
-        case Number():
+        case NumberWithUnit():
             return _format_number(content)
-        case Choice():
+        case WordChoice():
             return str(content)
-        case Interval() | Vector():
+        case Interval() | NumberList():
             return _format_numbers(content)
     return json.dumps(content)
 

@@ -21,7 +21,7 @@ from vsacli.compute.duals import tangent_of, value_of
 from vsacli.dynamics.drive import shaft_torques
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, apart, seeded
+from vsacli.robot.parameters import Parameter, seeded, with_copied_actuator
 from vsacli.studies.identification.conditioning import Signals
 from vsacli.studies.identification.estimation import Equations
 from vsacli.studies.identification.fitted_system import Solution, SystemOfEquations
@@ -214,7 +214,7 @@ def _carried(
         return signals.tau_motor[:, index, 0], np.zeros((len(springs), len(signals.time)))
     own = [each if each.joint == index else None for each in springs]
     chosen = [each for each in own if each is not None]
-    carrying = apart(seeded(robot, chosen).joints[index]).actuator
+    carrying = with_copied_actuator(seeded(robot, chosen).joints[index]).actuator
     torque = carrying.springs_of(joint_motion(signals, index)).tau_e
     slopes = np.zeros((len(springs), len(signals.time)))
     slopes[[each is not None for each in own]] = tangent_of(torque, len(chosen), signals.time.shape)
@@ -225,7 +225,7 @@ def _resistance(
     robot: Robot, index: int, motion: JointVariables, numbers: Sequence[Parameter]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the resisting torque of a joint and its rigid drive, (samples,), and its slopes."""
-    joint = apart(seeded(robot, numbers).joints[index])
+    joint = with_copied_actuator(seeded(robot, numbers).joints[index])
     dq: Any = motion.dq
     torque: Any = joint.damping * dq + joint_friction(joint.friction, (dq, 0, 0, 0)).tau
     if not joint.actuator.sprung:

@@ -21,7 +21,7 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.compute.duals import Dual, tangent_of, value_of
 from vsacli.dynamics.drive import shaft_torques
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, apart, parameters, seeded
+from vsacli.robot.parameters import Parameter, parameters, seeded, with_copied_actuator
 from vsacli.studies.identification.conditioning import Signals
 from vsacli.studies.identification.estimation import Equations
 from vsacli.studies.identification.fitted_system import CERTAIN, Solution, SystemOfEquations
@@ -229,7 +229,7 @@ class MotorSystem(SystemOfEquations):
             each._replace(value=float(value))
             for each, value in zip(self.sought, self.of_file(values), strict=True)
         ]
-        carrying = apart(seeded(self._robot, present).joints[index]).actuator
+        carrying = with_copied_actuator(seeded(self._robot, present).joints[index]).actuator
         with np.errstate(all="ignore"):  # a step of the search may go too far and is then shortened
             torques = predicted_torques(carrying, joint_motion(signals, index))
         slopes = tangent_of(torques, count, np.shape(value_of(torques)))
@@ -331,7 +331,7 @@ def _motor_combinations(
     dtheta, ddtheta = random.uniform(-1, 1, (2, SIDES, SAMPLES))
     dtheta *= np.geomspace(1, 1e-4, SAMPLES)  # of all sizes, as widths of friction are
     arrays = {"q": q[chosen], "phi": phi, "theta": q[chosen] + phi, "dtheta": dtheta, "ddtheta": ddtheta}
-    carrying = apart(seeded(robot, parts).joints[index]).actuator
+    carrying = with_copied_actuator(seeded(robot, parts).joints[index]).actuator
     with np.errstate(all="ignore"):  # a deflection nearby may be out of reach
         torques = predicted_torques(carrying, as_duals(arrays))
     columns = tangent_of(torques, len(parts), np.shape(value_of(torques))).reshape(len(parts), -1).T

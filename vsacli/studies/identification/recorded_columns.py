@@ -71,7 +71,7 @@ class _RobotColumns(NamedTuple):
 
     def existing(self, variable: Variable) -> BoolArray:
         """Return the existing columns of a variable of joints."""
-        return np.array([joint.has(variable) for joint in self.robot.joints])
+        return np.array([joint.has_columns(variable) for joint in self.robot.joints])
 
 
 def recorded_columns(
@@ -98,7 +98,7 @@ def recorded_columns(
         columns.append(Column(signal.column, place, stamps[there], values, signal.column in united))
     used = {column.name for column in columns}
     others = [signal.column for signal in recording.signals if signal.column not in used]
-    return columns, (*others, *recording.table.others), recording
+    return columns, (*others, *recording.table.unknown_columns), recording
 
 
 def _preferred(signals: Sequence[Measured]) -> dict[Where, Measured]:

@@ -100,7 +100,7 @@ def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> It
     """Yield sentences on motors behind springs that do not follow their joint."""
     stride = signals.filter.stride
     actuator, q = robot.joints[index].actuator, signals.q[::stride]
-    for motor, follows in enumerate(actuator.has(VARIABLES["phi"])[: actuator.motor_count]):
+    for motor, follows in enumerate(actuator.has_columns(VARIABLES["phi"])[: actuator.motor_count]):
         theta = signals.theta[::stride, index, motor]
         own = float(np.var(theta - q[:, index]))
         name, joint = (

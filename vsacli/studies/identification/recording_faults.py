@@ -127,7 +127,7 @@ def _apart(columns: Sequence[Column]) -> Iterator[str]:
 def _position_clauses(column: Column, robot: Robot) -> Iterator[str]:
     _, index, motor = column.place
     turns = robot.joints[index].is_revolute
-    follows = motor is None or robot.joints[index].actuator.has(VARIABLES["phi"])[motor - 1]
+    follows = motor is None or robot.joints[index].actuator.has_columns(VARIABLES["phi"])[motor - 1]
     largest = float(np.max(np.abs(column.values), initial=0.0))
     jumps = angle_wraps(column.values) if turns else None
     if jumps is not None:

@@ -105,7 +105,7 @@ def _of_motors(
     position, torque = (VARIABLES[each].quantity.unit(joint.type) for each in (MOTOR, TORQUE))
     names = motor_names(robot, index)
     recorded = {name: motor for motor, name in enumerate(names) if name in found.fit.residual_rms}
-    behind = joint.actuator.has(VARIABLES["phi"])[: len(names)]
+    behind = joint.actuator.has_columns(VARIABLES["phi"])[: len(names)]
     deflections = [_deflections(behind, each, index) for each in records]
     pulls = np.where(np.mean(np.hstack(deflections), axis=1) < 0, -1.0, 1.0)  # opposite signs in a pair
     pulled = [pulls[:, None] * each for each in deflections]

@@ -278,8 +278,8 @@ def _gear_ratios(recorded: Recording, result: StoredResult) -> list[float]:
 
 
 def _left_out(recorded: Recording, behind: Sequence[str]) -> Iterator[str]:
-    commanded = [column for column in recorded.table.others if role_of(column)[0] == COMMANDED]
-    unknown = [column for column in recorded.table.others if column not in commanded]
+    commanded = [column for column in recorded.table.unknown_columns if role_of(column)[0] == COMMANDED]
+    unknown = [column for column in recorded.table.unknown_columns if column not in commanded]
     if behind:
         yield f"not compared, as other columns say what the robot did: {', '.join(behind)}"
     if commanded:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FLAG_TYPE
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.texts import counted
 from vsacli.results.store.reader import StoredResult
 from vsacli.studies.measured.agreement import Agreement
@@ -96,5 +96,5 @@ def _samples(result: StoredResult) -> str:
     if "flags" not in result.variables:
         return ""
     flags = np.asarray(result.read("flags"), dtype=FLAG_TYPE)
-    missing = np.any(has(flags, INVALID), axis=1)
+    missing = np.any(has_flag(flags, INVALID), axis=1)
     return f" at {np.count_nonzero(missing)} of {counted(len(missing), 'sample')}"

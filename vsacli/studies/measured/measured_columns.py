@@ -16,7 +16,7 @@ from vsacli.base.texts import counted, listed
 from vsacli.base.variables import MOTORS, VARIABLES, Variable
 from vsacli.documents.column_mapping import ColumnMapping
 from vsacli.documents.csv_file import split_heading
-from vsacli.documents.table import Table, read_table
+from vsacli.documents.table import CsvTable, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
 from vsacli.trajectory.recorded.disorder import replace_stamps
@@ -98,13 +98,13 @@ class Recording(NamedTuple):
     Attributes:
         time: times, (samples,) in s since the first sample.
         signals: signals in the order of the variables, then of the joints.
-        table: table of the file; its `others` are not among these variables.
+        table: table of the file; its `unknown_columns` are not among these variables.
         stranger: sentence on joints that the subject of the recording does not have; otherwise empty.
     """
 
     time: FloatArray
     signals: tuple[Measured, ...]
-    table: Table
+    table: CsvTable
     stranger: str
 
 
@@ -134,7 +134,7 @@ def read_recording(
     table = table.without_empty_rows(stamped=True).with_joined_rows()
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
-    unknown = [name for name, _ in map(split_heading, table.others) if role_of(name)[0] != COMMANDED]
+    unknown = [name for name, _ in map(split_heading, table.unknown_columns) if role_of(name)[0] != COMMANDED]
     expected = (TIME,) if any(name in places for name in names) else (TIME, *places)
     header = ColumnNames(
         (*names, *unknown), {TIME, *places}, expected, jointed.joint_names, table.source.path, "use --columns"
@@ -277,7 +277,7 @@ def _scaled(values: FloatArray, factor: float) -> FloatArray:
     return np.asarray(values * factor)
 
 
-def _elapsed(table: Table, at: int, factors: Mapping[int, float], rate: float | None) -> FloatArray:
+def _elapsed(table: CsvTable, at: int, factors: Mapping[int, float], rate: float | None) -> FloatArray:
     """Return the times since the first sample, s; with a stated rate it stands in place of wrong stamps."""
     stamps = table.values[:, at]
     if len(stamps) < 2:

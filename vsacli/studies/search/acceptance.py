@@ -19,7 +19,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.base import units
 from vsacli.base.arrays import FLAG_TYPE, BoolArray, FloatArray
 from vsacli.base.errors import VsacliError
-from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.inverse import compute_block, usual_block
 from vsacli.dynamics.limits import MARGIN, Finding, limit_checks, limit_flags, worst_excess
@@ -173,11 +173,11 @@ class Acceptance:
     def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
         short = margin(values["stiffness"], values["stiffness_min"], values["stiffness_max"])
         flags = values["flags"]
-        refused: BoolArray = (short < self.min_margin) | has(flags, Flag.INFEASIBLE)
+        refused: BoolArray = (short < self.min_margin) | has_flag(flags, Flag.INFEASIBLE)
         refused |= self._near_limits(joint, values)
         if self.recorded is not None:  # allowances take long, and matter only where nothing else refuses
             flags = self.recorded.flags(self.robot, joint, values, instants, ~refused)
-        return refused | has(flags, LIMITS)
+        return refused | has_flag(flags, LIMITS)
 
     def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
         """Return a mask of the samples closer to a limit than the reserve, (samples,)."""
@@ -193,7 +193,7 @@ class Acceptance:
         lower, upper = values["stiffness_min"], values["stiffness_max"]
         gap = margin(asked, lower, upper)
         gap[np.isnan(gap)] = np.inf
-        gap[has(values["flags"], Flag.INFEASIBLE) & np.isnan(lower)] = -np.inf
+        gap[has_flag(values["flags"], Flag.INFEASIBLE) & np.isnan(lower)] = -np.inf
         step = int(gap.argmin())
         if gap[step] >= self.min_margin:
             return None
@@ -219,7 +219,7 @@ class Acceptance:
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
         checks = (check for check in limit_checks(joint) if check.variable in values)
-        worst = (worst_excess(joint, check, values, time, has(flags, check.flag)) for check in checks)
+        worst = (worst_excess(joint, check, values, time, has_flag(flags, check.flag)) for check in checks)
         return next(filter(None, worst), None)
 
 

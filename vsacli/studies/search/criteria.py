@@ -23,7 +23,7 @@ from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import drive
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import apart
+from vsacli.robot.parameters import with_copied_actuator
 from vsacli.studies.search.interior_point import (
     FIRST_GAP,
     WARM_GAP,
@@ -228,7 +228,7 @@ class CopperLoss(Criterion):
 
     def check(self, joint: Joint) -> None:
         """Check that the motors have a resistance."""
-        if not all(joint.has(VARIABLES["copper_loss"])[: joint.actuator.motor_count]):
+        if not all(joint.has_columns(VARIABLES["copper_loss"])[: joint.actuator.motor_count]):
             raise InputError.one(
                 f"the motors of {joint.name} have no resistance, which copper loss requires; add "
                 "torque_constant and resistance to the robot file, or use --minimize torque"
@@ -379,7 +379,7 @@ def made_to_carry(joint: Joint, directions: int, *, moving_corridor: bool) -> Jo
         directions: number of derivatives that the stiffness carries; each motor adds one for phi.
         moving_corridor: whether the ends of the attainable range carry derivatives as well.
     """
-    carrying = apart(joint)
+    carrying = with_copied_actuator(joint)
     implicit = ImplicitSolution(joint.actuator, carrying.actuator, directions + joint.actuator.motor_count)
     solve = implicit.solve if moving_corridor else implicit.solve_within
     object.__setattr__(carrying.actuator, "solve", solve)

@@ -18,7 +18,7 @@ from vsacli.compute.duals import Dual, value_of
 from vsacli.dynamics.drive import driven_by
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import apart
+from vsacli.robot.parameters import with_copied_actuator
 from vsacli.studies.search.criteria import (
     ENDS_OF_CORRIDOR,
     NO_COST,
@@ -192,7 +192,7 @@ class PacedJoint:
         self._carrying = (
             made_to_carry(self._joint, PACE_ORDERS + STIFFNESS.orders * varied, moving_corridor=True)
             if self._joint.actuator.sprung
-            else apart(self._joint)
+            else with_copied_actuator(self._joint)
         )
         fixed = NOT_OF_THE_PACE if varied else (*NOT_OF_THE_PACE, STIFFNESS.key)
         self._checks = [check for check in limit_checks(self._joint) if check.variable not in fixed]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
-from vsacli.base.flags import LIMITS, Flag, has
+from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.base.units import TORQUE
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
@@ -76,7 +76,7 @@ class Effects:
         """Include the next block."""
         block = part.block
         self._flags |= np.bitwise_or.reduce(block.flags, axis=None)
-        failed = has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR)
+        failed = has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR)
         self.failed += int(np.count_nonzero(failed))
         self.left_out += int(np.count_nonzero(failed.any(axis=1)))
         self.peak = np.fmax(self.peak, np.fmax.reduce(np.abs(block.tau_motor), axis=(0, 2)))
@@ -105,7 +105,7 @@ class Effects:
     def verdict(self) -> str:
         """Verdict on the run with unchanged parameters."""
         judged = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "over_limit": LIMITS}
-        return next((verdict for verdict, bits in judged.items() if has(self._flags, bits).any()), "ok")
+        return next((verdict for verdict, bits in judged.items() if has_flag(self._flags, bits).any()), "ok")
 
     def _add_torque(self, time: FloatArray, slopes: FloatArray, places: Sequence[int], joint: int) -> None:
         changes = np.abs(slopes).reshape(len(places), -1)

@@ -24,7 +24,7 @@ from vsacli.compute.duals import Dual, seeds, tangent_of, value_of
 from vsacli.dynamics.drive import driven_by
 from vsacli.dynamics.elastic_torques import TORQUES
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, apart, seeded
+from vsacli.robot.parameters import Parameter, seeded, with_copied_actuator
 
 AT_END = 1e-9
 """Relative distance below which phi is at the end of its range."""
@@ -184,7 +184,7 @@ def drive_derivatives(
     """
     numbers, motors = len(chosen), 2
     directions = numbers + len(TORQUES) + motors
-    carrying = apart(seeded(robot, chosen).joints[index])
+    carrying = with_copied_actuator(seeded(robot, chosen).joints[index])
     torques: dict[str, Any] = dict(
         zip(TORQUES, seeds([getattr(command, name) for name in TORQUES], numbers), strict=True)
     )

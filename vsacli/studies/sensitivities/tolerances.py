@@ -16,7 +16,7 @@ import scipy
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.json_records import Published, named
 from vsacli.base.units import Quantity
 from vsacli.documents import tree
@@ -130,10 +130,10 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
     source, text = read_source(path)
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
-    if not isinstance(root, tree.Mapping):
+    if not isinstance(root, tree.MapNode):
         problems.fail(root.line, f"expected {CONTENT}, found {root}")
     stated = root.entries.get("format")
-    if isinstance(stated, tree.Scalar):
+    if isinstance(stated, tree.TextNode):
         kind = stated.text.removeprefix("vsacli-").partition("/")[0]
         raise InputError.one(f"is a {kind}; expected {CONTENT}", source.path)
     found: list[Tolerance | None] = [None] * len(chosen)
@@ -163,10 +163,10 @@ def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
     Raises:
         InputError: the entry is invalid.
     """
-    if not isinstance(node, tree.Mapping) or len(node.entries) != 1:
+    if not isinstance(node, tree.MapNode) or len(node.entries) != 1:
         raise InputError.one(f"expected a distribution, {FORM}, found {node}")
     ((shape, size),) = node.entries.items()
-    if shape not in SHAPES or not isinstance(size, tree.Scalar):
+    if shape not in SHAPES or not isinstance(size, tree.TextNode):
         raise InputError.one(f"expected a distribution, {FORM}, found {shape}: {size}")
     share = PER_CENT.fullmatch(size.text)
     if share is None:
@@ -271,7 +271,9 @@ def _run(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:
         compute_block(robot, trajectory.block(start, start + size))
         for start in range(0, trajectory.samples, size)
     ]
-    lost = np.any([has(block.flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=0) for block in blocks], axis=0)
+    lost = np.any(
+        [has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=0) for block in blocks], axis=0
+    )
     return np.concatenate([block.tau_motor for block in blocks]), lost
 
 

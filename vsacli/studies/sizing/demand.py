@@ -16,7 +16,7 @@ from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
-from vsacli.base.flags import Flag, has
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.json_records import Published, named
 from vsacli.base.variables import Block
 from vsacli.dynamics.dampers import parallel_damper_torques
@@ -250,7 +250,7 @@ def demanded(
         for block in run:
             blocks.append(_moved(robot, block))
             springs.add(block, name)
-            left_out += int(np.count_nonzero(np.any(has(block.flags, UNDONE), axis=1)))
+            left_out += int(np.count_nonzero(np.any(has_flag(block.flags, UNDONE), axis=1)))
             progress(len(block.time))
         parts.append({name: np.concatenate([each[name] for each in blocks]) for name in MOVED})
         verdict = run.report().verdict
@@ -274,7 +274,7 @@ def _moved(robot: Robot, block: Block) -> dict[str, FloatArray]:
             load[:, index] += parallel_damper_torques(joint, JointVariables.of(block.of_joint(index)))[0].T
         if joint.actuator.coupled_rotors:
             load[:, index] += joint.actuator.coupled_rotors * block.ddtheta[:, index, ::-1]
-    load[has(block.flags, UNDONE)] = np.nan
+    load[has_flag(block.flags, UNDONE)] = np.nan
     of_motors = (block.dtheta, block.ddtheta, load, block.tau_motor)
     return dict(zip(MOVED, (block.time, *(each.copy() for each in of_motors)), strict=True))
 

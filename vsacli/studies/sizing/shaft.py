@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from vsacli.actuators.friction import NO_FRICTION, direction_of
+from vsacli.actuators.friction import NO_FRICTION, sign_of_motion
 from vsacli.actuators.motor import JointMotor
 from vsacli.base.arrays import FloatArray
 
@@ -145,7 +145,7 @@ def shaft_signals(velocity: FloatArray, acceleration: FloatArray, load: FloatArr
     They are acceleration, velocity, 1 while moving backward, 1 while moving forward, 1, the driven load, and
     the braked load. At rest a load counts as driven.
     """
-    direction = direction_of(velocity)
+    direction = sign_of_motion(velocity)
     driven = direction * load >= 0
     return np.stack(
         (

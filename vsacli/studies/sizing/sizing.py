@@ -191,8 +191,8 @@ def _notes(robot: Robot, table: RecordTable[CatalogMotor] | None) -> Iterator[st
     coupled = [joint.name for joint in robot.joints if joint.actuator.coupled_rotors]
     if coupled and table is not None:
         yield f"{', '.join(coupled)}: the coupled inertia stays as it is, whatever the motors"
-    if table is not None and table.others:
-        yield f"columns of the catalog that were left out: {', '.join(table.others)}"
+    if table is not None and table.unknown_columns:
+        yield f"columns of the catalog that were left out: {', '.join(table.unknown_columns)}"
 
 
 KEPT = ("max_torque", "max_velocity", "torque_constant", "resistance", "max_current", "max_voltage")

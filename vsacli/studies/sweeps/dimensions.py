@@ -22,12 +22,11 @@ from vsacli.base.units import ANY_SI_UNIT
 from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import evaluate
-from vsacli.documents.reading import ChangeError, changed
-from vsacli.documents.record_values import Entry, NumberPath, numbers
-from vsacli.documents.record_values import Number as NumberAt
+from vsacli.documents.reading import ChangeError, apply_changes
+from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex, numbers_in_record
 from vsacli.documents.source import Problems, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
-from vsacli.robot.file import ReadRobot
+from vsacli.robot.file import RobotFileWithSource
 from vsacli.robot.model import Robot
 from vsacli.studies.sensitivities.tolerances import Tolerance, distribution
 from vsacli.studies.sweeps.study_file import GRID, Drawn, Linked, Listed, Ranged, Spaced, StudyFile, Varied
@@ -47,7 +46,7 @@ class FileNumber(NamedTuple):
     value: float
 
 
-def file_numbers(numbers: Sequence[NumberAt], joint_types: Mapping[str, str]) -> list[FileNumber]:
+def file_numbers(numbers: Sequence[NumberAtPath], joint_types: Mapping[str, str]) -> list[FileNumber]:
     """Return the numbers of a file with their paths.
 
     Args:
@@ -66,11 +65,13 @@ def file_numbers(numbers: Sequence[NumberAt], joint_types: Mapping[str, str]) ->
 
 
 def _dotted(path: NumberPath, *, indexed: bool = False) -> str:
-    return ".".join(str(step.number) if indexed and isinstance(step, Entry) else str(step) for step in path)
+    return ".".join(
+        str(step.number) if indexed and isinstance(step, PathIndex) else str(step) for step in path
+    )
 
 
-def _type(number: NumberAt, joint_types: Mapping[str, str]) -> str:
-    names = (step.name for step in number.path if isinstance(step, Entry))
+def _type(number: NumberAtPath, joint_types: Mapping[str, str]) -> str:
+    names = (step.name for step in number.path if isinstance(step, PathIndex))
     return next((joint_types[name] for name in names if name in joint_types), "revolute")
 
 
@@ -212,7 +213,7 @@ class Entries:
     """
 
     def __init__(
-        self, file: StudyFile, path: str, read: ReadRobot, robot: Robot, trajectories: Sequence[str]
+        self, file: StudyFile, path: str, read: RobotFileWithSource, robot: Robot, trajectories: Sequence[str]
     ) -> None:
         self._file, self._path, self._read = file, path, read
         self._joints = CommandedJoints.of(robot)
@@ -261,8 +262,8 @@ class Entries:
         problems.check()
 
     def _numbers(self) -> list[FileNumber]:
-        trajectories = (numbers(document, self._joints.types) for document, _ in self._documents)
-        every = [*numbers(self._read.document), *(each for found in trajectories for each in found)]
+        trajectories = (numbers_in_record(document, self._joints.types) for document, _ in self._documents)
+        every = [*numbers_in_record(self._read.document), *(each for found in trajectories for each in found)]
         return file_numbers(every, self._joints.types)
 
     def _change(self, path: str, value: object) -> None:
@@ -270,9 +271,9 @@ class Entries:
         if changes.trajectory and self._tables:
             raise ChangeError.one("a trajectory of the study is a table, in which nothing can be set")
         if changes.robot:
-            changed(self._read.document, self._read.source, changes.robot)
+            apply_changes(self._read.document, self._read.source, changes.robot)
         for document, source in self._documents if changes.trajectory else ():
-            changed(document, source, changes.trajectory, self._joints.types, self._joints.exempt)
+            apply_changes(document, source, changes.trajectory, self._joints.types, self._joints.exempt)
 
 
 @contextmanager

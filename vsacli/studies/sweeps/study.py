@@ -23,10 +23,10 @@ from vsacli.base.version import __version__
 from vsacli.compute.engine import Settled, settle
 from vsacli.documents.reading import Changes, read_document
 from vsacli.documents.source import Problems, Source
-from vsacli.documents.tree import Mapping, parse_yaml
+from vsacli.documents.tree import MapNode, parse_yaml
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.results.store.study_table import TEXTS
-from vsacli.robot.file import ReadRobot, read_robot
+from vsacli.robot.file import RobotFileWithSource, read_robot_file
 from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.columns import KEPT, Column, over_time
 from vsacli.studies.sweeps.dimensions import Design, Dimension, Entries
@@ -110,7 +110,7 @@ class Study:
 
     file: StudyFile
     source: Source
-    read: ReadRobot
+    read: RobotFileWithSource
     robot: Robot
     trajectories: tuple[str, ...]
     trajectory_sources: tuple[tuple[Source, ...], ...]
@@ -261,10 +261,10 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     file, source = read_document(path, StudyFile, file_formats.STUDY)
     folder = Path(source.path).parent
     _check_named(source, "robot", file.robot)
-    read = read_robot(folder / file.robot)
+    read = read_robot_file(folder / file.robot)
     robot = read.robot()
     for each in over_time(file.variables or ()):
-        if not robot.has(VARIABLES[each.name]):
+        if not robot.has_variable(VARIABLES[each.name]):
             raise InputError.one(f"variables: no joint of {robot.name} has a {each.name}", source.path)
     trajectories = _trajectories(file, folder, source)
     loaded = [load_trajectory(each, robot) for each in trajectories]
@@ -293,7 +293,7 @@ def _check_named(source: Source, key: str, name: str) -> None:
 
 def _line_of(source: Source, key: str) -> int:
     root = parse_yaml(source.text or "", Problems(source.path))
-    return root.key_lines.get(key, 0) if isinstance(root, Mapping) else 0
+    return root.key_lines.get(key, 0) if isinstance(root, MapNode) else 0
 
 
 def _trajectories(file: StudyFile, folder: Path, source: Source) -> tuple[str, ...]:

@@ -17,16 +17,16 @@ from vsacli.base.units import Quantity
 from vsacli.documents import tree
 from vsacli.documents.fields import (
     Check,
-    Choice,
     Items,
     Name,
     OneOrMore,
     OwnKind,
-    Record,
+    RecordOf,
     Refer,
     Schema,
     Share,
     Text,
+    WordChoice,
     choice,
     integer,
     text,
@@ -105,7 +105,7 @@ class Ways(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return a tuple of `Varied`."""
-        if not isinstance(node, tree.Mapping):
+        if not isinstance(node, tree.MapNode):
             return scope.unexpected(node, "a mapping from paths to values", label)
         found = []
         for path, entry in node.entries.items():
@@ -130,14 +130,14 @@ class Ways(OwnKind):
 
 def _way(node: Node) -> Way:
     match node:
-        case tree.Sequence(items=items) if items:
+        case tree.ListNode(items=items) if items:
             return Listed(tuple(map(tree.plain, items)))
-        case tree.Mapping(entries=entries) if entries:
+        case tree.MapNode(entries=entries) if entries:
             return _mapped(node, dict(entries))
     raise InputError.one(f"expected {FORMS}, found {node}")
 
 
-def _mapped(node: tree.Mapping, entries: Mapping[str, Node]) -> Way:
+def _mapped(node: tree.MapNode, entries: Mapping[str, Node]) -> Way:
     key = next(iter(entries))
     if LINKED in entries:
         texts = {word: _text(entry, word) for word, entry in entries.items() if word in (LINKED, FACTOR)}
@@ -146,7 +146,7 @@ def _mapped(node: tree.Mapping, entries: Mapping[str, Node]) -> Way:
     elif len(entries) == 1 and key in SPACED:
         return Spaced(key, *_texts(entries[key], 3, f"{key}: [first, last, count]"))
     elif len(entries) == 1 and key in SHAPES:
-        if key == "uniform" and isinstance(entries[key], tree.Sequence):
+        if key == "uniform" and isinstance(entries[key], tree.ListNode):
             return Ranged(*_texts(entries[key], 2, "uniform: [least, largest]"))
         return Drawn(node)
     hint = did_you_mean(key, [*SPACED, *SHAPES, LINKED]) if len(entries) == 1 else ""
@@ -154,13 +154,13 @@ def _mapped(node: tree.Mapping, entries: Mapping[str, Node]) -> Way:
 
 
 def _texts(node: Node, count: int, form: str) -> list[str]:
-    if not isinstance(node, tree.Sequence) or len(node.items) != count:
+    if not isinstance(node, tree.ListNode) or len(node.items) != count:
         raise InputError.one(f"expected {form}, found {node}")
     return [_text(item, form) for item in node.items]
 
 
 def _text(node: Node, form: str) -> str:
-    if not isinstance(node, tree.Scalar):
+    if not isinstance(node, tree.TextNode):
         raise InputError.one(f"expected a single value in {form}, found {node}")
     return node.text
 
@@ -283,17 +283,17 @@ class StudyFile(DeclaredRecord):
     )
     seed: int = integer("seed of the random samples", check=_SEED, default=0)
     optimize: Optimized | None = value(
-        Record(Optimized),
+        RecordOf(Optimized),
         "optimization of each run; all kept values are then those of the optimum",
         default=None,
     )
     keep: tuple[str, ...] | None = value(
-        Items(Choice(tuple(KEPT), words="name of a column")),
+        Items(WordChoice(tuple(KEPT), words="name of a column")),
         "values that are kept of each run in addition to its verdict; all by default",
         default=None,
     )
     variables: tuple[str, ...] | None = value(
-        Items(Choice(tuple(OVER_TIME), words="name of a variable")),
+        Items(WordChoice(tuple(OVER_TIME), words="name of a variable")),
         "variables of results that are kept over time",
         default=None,
     )

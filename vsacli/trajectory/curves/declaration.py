@@ -23,8 +23,8 @@ from vsacli.documents.fields import (
     POSITIVE,
     Check,
     Items,
+    NumberList,
     PerJoint,
-    Vector,
     boolean,
     choice,
     number,
@@ -92,10 +92,10 @@ class Use:
         return odd(degrees, 2 * self.smoothness - 1, f"{vanishing} must vanish at both ends")
 
     @property
-    def _kind(self) -> PerJoint | Vector:
+    def _kind(self) -> PerJoint | NumberList:
         unit = self.signal.quantities[0]
         if self.signal.components is not None:
-            return Vector(self.signal.components, unit)
+            return NumberList(self.signal.components, unit)
         return PerJoint(unit, self.signal.key)
 
     def _field(self, kind: Any, doc: str, **options: Any) -> Any:
@@ -194,7 +194,7 @@ class Recorded(Declaration):
             yield FieldProblem(("bandwidth",), message)
 
     @property
-    def chosen(self) -> FitChoice:
+    def fit_choice(self) -> FitChoice:
         """Choice of the spline."""
         from vsacli.trajectory.fits import FitChoice
 

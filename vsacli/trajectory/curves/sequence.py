@@ -243,7 +243,7 @@ class Sequence(Formula):
             part = ("parts", jump.part)
             if jump.order == 0:
                 path = (*part, *self.parts[jump.part].opening, jump.component)
-                yield FieldProblem(path, _elsewhere(jump, path), jump.component)
+                yield FieldProblem(path, _describe_gap(jump, path), jump.component)
             else:
                 name = self.signal.names[jump.order]
                 change = f"{name} jumps from {jump.before:.4g} to {jump.after:.4g} where this part begins"
@@ -291,6 +291,6 @@ class Sequence(Formula):
                 yield from part.notes_over(profile.span)
 
 
-def _elsewhere(jump: Jump, path: tuple[str | int, ...]) -> str:
+def _describe_gap(jump: Jump, path: tuple[str | int, ...]) -> str:
     advice = "leave this key out" if "start" in path else "begin there"
     return f"begins at {jump.after:.12g}, but the part before ends at {jump.before:.12g}; {advice}"

@@ -14,7 +14,7 @@ from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import WRENCH, Signal
-from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, Number, integer, number, value
+from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, NumberWithUnit, integer, number, value
 from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile
 from vsacli.trajectory.curves.declaration import SAME_TIME, Formula, Use, Values, nan_for_none, odd
 from vsacli.trajectory.curves.polynomial import AXES, RestToRest
@@ -169,7 +169,7 @@ class Steps(Formula):
             **use.frame(),
             "degree": integer(degree, check=odd(DEGREES, 2 * use.smoothness + 1, _SMOOTH)),
             "levels": use.several(f"{axes} of the levels, in order"),
-            "times": value(Items(Number(units.TIME)), times, check=NON_NEGATIVE),
+            "times": value(Items(NumberWithUnit(units.TIME)), times, check=NON_NEGATIVE),
             "transition": number(units.TIME, "duration of each change", check=POSITIVE),
         }
 

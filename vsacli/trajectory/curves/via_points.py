@@ -15,7 +15,7 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
-from vsacli.documents.fields import NON_NEGATIVE, Items, Number, integer, value
+from vsacli.documents.fields import NON_NEGATIVE, Items, NumberWithUnit, integer, value
 from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, add_constants
 from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
@@ -254,7 +254,7 @@ class Via(Formula):
         return {
             "degree": integer(degree, check=use.degree(VIA_DEGREES)),
             "points": use.several(" to pass, from the first to the last"),
-            "times": value(Items(Number(units.TIME)), _TIMES, check=NON_NEGATIVE, default=None),
+            "times": value(Items(NumberWithUnit(units.TIME)), _TIMES, check=NON_NEGATIVE, default=None),
         }
 
     @classmethod

@@ -12,7 +12,7 @@ from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import wrench_columns
-from vsacli.documents.csv_file import of_columns, split_heading
+from vsacli.documents.csv_file import group_column_problems, split_heading
 from vsacli.documents.expression import conversion_factor
 from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints
@@ -206,5 +206,5 @@ def unit_factors(
                 factors[place] = 1.0 if unit is None else conversion_factor(unit, units[name])
             except InputError as error:
                 refused.append((name, str(error)))
-    problems.extend(of_columns(refused))
+    problems.extend(group_column_problems(refused))
     return factors

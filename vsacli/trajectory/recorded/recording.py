@@ -21,7 +21,7 @@ from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.reading import ChangeError
 from vsacli.documents.source import Source
-from vsacli.documents.table import Lines, Table, read_table
+from vsacli.documents.table import CsvTable, RowLines, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints, describe_commanded_joints
 from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
@@ -57,8 +57,8 @@ class RecordedSignals:
         notes: unused parts of the file, and jumps removed.
         source: file that was read.
         lines: lines of its rows.
-        first_stamp: stamp that was subtracted from its times, see `Table`.
-        rated: whether its times follow from a rate, see `Table`.
+        first_stamp: stamp that was subtracted from its times, see `CsvTable`.
+        rated: whether its times follow from a rate, see `CsvTable`.
     """
 
     times: RecordedTimes
@@ -66,7 +66,7 @@ class RecordedSignals:
     warnings: tuple[str, ...]
     notes: tuple[str, ...]
     source: Source
-    lines: Lines
+    lines: RowLines
     first_stamp: int | str | None = None
     rated: bool = False
 
@@ -166,7 +166,7 @@ class _ReadSamples(NamedTuple):
         replaced: failure of the stamps to increase, if the rate of the rows stands in their place.
     """
 
-    table: Table
+    table: CsvTable
     layout: ColumnLayout
     time: FloatArray
     records: list[SignalSamples]
@@ -190,7 +190,7 @@ def read_samples(
     table = table.without_hollow_columns().without_empty_rows().with_joined_rows()
     signals = NEEDED if wanted is None else tuple(wanted)
     _check_hollow(table, signals)
-    headings = (*table.columns, *table.others)
+    headings = (*table.columns, *table.unknown_columns)
     layout = column_layout(headings, joints, signals, table.source.path, table.header.line)
     _check_filled(table)
     if wanted is None:
@@ -204,7 +204,7 @@ def read_samples(
     return _ReadSamples(table, layout, time, records, replaced)
 
 
-def _check_hollow(table: Table, signals: Sequence[Signal]) -> None:
+def _check_hollow(table: CsvTable, signals: Sequence[Signal]) -> None:
     """Raise an error if a column of required values holds no number; derivatives may be left out."""
     values = {signal.names[0] for signal in signals}
     needed = [
@@ -215,7 +215,7 @@ def _check_hollow(table: Table, signals: Sequence[Signal]) -> None:
         raise InputError.one(message, table.source.path, table.header.line)
 
 
-def _check_filled(table: Table) -> None:
+def _check_filled(table: CsvTable) -> None:
     """Raise an error for empty cells in rows with numbers, since all signals use the same rows."""
     empty = np.isnan(table.values)
     if not empty.any():
@@ -237,7 +237,7 @@ def _check_filled(table: Table) -> None:
     raise InputError.one(message, table.source.path, table.line_of(row))
 
 
-def _notes_on_reading(table: Table, disorder: Disorder | None) -> Iterator[str]:
+def _notes_on_reading(table: CsvTable, disorder: Disorder | None) -> Iterator[str]:
     if table.hollow:
         holds = "it holds" if len(table.hollow) == 1 else "they hold"
         yield f"left out, as {holds} no number: {', '.join(table.hollow)}"
@@ -271,7 +271,7 @@ def _notes_on_unused_columns(layout: ColumnLayout, wanted: Sequence[Signal]) -> 
 
 
 def _samples_from_table(
-    signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: Table, layout: ColumnLayout
+    signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: CsvTable, layout: ColumnLayout
 ) -> SignalSamples:
     labels = WRENCH_AXES if signal is WRENCH else joint_names
     values, *derivatives = (
@@ -294,7 +294,7 @@ def _unwrap_positions(records: Sequence[SignalSamples], joints: CommandedJoints)
                 yield f"{'a jump' if jumps == 1 else f'{jumps} jumps'} by 2 pi taken out of {joint}.q"
 
 
-def _types_without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoints) -> dict[int, str]:
+def _types_without_unit(table: CsvTable, layout: ColumnLayout, joints: CommandedJoints) -> dict[int, str]:
     """Return the types of joints whose position has no unit in the header, by index."""
     headings = {
         index: table.columns[column.index]
@@ -304,7 +304,7 @@ def _types_without_unit(table: Table, layout: ColumnLayout, joints: CommandedJoi
     return {index: types[index] for index, heading in headings.items() if "[" not in heading}
 
 
-def _rows_in_si_units(table: Table, columns: Mapping[int, SignalColumn], components: int) -> FloatArray:
+def _rows_in_si_units(table: CsvTable, columns: Mapping[int, SignalColumn], components: int) -> FloatArray:
     """Return columns in SI units, (components, samples); NaN for components without a column."""
     rows = np.full((components, len(table.values)), np.nan)
     for component, column in columns.items():
@@ -312,7 +312,7 @@ def _rows_in_si_units(table: Table, columns: Mapping[int, SignalColumn], compone
     return rows
 
 
-def _column_in_si_units(table: Table, column: SignalColumn) -> FloatArray:
+def _column_in_si_units(table: CsvTable, column: SignalColumn) -> FloatArray:
     """Return a column in SI units; by division if that is exact, so that 3 ms are 0.003 s."""
     values = np.ascontiguousarray(table.values[:, column.index])
     divisor = round(1 / column.factor)
@@ -322,7 +322,7 @@ def _column_in_si_units(table: Table, column: SignalColumn) -> FloatArray:
         return values * column.factor
 
 
-def _locate_problem(problem: SampleProblem, table: Table, layout: ColumnLayout) -> Problem:
+def _locate_problem(problem: SampleProblem, table: CsvTable, layout: ColumnLayout) -> Problem:
     line = 0 if problem.sample is None else table.line_of(problem.sample)
     column = (
         problem.quantity if problem.joint is None else layout.quantities[problem.quantity][problem.joint].name

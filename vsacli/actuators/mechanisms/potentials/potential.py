@@ -28,7 +28,7 @@ from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import (
     FINITE,
     NamedNumbers,
-    Record,
+    RecordOf,
     interval,
     number,
     text,
@@ -76,9 +76,9 @@ class Potential(Mechanism):
     constants: tuple[tuple[str, float], ...] = value(
         NamedNumbers(), "constants of the energy by name", check=FINITE, default=()
     )
-    start: BranchStart = value(Record(BranchStart), "motor positions at q = 0 that select the branch")
+    start: BranchStart = value(RecordOf(BranchStart), "motor positions at q = 0 that select the branch")
     range: PotentialRange = value(
-        Record(PotentialRange), "range of validity of the energy; its ends bound the stiffness"
+        RecordOf(PotentialRange), "range of validity of the energy; its ends bound the stiffness"
     )
 
     @classmethod

@@ -16,9 +16,9 @@ from vsacli.actuators.mechanisms.preloaded_cams.lift import Lift
 from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import PreloadedCam
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError, Problem
-from vsacli.documents.fields import TableFile, value
+from vsacli.documents.fields import TablePath, value
 from vsacli.documents.source import Source
-from vsacli.documents.table import Table
+from vsacli.documents.table import CsvTable
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -164,8 +164,8 @@ class Cam(PreloadedCam):
     extrapolated.
     """
 
-    profile: Table = value(
-        TableFile(("deflection", "lift")),
+    profile: CsvTable = value(
+        TablePath(("deflection", "lift")),
         "CSV file with the header deflection,lift in rad,m (m,m), path relative to the robot file",
     )
 
@@ -223,7 +223,7 @@ class Cam(PreloadedCam):
         return Lift(*self._fitted.curve(from_rest, 0, 4))
 
 
-def _profile_problems(table: Table) -> Iterator[Problem]:
+def _profile_problems(table: CsvTable) -> Iterator[Problem]:
     """Yield why the rows are no profile with one minimum, with the lines."""
     deflection, lift = table.values.T
     if problems := list(wrong_rows(table)):

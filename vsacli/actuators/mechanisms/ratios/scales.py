@@ -16,10 +16,10 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.lazy import LazyRegistry
 from vsacli.compute.control_flow import Values, look_up, repeat
 from vsacli.compute.rounding import OfRounding
-from vsacli.documents.fields import NON_ZERO, TableFile, number, value
+from vsacli.documents.fields import NON_ZERO, TablePath, number, value
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.source import Source
-from vsacli.documents.table import Table
+from vsacli.documents.table import CsvTable
 
 Function = Callable[..., Values]
 """Value, slope and curvature at (x, *constants), arrays of one shape."""
@@ -183,8 +183,8 @@ MIN_ROWS = 4
 class MeasuredScale(ScaleLaw):
     """The cubic spline through settings and scales; it must rise or fall throughout, noise must not show."""
 
-    file: Table = value(
-        TableFile(("setting", "scale")),
+    file: CsvTable = value(
+        TablePath(("setting", "scale")),
         "CSV file with the header setting,scale, theta_2 in rad (m), path relative to the robot file",
     )
 
