@@ -333,8 +333,10 @@ def _forks(urdf: Urdf, base: str) -> Iterator[str]:
 
 def _describe_possible_tips(urdf: Urdf, base: str, tips: list[str]) -> str:
     counts = [len(_chain_between(urdf, base, tip).moving) for tip in tips]
-    found = [f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)]
-    more = f" and {len(found) - MAX_TIPS} more" if len(found) > MAX_TIPS else ""
-    offered = ", ".join(found[:MAX_TIPS])
+    tip_phrases = [
+        f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)
+    ]
+    more = f" and {len(tip_phrases) - MAX_TIPS} more" if len(tip_phrases) > MAX_TIPS else ""
+    offered = ", ".join(tip_phrases[:MAX_TIPS])
     which = f"several links below {quoted(base)} could be the end effector"
     return f"{which}; choose one with --tip: {offered}{more}"
