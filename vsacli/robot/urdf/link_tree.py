@@ -336,7 +336,7 @@ def _describe_possible_tips(urdf: Urdf, base: str, tips: list[str]) -> str:
     tip_phrases = [
         f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)
     ]
-    more = f" and {len(tip_phrases) - MAX_TIPS} more" if len(tips) > MAX_TIPS else ""
+    more = f" and {len(tip_phrases) - MAX_TIPS} more" if len(tip_phrases) > MAX_TIPS else ""
     offered = ", ".join(tip_phrases[:MAX_TIPS])
     which = f"several links below {quoted(base)} could be the end effector"
     return f"{which}; choose one with --tip: {offered}{more}"
