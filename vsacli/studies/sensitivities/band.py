@@ -196,7 +196,7 @@ class Band:
         """Return the band of each joint."""
         run = self._together()
         return [
-            _of_joint(
+            _joint_band(
                 _Part(
                     time=run.time,
                     tau_motor=run.tau_motor[:, joint],
@@ -214,7 +214,7 @@ class Band:
         return _Part(*map(np.concatenate, zip(*self._parts, strict=True)))
 
 
-def _of_joint(run: _Part) -> JointBand:
+def _joint_band(run: _Part) -> JointBand:
     spread = np.nan_to_num(np.fmax(*run.of_torque.T))
     worst = int(spread.argmax())
     deviation, motor = float(spread[worst]), int(np.nan_to_num(run.of_torque[worst]).argmax())
@@ -222,7 +222,7 @@ def _of_joint(run: _Part) -> JointBand:
     reversing = float(run.by_reversals[worst, motor]) / deviation**2 if deviation > 0 else 0.0
     of_torque = (
         deviation,
-        _share(deviation, peak),
+        _spread_share(deviation, peak),
         float(run.time[worst]),
         bool(run.uncertain.any()),
         reversing,
@@ -241,5 +241,5 @@ def _of_joint(run: _Part) -> JointBand:
     )
 
 
-def _share(spread: float, peak: float) -> float:
+def _spread_share(spread: float, peak: float) -> float:
     return spread / peak if peak > 0 else math.nan
