@@ -1,10 +1,9 @@
 """Explanations of residuals: possible causes, and the parameters that these make wrong.
 
 Residuals of pure noise have no structure. `addition` tests each cause of `residual_causes`; the one that
-explains most is chosen, then the remaining residual is tested again. A cause is reported if it matters: if
-it would change
-a parameter by more than its standard error admits, if it explains most of the residual, or if the residual is
-too large anyway.
+explains most is chosen, then the remaining residual is tested again. A cause is reported if it matters: if it
+would change a parameter by more than its standard error admits, if it explains most of the residual, or if
+the residual is too large anyway.
 """
 
 from __future__ import annotations
