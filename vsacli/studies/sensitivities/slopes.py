@@ -153,7 +153,7 @@ class Chained(Slopes):
         return np.tensordot(self._of_torques, by_torques, 2)
 
 
-class Group(NamedTuple):
+class ParameterGroup(NamedTuple):
     """Derivatives by some parameters.
 
     Attributes:
@@ -179,7 +179,7 @@ class Derivatives:
 
     block: Block
     numbers: int
-    groups: Sequence[Group] = field(repr=False)
+    groups: Sequence[ParameterGroup] = field(repr=False)
 
     @property
     def time(self) -> FloatArray:
@@ -265,14 +265,14 @@ def derivatives_of(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) ->
         derived = drive_derivatives(robot, index, command, [chosen[at] for at in own])
         by_torques.append(derived.by_torques)
         known = Known(derived.by_numbers)
-        groups.append(Group(own, [known if joint == index else None for joint in joints]))
+        groups.append(ParameterGroup(own, [known if joint == index else None for joint in joints]))
     of_links = [place for place, each in enumerate(chosen) if each.part != ACTUATOR]
     for places, of_torques in torque_slopes(robot, motion, [chosen[at] for at in of_links]):
         of_joints = [
             None if each is None else Chained(each, slopes)
             for each, slopes in zip(of_torques, by_torques, strict=True)
         ]
-        groups.append(Group([of_links[at] for at in places], of_joints))
+        groups.append(ParameterGroup([of_links[at] for at in places], of_joints))
     return Derivatives(block, len(chosen), groups)
 
 
