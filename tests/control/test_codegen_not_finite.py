@@ -22,7 +22,7 @@ from vsacli.control.codegen.feedback_function import feedback_linearization_func
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.codegen.self_test import Reference
+from vsacli.control.codegen.self_test import ReferenceResults
 from vsacli.dynamics.inverse import InverseDynamics, compute_block
 from vsacli.robot.model import Robot
 
@@ -76,7 +76,7 @@ def arguments(function: Function, rows: FloatArray) -> list[dict[str, FloatArray
 
 def entries(function: Function, robot: Robot) -> FloatArray:
     """All entries of a call that goes well."""
-    given = Reference(robot).inputs(function)
+    given = ReferenceResults(robot).inputs(function)
     return np.concatenate(
         [
             arrays[array.name][0].ravel()

@@ -22,7 +22,7 @@ from vsacli.base.variables import Block
 from vsacli.control.codegen.parameters import PARAMETERS, check_parameters, with_parameters
 from vsacli.control.codegen.project import WITHOUT_PARAMETERS, generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.codegen.self_test import CASES, Reference
+from vsacli.control.codegen.self_test import CASES, ReferenceResults
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
@@ -118,7 +118,7 @@ def test_the_project_compiles_and_its_self_test_covers_two_sets(precision: str, 
     compile_c(tmp_path, *STRICT, *flags, "-c", "vsa_3r.c", "-o", "robot.o")
     compile_c(tmp_path, *STRICT, "vsa_3r_test.c", "robot.o", "-o", "test", "-lm")
     compile_c(tmp_path, "-c", "vsa_3r.c", "-o", "robot.o")
-    given = Reference(robot, parameters(robot, patterns))
+    given = ReferenceResults(robot, parameters(robot, patterns))
     function = with_parameters(inverse_dynamics_function, robot, None, parameters(robot, patterns))
     (*_, numbers) = given.inputs(function)
     assert all(len(set(values)) == 2 and len(values) == CASES for values in numbers.values())

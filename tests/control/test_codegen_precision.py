@@ -25,7 +25,7 @@ from vsacli.control.codegen.feedback_function import feedback_linearization_func
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.codegen.self_test import Arrays, Reference
+from vsacli.control.codegen.self_test import Arrays, ReferenceResults
 from vsacli.robot.model import Robot
 
 DIFFERENCE = 82
@@ -107,7 +107,7 @@ def test_values_in_single_precision_are_those_of_compiled_code(name: str, tmp_pa
     robot = shipped_robot(name)
     makers = (link_torques_function, inverse_dynamics_function, feedback_linearization_function)
     functions = [make(robot) for make in makers]
-    reference = Reference(robot)
+    reference = ReferenceResults(robot)
     code = compiled_robot(tmp_path / "c", robot, functions, "float")
     for function in functions:
         compiled, _ = code(function, *reference.inputs(function))
@@ -123,7 +123,7 @@ def test_long_programs_of_calls_are_looked_at_too() -> None:
     """Sixteen joints, whose code calls a function for each structure of a joint."""
     robot = random_chain(16)
     function = inverse_dynamics_function(robot)
-    reference = Reference(robot)
+    reference = ReferenceResults(robot)
     expected = reference.results(function)["tau_e"]
     # 1e-5 is seen: the rounding of some hundred operations in a row for each joint
     error = np.abs(reference.single_results(function)["tau_e"] - expected).max()
@@ -131,15 +131,15 @@ def test_long_programs_of_calls_are_looked_at_too() -> None:
 
 
 def test_flags_count_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
-    original = Reference.single_results
+    original = ReferenceResults.single_results
 
-    def flagged(self: Reference, function: Function) -> Arrays:
+    def flagged(self: ReferenceResults, function: Function) -> Arrays:
         results = original(self, function)
         if function.name == "inverse_dynamics":
             results["flags"][3, 1] += Flag.SLACK
         return results
 
-    monkeypatch.setattr(Reference, "single_results", flagged)
+    monkeypatch.setattr(ReferenceResults, "single_results", flagged)
     with pytest.raises(InputError) as caught:
         generate(shipped_robot("vsa_3r"), "float")
     assert str(caught.value) == (

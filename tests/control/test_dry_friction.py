@@ -25,9 +25,9 @@ from vsacli.control.simulation import InitialError, Tolerances, perturbed, simul
 from vsacli.control.simulation.closed_loop import ClosedLoop, Phase
 from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.integrator import Integrator
-from vsacli.control.simulation.loop_equations import Equations
+from vsacli.control.simulation.loop_equations import LoopEquations
 from vsacli.control.simulation.stick_slip import StickSlip
-from vsacli.control.simulation.tabulated import Reference
+from vsacli.control.simulation.tabulated import TabulatedReference
 from vsacli.dynamics.forward import Plant, State, state_derivative
 from vsacli.robot.model import Robot
 
@@ -61,14 +61,14 @@ def pushed(
     robot: Robot, force: Callable[[float], float], times: FloatArray, dq: float = 0.0, q: float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
     """Position and velocity of the joint of a robot whose only motor exerts a force."""
-    loop = ClosedLoop(robot, Push(force), Reference(step_of(0.0, duration=float(times[-1]))))
+    loop = ClosedLoop(robot, Push(force), TabulatedReference(step_of(0.0, duration=float(times[-1]))))
     laws = loop.plant.drivetrain.friction
     assert laws is not None
     slides = StickSlip(loop, laws)
     springs = loop.plant.drivetrain.sprung.sum()
     start = loop.packing.pack(np.array([q]), np.array([dq]), np.full(springs, q), np.full(springs, dq))
     start = slides.start(0.0, start)
-    equations = Equations(loop, [], Budget(None, times))
+    equations = LoopEquations(loop, [], Budget(None, times))
     integrator = Integrator(equations, Tolerances(), lambda _: None, slides)
     reached, states = map(np.concatenate, zip(*integrator.over(times, start), strict=True))
     np.testing.assert_array_equal(reached, times)

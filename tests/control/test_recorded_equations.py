@@ -28,8 +28,8 @@ from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, perturbed, simulate
 from vsacli.control.simulation.compiled_loop import LARGEST_GROWTH, dop853_with_stages
 from vsacli.control.simulation.ending import Budget
-from vsacli.control.simulation.loop_code import loop_code, record
-from vsacli.control.simulation.loop_equations import Computing, Equations, RecordedEquations
+from vsacli.control.simulation.loop_code import loop_code, record_loop
+from vsacli.control.simulation.loop_equations import Computing, LoopEquations, RecordedEquations
 from vsacli.control.simulation.perturbation import simulate_perturbed
 
 AGREEMENT = 1e-11
@@ -113,7 +113,9 @@ def test_the_code_of_robots_that_differ_in_numbers_is_one():
     """Equal numbers of two joints may make the exact robot's a special one, but not those of errors."""
     robot, trajectory = vsa_3r(), short_motion(3)
     cases = [loop_of(robot, trajectory, GAINS, model=perturbed(robot, 0.05, seed)) for seed in (1, 2)]
-    (first, numbers), (second, others) = (loop_code(record(case.loop, case.boundaries)) for case in cases)
+    (first, numbers), (second, others) = (
+        loop_code(record_loop(case.loop, case.boundaries)) for case in cases
+    )
     assert first == second
     assert len(numbers) == len(others)
     assert (numbers != others).any()
@@ -336,7 +338,7 @@ def _no_inertia(robot):
 
 def test_equations_from_text_count_what_they_evaluate():
     case = shipped_loop("one spring")
-    plain = Equations(case.loop, case.boundaries, Budget(None, np.array([0.0, 1.0])))
+    plain = LoopEquations(case.loop, case.boundaries, Budget(None, np.array([0.0, 1.0])))
     plain(0.0, np.tile(case.start, (3, 1)))
     assert plain.budget.used == 3
     assert plain.provenance == PLAIN

@@ -27,7 +27,7 @@ from vsacli.control.simulation.boundaries import Singularity
 from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, Phase
 from vsacli.control.simulation.history import RateFilter
 from vsacli.control.simulation.start import start_state
-from vsacli.control.simulation.tabulated import Reference
+from vsacli.control.simulation.tabulated import TabulatedReference
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -105,7 +105,7 @@ def test_a_run_ends_where_the_decoupling_matrix_becomes_singular():
 def test_a_boundary_lies_where_its_distance_is_no_number_any_more():
     """The root finder of an event needs numbers; a law may have none beyond its end."""
     trajectory, robot = short_motion(3), vsa_3r()
-    reference = Reference(trajectory)
+    reference = TabulatedReference(trajectory)
     loop = ClosedLoop(robot, Feedforward(robot, trajectory), reference)
     start = loop.packing.pack(*loop.plant.unpacked(start_state(robot, trajectory, InitialError())))
     boundary = Singularity(loop, start)

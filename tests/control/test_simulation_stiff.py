@@ -21,7 +21,7 @@ from vsacli.base.units import time_text
 from vsacli.control.gains import Gains
 from vsacli.control.simulation import InitialError, simulate
 from vsacli.control.simulation.ending import Budget
-from vsacli.control.simulation.stiff import jacobian
+from vsacli.control.simulation.stiff import difference_jacobian
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -194,9 +194,9 @@ def test_a_jacobian_is_finite_also_where_a_difference_steps_over_an_end():
     def function(_time, vectors):
         return np.where(vectors > 1.0, np.nan, vectors) @ matrix.T
 
-    inside = jacobian(function, 0.0, np.array([0.3, -0.7]))
+    inside = difference_jacobian(function, 0.0, np.array([0.3, -0.7]))
     assert inside == pytest.approx(matrix, abs=0.1)  # rounding of 2.8e6, 5e-10, by the step of 1.5e-8
-    at_the_end = jacobian(function, 0.0, np.array([1.0, -0.7]))
+    at_the_end = difference_jacobian(function, 0.0, np.array([1.0, -0.7]))
     assert np.isfinite(at_the_end).all()
     assert at_the_end[:, 1] == pytest.approx(matrix[:, 1], abs=0.1)
 

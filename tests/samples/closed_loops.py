@@ -20,7 +20,7 @@ from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import Boundary, boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, LinearizingFeedback
 from vsacli.control.simulation.start import InitialError, start_state
-from vsacli.control.simulation.tabulated import Reference
+from vsacli.control.simulation.tabulated import TabulatedReference
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -64,7 +64,7 @@ def loop_of(
     robot: Robot, trajectory: Trajectory, gains: Gains | None = None, model: Robot | None = None
 ) -> Loop:
     trajectory = trajectory.from_zero()
-    reference = Reference(trajectory)
+    reference = TabulatedReference(trajectory)
     believed = model or robot
     controller = (
         Feedforward(believed, trajectory)

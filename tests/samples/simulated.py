@@ -16,11 +16,11 @@ from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, LinearizingFeedback
 from vsacli.control.simulation.ending import Budget
-from vsacli.control.simulation.history import History, continuous, histories, joined
+from vsacli.control.simulation.history import History, concatenate_histories, continuous, histories
 from vsacli.control.simulation.integrator import Integrator, Tolerances
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.start import InitialError
-from vsacli.control.simulation.tabulated import Reference
+from vsacli.control.simulation.tabulated import TabulatedReference
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
@@ -86,7 +86,7 @@ def linearized_run(
     robot: Robot, paired: Robot, trajectory: Trajectory, gains: Gains, error: InitialError
 ) -> tuple[History, State]:
     """What happens under feedback linearization, and the states (samples first)."""
-    reference = Reference(trajectory)
+    reference = TabulatedReference(trajectory)
     loop = ClosedLoop(robot, LinearizingFeedback(robot, reference, gains), reference)
     start = loop.packing.pack(*loop.plant.unpacked(start_of(robot, paired, trajectory, error)))
     times = trajectory.times.block(0, trajectory.samples)
@@ -94,7 +94,7 @@ def linearized_run(
     equations = RecordedEquations(loop, list(boundaries(loop, start)), budget, Computing("auto"))
     integrator = Integrator(equations, Tolerances(), lambda _: None)
     integrated = continuous(loop, integrator, times, start)
-    past = joined(list(histories(robot, loop, integrated, 0.0)))
+    past = concatenate_histories(list(histories(robot, loop, integrated, 0.0)))
     return past, State(past.q, past.dq, past.theta, past.dtheta)
 
 

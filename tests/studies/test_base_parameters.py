@@ -17,7 +17,7 @@ from vsacli.studies.identification.regressor import (
     all_parameters,
     base_parameters,
     link_of,
-    names,
+    link_parameter_names,
     parameters_of,
     regressor,
 )
@@ -105,7 +105,7 @@ def test_base_parameters_are_all_that_torques_tell(types: str) -> None:
 def test_each_base_parameter_says_of_what_it_is_the_sum() -> None:
     """By hand, for the paper's arm: the elbow's inertia about its own axis, and what the shoulder carries."""
     robot = shipped_robot("vsa_3r")
-    base, of_links = base_parameters(robot), names(robot)
+    base, of_links = base_parameters(robot), link_parameter_names(robot)
     words = [base.words(place, of_links) for place in range(len(base.kept))]
     assert "elbow.mx + 0.3 elbow.m" in words
     assert "shoulder.mx + 0.3 shoulder.m + 0.3 elbow.m" in words

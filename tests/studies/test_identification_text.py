@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from vsacli.studies.identification.identification_text import counts
+from vsacli.studies.identification.identification_text import agreement_counts
 from vsacli.studies.identification.identified_values import Number
 
 AGREES = Number("k", "N m/rad", before=400.0, value=400.1, standard_error=1.0)
@@ -24,4 +24,4 @@ UNKNOWN = Number("k", "N m/rad", before=400.0, value=400.0, standard_error=math.
     ],
 )
 def test_verbs_have_the_number_of_their_parameters(numbers: list[Number], text: str) -> None:
-    assert counts(numbers).startswith(text)
+    assert agreement_counts(numbers).startswith(text)

@@ -9,7 +9,7 @@ import pytest
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.studies.identification.estimation import Equations, Fit, gauss_newton, least_squares
+from vsacli.studies.identification.estimation import Equations, LeastSquaresFit, gauss_newton, least_squares
 
 TRUTH = np.array([3.0, -1.0, 0.5, 20.0])
 DRAWS = 200
@@ -60,7 +60,7 @@ def low_passed(random: np.random.Generator, samples: int) -> FloatArray:
 
 
 @cache
-def fits(noise: Noise, samples: int = 600) -> list[Fit]:
+def fits(noise: Noise, samples: int = 600) -> list[LeastSquaresFit]:
     random, slopes, present = np.random.default_rng(7), columns(samples), np.zeros(4)
     measured = [slopes @ TRUTH + 0.3 * noise(random, samples) for _ in range(DRAWS)]
     return [least_squares([record(each, slopes, present)], present) for each in measured]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,7 +51,9 @@ class Command(NamedTuple):
 
     def variables(self) -> JointVariables:
         """Return the record of the joint that has only these variables."""
-        return JointVariables(*self[:-1], **self.commanded)
+        fields = {name: array for name, array in self.commanded.items() if name in JointVariables._fields}
+        further = {name: array for name, array in self.commanded.items() if name not in fields}
+        return JointVariables(*self[:-1], **fields, further=further)
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return all arrays by name."""
@@ -113,6 +116,8 @@ class JointVariables(NamedTuple):
     voltage: AnyArray = ABSENT
     copper_loss: AnyArray = ABSENT
     dissipated_power: AnyArray = ABSENT
+    further: Mapping[str, AnyArray] = MappingProxyType({})
+    """Commanded signals without a field here, by name."""
 
     @classmethod
     def of(cls, arrays: Mapping[str, AnyArray]) -> JointVariables:
@@ -121,7 +126,8 @@ class JointVariables(NamedTuple):
 
     def by_name(self) -> dict[str, AnyArray]:
         """Return the variables present, by name."""
-        return {name: array for name, array in zip(self._fields, self, strict=True) if array is not None}
+        fields = zip(self._fields[:-1], self[:-1], strict=True)
+        return {**{name: array for name, array in fields if array is not None}, **self.further}
 
 
 def single_motor(command: Command, **variables: AnyArray) -> JointVariables:

@@ -99,8 +99,8 @@ class Gains:
         Raises:
             InputError: the number of poles is wrong, or a pole is unstable or complex without its conjugate.
         """
-        position_gains, position_integral = _coefficients("position", position, {2, 3, 4, 5})
-        stiffness_gains, stiffness_integral = _coefficients("stiffness", stiffness, {2, 3})
+        position_gains, position_integral = _error_coefficients("position", position, {2, 3, 4, 5})
+        stiffness_gains, stiffness_integral = _error_coefficients("stiffness", stiffness, {2, 3})
         return cls(position_gains, stiffness_gains, position_integral, stiffness_integral)
 
     @property
@@ -130,7 +130,7 @@ class Gains:
                 raise InputError.one(f"there are {name} gains of {count} joints, but the robot has {joints}")
 
 
-def _coefficients(name: str, poles: npt.ArrayLike, counts: set[int]) -> tuple[FloatArray, FloatArray]:
+def _error_coefficients(name: str, poles: npt.ArrayLike, counts: set[int]) -> tuple[FloatArray, FloatArray]:
     """Return rows K0, K1, ..., and the KI of each row."""
     table = np.atleast_2d(np.asarray(poles, dtype=np.complex128))
     if table.ndim != 2 or table.shape[1] not in counts:

@@ -214,7 +214,7 @@ def position_order(robot: Robot, plant: Plant) -> int:
             f"where a damper lies parallel to the springs ({', '.join(damped)}); use feedforward"
         )
     if sprung.any() and not sprung.all():
-        raise InputError.one(_mixed(robot, plant))
+        raise InputError.one(_mixed_drives_text(robot, plant))
     return POSITION_ORDER if sprung.all() else RIGID_ORDER
 
 
@@ -223,7 +223,7 @@ def control_law(plant: Plant, gains: Gains) -> Decoupling | ComputedTorque:
     return Decoupling(plant, gains) if plant.drivetrain.sprung.all() else ComputedTorque(plant, gains)
 
 
-def _mixed(robot: Robot, plant: Plant) -> str:
+def _mixed_drives_text(robot: Robot, plant: Plant) -> str:
     drivetrain = plant.drivetrain
     rigid, sprung = (
         list(dict.fromkeys(robot.joint_names[joint] for joint in drivetrain.joint[with_spring]))

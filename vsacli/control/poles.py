@@ -71,7 +71,7 @@ def gains_from_text(robot: Robot, position: str, stiffness: str, *, integral: bo
     Raises:
         InputError: poles are invalid, or their number is not the one that the robot needs.
     """
-    return _gains(
+    return _gains_from_poles(
         robot, {"": parse_poles(position, ", or a YAML file")}, {"": parse_poles(stiffness)}, integral
     )
 
@@ -95,12 +95,12 @@ def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) ->
         for error in ("position", "stiffness")
     )
     try:
-        return replace(_gains(robot, position, stiffness, integral), sources=(source,))
+        return replace(_gains_from_poles(robot, position, stiffness, integral), sources=(source,))
     except InputError as error:
         raise InputError.one(str(error), source.path) from None
 
 
-def _gains(
+def _gains_from_poles(
     robot: Robot, position: Mapping[str, Poles], stiffness: Mapping[str, Poles], integral: bool
 ) -> Gains:
     """Return the gains for the poles of each joint, by the beginnings of error messages on them."""

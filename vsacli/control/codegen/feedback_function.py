@@ -24,7 +24,7 @@ Arrays = Mapping[str, Any]
 """Arrays of numbers or symbols, by name."""
 
 
-class _Gains(NamedTuple):
+class _GainInputs(NamedTuple):
     """Gains that are known only when the controller runs; fields as of `vsacli.control.gains.Gains`."""
 
     position: Any
@@ -105,7 +105,7 @@ class _Law:
         """Return the rows of the motor torques, then those of the flags."""
         state, reference, gains, integral, *wrench = self._unpacked(rows)
         drivetrain = self._plant.drivetrain
-        law: Any = control_law(self._plant, cast("Gains", _Gains(**gains)))
+        law: Any = control_law(self._plant, cast("Gains", _GainInputs(**gains)))
         theta, dtheta = (
             drivetrain.of_motors(state[name])[..., drivetrain.sprung] for name in ("theta", "dtheta")
         )

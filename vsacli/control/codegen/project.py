@@ -19,7 +19,7 @@ from vsacli.control.codegen.feedback_function import feedback_linearization_func
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.parameters import Maker, check_parameters, with_parameters
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.codegen.self_test import Reference, check_single_precision
+from vsacli.control.codegen.self_test import ReferenceResults, check_single_precision
 from vsacli.control.codegen.texts import (
     DIGEST,
     binding_text,
@@ -84,7 +84,7 @@ def generate(
         functions, omitted = _functions(robot, wrench, chosen)
         if not loops:
             _check_loops(robot, functions)
-        reference = Reference(robot, chosen)
+        reference = ReferenceResults(robot, chosen)
         if precision == "float":
             check_single_precision(robot, functions, reference)
         files = {

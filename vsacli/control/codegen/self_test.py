@@ -40,7 +40,7 @@ Arrays = dict[str, FloatArray]
 """Arrays, (cases, ...), by name."""
 
 
-class Comparison(NamedTuple):
+class ArrayComparison(NamedTuple):
     """The rule by which the self-test compares an array.
 
     Attributes:
@@ -52,7 +52,7 @@ class Comparison(NamedTuple):
     bound: float
 
 
-class Reference:
+class ReferenceResults:
     """Inputs and results of the generated functions of a robot."""
 
     def __init__(self, robot: Robot, chosen: Sequence[Parameter] = ()) -> None:
@@ -92,13 +92,13 @@ class Reference:
         rows = in_single_precision(function.program, self._entries(function).T)
         return _result_arrays(function, np.array(rows, dtype=np.float64))
 
-    def comparison(self, function: Function, name: str) -> Comparison:
+    def comparison(self, function: Function, name: str) -> ArrayComparison:
         """Return the rule by which the self-test compares an array of a function's results."""
         values = self.results(function)[name]
         bound = BOUND * self._largest_stiffness if name == BOUNDED else np.inf
         scale = float(np.abs(np.minimum(values, bound)[np.isfinite(values)]).max(initial=0.0))
         bits = next(array.bits for array in function.result.arrays if array.name == name)
-        return Comparison(0.0 if bits else scale, scale if name == BOUNDED else np.inf)
+        return ArrayComparison(0.0 if bits else scale, scale if name == BOUNDED else np.inf)
 
     def _entries(self, function: Function) -> FloatArray:
         """Return all entries of the arguments, (CASES, entries)."""
@@ -195,7 +195,7 @@ SHARE = 0.5
 controller may round differently from this machine's. Bundled robots use a 400th of the tolerance."""
 
 
-class _Difference(NamedTuple):
+class _PrecisionDifference(NamedTuple):
     """A result that single precision changes.
 
     Attributes:
@@ -216,7 +216,7 @@ class _Difference(NamedTuple):
     double: float
 
 
-def check_single_precision(robot: Robot, functions: Sequence[Function], reference: Reference) -> None:
+def check_single_precision(robot: Robot, functions: Sequence[Function], reference: ReferenceResults) -> None:
     """Raise an error if a robot's functions in single precision would fail the self-test.
 
     Raises:
@@ -232,7 +232,9 @@ def check_single_precision(robot: Robot, functions: Sequence[Function], referenc
     )
 
 
-def _differences(functions: Sequence[Function], reference: Reference) -> Iterator[_Difference]:
+def _differences(
+    functions: Sequence[Function], reference: ReferenceResults
+) -> Iterator[_PrecisionDifference]:
     for function in functions:
         single, double = reference.single_results(function), reference.results(function)
         for array in function.result.arrays:
@@ -240,12 +242,12 @@ def _differences(functions: Sequence[Function], reference: Reference) -> Iterato
             sizes = _sizes(*values, reference.comparison(function, array.name))
             at = np.unravel_index(sizes.argmax(), sizes.shape)
             _, *index = map(int, at)
-            yield _Difference(
+            yield _PrecisionDifference(
                 float(sizes[at]), function.name, array, tuple(index), *(float(each[at]) for each in values)
             )
 
 
-def _sizes(single: FloatArray, double: FloatArray, comparison: Comparison) -> FloatArray:
+def _sizes(single: FloatArray, double: FloatArray, comparison: ArrayComparison) -> FloatArray:
     """Return differences relative to the scale, computed as in the self-test."""
     found, expected = (np.minimum(each, comparison.bound) for each in (single, double))
     same = (found == expected) | (np.isnan(found) & np.isnan(expected))
@@ -254,7 +256,7 @@ def _sizes(single: FloatArray, double: FloatArray, comparison: Comparison) -> Fl
     return np.where(same, 0.0, np.where(np.isnan(sizes), np.inf, sizes))
 
 
-def _described(difference: _Difference) -> str:
+def _described(difference: _PrecisionDifference) -> str:
     name = f"{difference.array.name} of {difference.function}"
     if difference.array.bits:
         return f"{name} are {_flags(difference.single)}, in double precision {_flags(difference.double)}"

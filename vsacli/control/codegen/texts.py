@@ -22,7 +22,7 @@ from vsacli.compute.tracing.c_code import digits
 from vsacli.control.codegen.cost import table_bytes, worst_cost
 from vsacli.control.codegen.interface import Function, Structure, structures
 from vsacli.control.codegen.scalar import WIDTH, definitions, signature
-from vsacli.control.codegen.self_test import CASES, TOLERANCE, Arrays, Reference
+from vsacli.control.codegen.self_test import CASES, TOLERANCE, Arrays, ReferenceResults
 from vsacli.robot.model import Robot
 
 DIGEST = "0xd19e5700u"
@@ -114,7 +114,7 @@ def source_text(prefix: str, functions: Sequence[Function], precision: str, abou
 
 
 def self_test_text(
-    prefix: str, functions: Sequence[Function], reference: Reference, precision: str, about: str
+    prefix: str, functions: Sequence[Function], reference: ReferenceResults, precision: str, about: str
 ) -> str:
     """Return the test program; for arguments see `source_text`."""
     tests: list[str] = []
@@ -154,7 +154,7 @@ def _initializer(values: FloatArray, bits: bool) -> str:
     return f"{int(values)}u" if bits else digits(float(values))
 
 
-def _test(prefix: str, function: Function, reference: Reference) -> str:
+def _test(prefix: str, function: Function, reference: ReferenceResults) -> str:
     own, result = function.name, f"{prefix}_{function.result.name}"
     given = ", ".join(f"&{own}_{name}[n]" for name, _ in function.arguments)
     comparisons = "\n".join(_comparisons(function, reference))
@@ -171,7 +171,7 @@ def _test(prefix: str, function: Function, reference: Reference) -> str:
 }}"""
 
 
-def _comparisons(function: Function, reference: Reference) -> Iterator[str]:
+def _comparisons(function: Function, reference: ReferenceResults) -> Iterator[str]:
     for array in function.result.arrays:
         scale, bound = reference.comparison(function, array.name)
         for entry in array.entries:

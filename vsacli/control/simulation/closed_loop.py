@@ -12,7 +12,7 @@ from vsacli.base.flags import Flag
 from vsacli.control.gains import Gains, Integral
 from vsacli.control.linearization import FeedbackLinearization
 from vsacli.control.simulation.ending import Ending
-from vsacli.control.simulation.tabulated import Constant, Reference, Table
+from vsacli.control.simulation.tabulated import ConstantTable, Table, TabulatedReference
 from vsacli.dynamics.dry_friction import Response
 from vsacli.dynamics.forward import Plant
 from vsacli.dynamics.internal_motion import internal_motions
@@ -129,7 +129,7 @@ class Feedforward:
 class LinearizingFeedback:
     """Feedback linearization by a model, along a reference."""
 
-    def __init__(self, model: Robot, reference: Reference, gains: Gains) -> None:
+    def __init__(self, model: Robot, reference: TabulatedReference, gains: Gains) -> None:
         self._feedback = FeedbackLinearization(model, gains, reference.frame)
         self._reference = reference
         self.ending: Ending | None = None
@@ -167,13 +167,13 @@ class ClosedLoop:
         held: torques commanded in any state until the controller acts again; None if it acts all the time.
     """
 
-    def __init__(self, robot: Robot, controller: Controller, reference: Reference) -> None:
+    def __init__(self, robot: Robot, controller: Controller, reference: TabulatedReference) -> None:
         self.plant = Plant(robot, reference.frame)
         self.packing = Packing(self.plant.drivetrain)
         self.controller = controller
         self.reference = reference
         self.slip: FloatArray | None = None
-        self.held: Constant | None = None
+        self.held: ConstantTable | None = None
 
     def demand(self, time: float, vector: FloatArray) -> FloatArray:
         """Return the motor torques that are commanded in a state."""
@@ -186,7 +186,7 @@ class ClosedLoop:
     def hold(self, torques: FloatArray) -> None:
         """Command these torques until others are held."""
         if self.held is None:
-            self.held = Constant(torques)
+            self.held = ConstantTable(torques)
         self.held.set(torques)
 
     def applied(self, demand: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from vsacli.compute.aligned_rows import address
 from vsacli.compute.engine.compiler import CompilerError
 from vsacli.compute.engine.trial import Trial
 from vsacli.control.simulation.closed_loop import ClosedLoop
-from vsacli.control.simulation.loop_code import Recording
+from vsacli.control.simulation.loop_code import LoopPrograms
 from vsacli.control.simulation.tabulated import Table
 
 LARGEST_GROWTH = 1.1
@@ -118,24 +118,24 @@ _ARGUMENTS: dict[str, list[Any]] = {
 """Types of the arguments of the functions in loop.c, after the first one, the loop."""
 
 
-class _Table(Structure):
+class _CTable(Structure):
     _fields_ = (
         *((name, c_int64) for name in ("cells", "powers", "columns")),
         *((name, c_void_p) for name in ("ends", "coefficients")),
     )
 
     @classmethod
-    def of(cls, table: Table) -> _Table:
+    def of(cls, table: Table) -> _CTable:
         return cls(*table.coefficients.shape, address(table.ends), address(table.coefficients))
 
 
-class _Loop(Structure):
-    _fields_ = (("numbers", c_void_p), ("tables", c_int64), ("table", POINTER(_Table)))
+class _CLoop(Structure):
+    _fields_ = (("numbers", c_void_p), ("tables", c_int64), ("table", POINTER(_CTable)))
 
     @classmethod
-    def of(cls, numbers: FloatArray, tables: Sequence[Table]) -> _Loop:
-        row = _Table * len(tables)
-        return cls(address(numbers), len(tables), row(*map(_Table.of, tables)))
+    def of(cls, numbers: FloatArray, tables: Sequence[Table]) -> _CLoop:
+        row = _CTable * len(tables)
+        return cls(address(numbers), len(tables), row(*map(_CTable.of, tables)))
 
 
 def open_loop(path: Path) -> dict[str, Any]:
@@ -156,7 +156,7 @@ def open_loop(path: Path) -> dict[str, Any]:
 
 
 def loop_trial(
-    loop: ClosedLoop, time: float, vectors: FloatArray, numbers: FloatArray, recording: Recording
+    loop: ClosedLoop, time: float, vectors: FloatArray, numbers: FloatArray, recording: LoopPrograms
 ) -> Trial:
     """Return a call of the compiled equations of motion at states about some, (..., entries).
 
@@ -189,8 +189,8 @@ class CompiledLoop:
         recording: recorded loop that was compiled.
     """
 
-    def __init__(self, functions: dict[str, Any], numbers: FloatArray, recording: Recording) -> None:
-        loops = [_Loop.of(numbers, each.tables) for each in recording]
+    def __init__(self, functions: dict[str, Any], numbers: FloatArray, recording: LoopPrograms) -> None:
+        loops = [_CLoop.of(numbers, each.tables) for each in recording]
         self._kept = (numbers, recording, loops)  # keeps alive the arrays to which the code has pointers
         rates, torques, distances = map(byref, loops)
         self._derivatives = partial(functions["derivatives"], rates)

@@ -17,7 +17,7 @@ from vsacli.control.simulation.closed_loop import ClosedLoop, Phase
 from vsacli.control.simulation.ending import Ending
 from vsacli.control.simulation.integrator import Integrator
 from vsacli.control.simulation.sensors import Readings
-from vsacli.control.simulation.stepping import Pieces, Samples
+from vsacli.control.simulation.stepping import Pieces, StateSamples
 from vsacli.dynamics.limits import limit_flags
 from vsacli.dynamics.losses import dissipated_power
 from vsacli.robot.model import Robot
@@ -75,7 +75,7 @@ def continuous(
         yield StateBlock(time, states, loop.controller.torque(time, loop.packing.unpack(states)), ending)
 
 
-def sampled(
+def integrate_sampled(
     loop: ClosedLoop,
     integrator: Integrator,
     times: FloatArray,
@@ -88,14 +88,14 @@ def sampled(
     the run.
     """
     demands: list[FloatArray] = []
-    pieces = _sampled(loop, integrator, times, start, readings, demands)
+    pieces = _integrate_intervals(loop, integrator, times, start, readings, demands)
     for (time, states), ending in _gathered(pieces, loop.controller.ending):
         demand = np.array(demands[: len(time)])
         del demands[: len(time)]
         yield StateBlock(time, states, demand, ending, held=True)
 
 
-def _sampled(
+def _integrate_intervals(
     loop: ClosedLoop,
     integrator: Integrator,
     times: FloatArray,
@@ -112,7 +112,7 @@ def _sampled(
     measurement = RateFilter(read(start, 0))
     demands.append(loop.controller.torque(float(times[0]), measurement.phase))
     loop.hold(demands[-1])
-    yield Samples(times[:1], start[None])
+    yield StateSamples(times[:1], start[None])
     state, ending = start, None
     for sample, interval in enumerate(np.stack((times[:-1], times[1:]), axis=1), 1):
         (time, after), ending = _whole(integrator.over(interval, state))
@@ -123,44 +123,44 @@ def _sampled(
         torques = integrator.equations.torques(float(time[-1]), loop.packing.joined(measurement.phase))
         demands += [torques] * (len(time) - 1)
         loop.hold(torques)
-        yield Samples(time[1:], after[1:])
+        yield StateSamples(time[1:], after[1:])
         if ending is not None:
             break
     return ending
 
 
-def _gathered(pieces: Pieces, last: Ending | None) -> Iterator[tuple[Samples, Ending | None]]:
+def _gathered(pieces: Pieces, last: Ending | None) -> Iterator[tuple[StateSamples, Ending | None]]:
     """Yield a run in blocks of at least `BLOCK` samples, but for the last one, which has the early end.
 
     Without one, it has the end of the controller's torques, `last`.
     """
-    gathered: list[Samples] = []
+    gathered: list[StateSamples] = []
     count = 0
     while True:
         try:
             piece = next(pieces)
         except StopIteration as finished:
-            yield _joined(gathered), last if finished.value is None else finished.value
+            yield _concatenate_pieces(gathered), last if finished.value is None else finished.value
             return
         if count >= BLOCK:
-            yield _joined(gathered), None
+            yield _concatenate_pieces(gathered), None
             gathered, count = [], 0
         gathered.append(piece)
         count += len(piece.time)
 
 
-def _whole(pieces: Pieces) -> tuple[Samples, Ending | None]:
+def _whole(pieces: Pieces) -> tuple[StateSamples, Ending | None]:
     """Return all samples of a short run, and its early end."""
-    gathered: list[Samples] = []
+    gathered: list[StateSamples] = []
     while True:
         try:
             gathered.append(next(pieces))
         except StopIteration as finished:
-            return _joined(gathered), finished.value
+            return _concatenate_pieces(gathered), finished.value
 
 
-def _joined(pieces: Sequence[Samples]) -> Samples:
-    return Samples(*map(np.concatenate, zip(*pieces, strict=True)))
+def _concatenate_pieces(pieces: Sequence[StateSamples]) -> StateSamples:
+    return StateSamples(*map(np.concatenate, zip(*pieces, strict=True)))
 
 
 class History(Block):
@@ -172,7 +172,7 @@ class History(Block):
     declared = SIMULATION_VARIABLES
 
 
-def joined(blocks: Sequence[History]) -> History:
+def concatenate_histories(blocks: Sequence[History]) -> History:
     """Return the variables of consecutive blocks of a run."""
     arrays = [block.arrays() for block in blocks]
     names = list(arrays[0])
@@ -220,7 +220,7 @@ def _history(
         **{COMMANDS[name]: values for name, values in {**commanded, "tau_motor": demand}.items()},
         **{error(name): found[name] - commanded[name] for name in ERRORS},
         **read,
-        flags=_flags(robot, {**found, "tau_motor": demand}, integrated.ending),
+        flags=_history_flags(robot, {**found, "tau_motor": demand}, integrated.ending),
     )
 
 
@@ -285,7 +285,7 @@ class _Work:
         return found
 
 
-def _flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -> FlagArray:
+def _history_flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -> FlagArray:
     """Return flags of exceeded limits, of actual values and commanded torques, and of an early end."""
     flags = np.zeros(values["q"].shape, dtype=FLAG_TYPE)
     for index, joint in enumerate(robot.joints):

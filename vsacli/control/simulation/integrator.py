@@ -19,10 +19,10 @@ from vsacli.base.errors import InputError
 from vsacli.base.json_records import Stored
 from vsacli.control.simulation.compiled_loop import dop853_with_stages
 from vsacli.control.simulation.ending import INCOMPLETE, Deadline, Ending, Progress, SpentError
-from vsacli.control.simulation.loop_equations import Edge, Equations
-from vsacli.control.simulation.stepping import Event, Pieces, Samples, Stop, steps
+from vsacli.control.simulation.loop_equations import Edge, LoopEquations
+from vsacli.control.simulation.stepping import Event, Pieces, StateSamples, Stop, step_samples
 from vsacli.control.simulation.stick_slip import StickSlip, Switch
-from vsacli.control.simulation.stiff import jacobian, resolved
+from vsacli.control.simulation.stiff import difference_jacobian, resolved_tolerances
 
 EXPLICIT = "DOP853"
 """Method of order 8: motors and links oscillate on their springs, and most robots are not stiff."""
@@ -90,7 +90,7 @@ class _End(NamedTuple):
 
     last: float
     early: Ending | None = None
-    sample: Samples | None = None
+    sample: StateSamples | None = None
 
 
 class Integrator:
@@ -108,7 +108,7 @@ class Integrator:
 
     def __init__(
         self,
-        equations: Equations,
+        equations: LoopEquations,
         tolerances: Tolerances,
         progress: Progress,
         sliding: StickSlip | None = None,
@@ -141,7 +141,7 @@ class Integrator:
             yield sample
         return early
 
-    def _changed(self, times: FloatArray, change: Samples) -> Pieces:
+    def _changed(self, times: FloatArray, change: StateSamples) -> Pieces:
         """Continue with the implicit method at the end of the explicit one, which is not a sample of its own.
 
         Only if the budget is too small for the implicit method, the run ends there.
@@ -151,7 +151,7 @@ class Integrator:
         pieces = self._implicit(rest, change.states[0])
         first = next(pieces)
         if len(first.time) > 1:
-            yield Samples(first.time[1:], first.states[1:])
+            yield StateSamples(first.time[1:], first.states[1:])
         end = yield from pieces
         if end.sample is None and end.last == at:
             yield change
@@ -161,17 +161,17 @@ class Integrator:
             yield end.sample
         return end.early
 
-    def _explicit(self, times: FloatArray, start: FloatArray) -> Generator[Samples, None, _End]:
+    def _explicit(self, times: FloatArray, start: FloatArray) -> Generator[StateSamples, None, _End]:
         method = dop853_with_stages()
         solver = partial(method, self.equations, stages=self.equations.stages, atol=self._tolerances.atol)
         return self._solve(times, start, self._budget.too_slow, solver, reserve=len(method.C_EXTRA))
 
-    def _implicit(self, times: FloatArray, start: FloatArray) -> Generator[Samples, None, _End]:
-        slope = partial(jacobian, self.equations)
+    def _implicit(self, times: FloatArray, start: FloatArray) -> Generator[StateSamples, None, _End]:
+        slope = partial(difference_jacobian, self.equations)
         try:
-            floor = resolved(slope(float(times[0]), start), start, self._tolerances.rtol)
+            floor = resolved_tolerances(slope(float(times[0]), start), start, self._tolerances.rtol)
         except SpentError:
-            yield Samples(times[:1], start[None])
+            yield StateSamples(times[:1], start[None])
             return _End(float(times[0]), self._budget.ending(float(times[0])))
         atol = np.maximum(self._tolerances.atol, floor)
         options: dict[str, Any] = {"jac": slope, "atol": atol}  # SciPy's stubs know only scalar tolerances
@@ -185,7 +185,7 @@ class Integrator:
         is_due: Callable[[float], bool],
         solver: Callable[..., Any],
         reserve: int,
-    ) -> Generator[Samples, None, _End]:
+    ) -> Generator[StateSamples, None, _End]:
         """Integrate with a method of SciPy from switch to switch; yield at least one sample."""
         deadline = Deadline(self._budget, is_due, float(times[-1]), self._progress)
         events = [deadline, Edge(self.equations), *(self._sliding.switches if self._sliding else ())]
@@ -204,14 +204,14 @@ class Integrator:
                 break
         if math.isnan(last):  # a span of zero length, or a failure of the first step
             last = float(first)
-            yield Samples(first[None], start[None])
+            yield StateSamples(first[None], start[None])
         if self._budget.exhausted:
             return _End(last, self._budget.ending(last))
         if stop.failed:
             return _End(last, Ending(last, "the motion became too fast to integrate"))
         if stop.event is None:
             return _End(last)
-        sample = Samples(np.array([stop.time]), stop.state[None])
+        sample = StateSamples(np.array([stop.time]), stop.state[None])
         return _End(last, stop.event.ending(stop.time, stop.state), sample)
 
     def _until_event(
@@ -221,7 +221,7 @@ class Integrator:
         events: Sequence[Event],
         solver: Callable[..., Any],
         reserve: int,
-    ) -> Generator[Samples, None, Stop]:
+    ) -> Generator[StateSamples, None, Stop]:
         """Integrate from a time and state on to the first event or the last time."""
         longest = self._sliding.longest_step if self._sliding else math.inf
         tolerance = {"rtol": self._tolerances.rtol, "max_step": longest}
@@ -230,4 +230,4 @@ class Integrator:
                 begun = solver(t0=begin.time, y0=begin.state, t_bound=float(times[-1]), **tolerance)
         except SpentError:  # the budget is too small even for a first step
             return Stop(begin.time, begin.state, failed=True)
-        return (yield from steps(begun, times, events, self._budget, reserve))
+        return (yield from step_samples(begun, times, events, self._budget, reserve))

@@ -136,7 +136,7 @@ class JointTracking(Stored):
         return abs(self.q.final) > self.tolerance
 
 
-def rows(joints: Sequence[JointTracking], ideal: Sequence[Deviation] = ()) -> list[tuple[str, ...]]:
+def tracking_rows(joints: Sequence[JointTracking], ideal: Sequence[Deviation] = ()) -> list[tuple[str, ...]]:
     """Return a table of errors and peaks, below its header with units.
 
     Args:
@@ -152,12 +152,15 @@ def rows(joints: Sequence[JointTracking], ideal: Sequence[Deviation] = ()) -> li
         f"peak motor 1 / 2\n{torque}",
     )
     if not ideal:
-        return [header, *map(_row, joints)]
+        return [header, *map(_tracking_row, joints)]
     compared = zip(joints, ideal, strict=True)
-    return [(*header, f"q error with full state\n{position}"), *((*_row(a), _pair(b)) for a, b in compared)]
+    return [
+        (*header, f"q error with full state\n{position}"),
+        *((*_tracking_row(a), _pair(b)) for a, b in compared),
+    ]
 
 
-def _row(joint: JointTracking) -> tuple[str, ...]:
+def _tracking_row(joint: JointTracking) -> tuple[str, ...]:
     motors = " / ".join(error_text(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
     return (joint.name, *map(_pair, (joint.q, joint.stiffness)), motors)
 

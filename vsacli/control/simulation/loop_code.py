@@ -19,14 +19,14 @@ from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.tabulated import Instant, Table
 
 
-class Recorded(NamedTuple):
+class StateProgram(NamedTuple):
     """A program whose inputs are the entries of a state vector, then the columns of tables at a time."""
 
     program: Program
     tables: tuple[Table, ...]
 
 
-class Recording(NamedTuple):
+class LoopPrograms(NamedTuple):
     """The recorded closed loop at an instant.
 
     Attributes:
@@ -35,9 +35,9 @@ class Recording(NamedTuple):
         distances: program of the distance to each boundary.
     """
 
-    rates: Recorded
-    torques: Recorded
-    distances: Recorded
+    rates: StateProgram
+    torques: StateProgram
+    distances: StateProgram
 
     @property
     def entries(self) -> int:
@@ -45,7 +45,7 @@ class Recording(NamedTuple):
         return len(self.rates.program.outputs)
 
 
-def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
+def record_loop(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> LoopPrograms:
     """Record a closed loop.
 
     Args:
@@ -65,13 +65,15 @@ def record(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> Recording:
         return np.concatenate([vector[:0], *(each.distance(vector).reshape(1) for each in boundaries)])
 
     try:
-        parts = (_recorded(each, loop.packing.entries) for each in (loop.derivative, torques, distances))
-        return Recording(*parts)
+        parts = (
+            _record_program(each, loop.packing.entries) for each in (loop.derivative, torques, distances)
+        )
+        return LoopPrograms(*parts)
     except (AttributeError, IndexError, TypeError, ValueError) as error:  # e.g. from a user's own spring law
         raise NotImplementedError(f"it takes more than NumPy's functions of arrays: {error}") from error
 
 
-def _recorded(function: Callable[[Any, Any], Any], entries: int) -> Recorded:
+def _record_program(function: Callable[[Any, Any], Any], entries: int) -> StateProgram:
     tape = Tape(MOST_RECORDED)
 
     def inputs(count: int) -> Any:
@@ -79,10 +81,10 @@ def _recorded(function: Callable[[Any, Any], Any], entries: int) -> Recorded:
 
     vector, instant = inputs(entries), Instant(inputs)
     program = tape.program(cells_of(function(instant, vector)).tolist())
-    return Recorded(program, tuple(instant.tables))
+    return StateProgram(program, tuple(instant.tables))
 
 
-def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
+def loop_code(recording: LoopPrograms) -> tuple[Code, FloatArray]:
     """Return the C code of a recording, and the constants to be passed to it.
 
     Constants are entries of an array, in the order in which they are written, so that robots that differ only
@@ -105,12 +107,12 @@ def loop_code(recording: Recording) -> tuple[Code, FloatArray]:
         *table_declarations(tables, dialect),
     ]
     for name, each in recording._asdict().items():
-        lines += _function(name, each.program, recording.entries, writer)
+        lines += _c_function(name, each.program, recording.entries, writer)
     functions = tuple(compiling_size(each.program) for each in recording)
     return Code("\n".join([*lines, ""]), sum(functions), functions), np.array(constants)
 
 
-def _function(name: str, program: Program, entries: int, writer: Writer) -> Iterator[str]:
+def _c_function(name: str, program: Program, entries: int, writer: Writer) -> Iterator[str]:
     """Return the C function of a program, whose inputs are the entries of a state, then columns of tables."""
     places = (
         f"y[{number}]" if number < entries else f"s[{number - entries}]"

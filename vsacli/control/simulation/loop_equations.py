@@ -1,7 +1,7 @@
 """The equations of motion of a closed loop, evaluated by the fastest backend for the length of a run.
 
-`Equations` evaluates them with NumPy, for any controller. `RecordedEquations` changes from NumPy to a program
-on plain numbers, and from that to compiled code, once a run is long enough.
+`LoopEquations` evaluates them with NumPy, for any controller. `RecordedEquations` changes from NumPy to a
+program on plain numbers, and from that to compiled code, once a run is long enough.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from vsacli.control.simulation.boundaries import Boundary
 from vsacli.control.simulation.closed_loop import ClosedLoop
 from vsacli.control.simulation.compiled_loop import CompiledLoop, Stages, loop_trial, open_loop
 from vsacli.control.simulation.ending import Budget, Ending
-from vsacli.control.simulation.loop_code import Recorded, Recording, loop_code, record
+from vsacli.control.simulation.loop_code import LoopPrograms, StateProgram, loop_code, record_loop
 
 
-class Equations:
+class LoopEquations:
     """The equations of motion of a closed loop evaluated with NumPy, with the boundaries of a run.
 
     Args:
@@ -80,7 +80,7 @@ class Edge:
         equations: equations of motion, with their boundaries.
     """
 
-    def __init__(self, equations: Equations) -> None:
+    def __init__(self, equations: LoopEquations) -> None:
         self._equations = equations
 
     def __call__(self, _time: float, vector: FloatArray) -> float:
@@ -100,7 +100,7 @@ class NumberProgram:
         NotImplementedError: the program has loops or conditionals.
     """
 
-    def __init__(self, recorded: Recorded) -> None:
+    def __init__(self, recorded: StateProgram) -> None:
         self._function, self._tables = number_function(recorded.program), recorded.tables
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
@@ -143,7 +143,7 @@ class Computing(NamedTuple):
     runs: int = 1
 
 
-class RecordedEquations(Equations):
+class RecordedEquations(LoopEquations):
     """Equations that change from NumPy to a program on plain numbers, and from that to compiled code.
 
     A backend is made when the earlier ones have taken about as long as making it takes. So a run never takes
@@ -187,7 +187,7 @@ class RecordedEquations(Equations):
         """See `Equations.__call__`; NumPy evaluates again where a result is not finite."""
         self._improve(time, vectors)
         self.budget.check(evaluations := vectors.size // vectors.shape[-1])
-        rates = _finite(self._compiled.derivatives if self._compiled else self._program, time, vectors)
+        rates = _finite_values(self._compiled.derivatives if self._compiled else self._program, time, vectors)
         if rates is None:
             return super().__call__(time, vectors)
         self.budget.used += evaluations
@@ -195,7 +195,7 @@ class RecordedEquations(Equations):
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
         """See `Equations.torques`."""
-        asked = _finite(self._compiled.torques if self._compiled else self._law, time, vector)
+        asked = _finite_values(self._compiled.torques if self._compiled else self._law, time, vector)
         return super().torques(time, vector) if asked is None else asked
 
     def stages(
@@ -225,7 +225,7 @@ class RecordedEquations(Equations):
         """Make one faster backend after the other; yield the number of evaluations at which to continue."""
         yield RECORD_FROM * len(self.loop.plant.drivetrain.present)
         with suppress(NotImplementedError, CompilerError):
-            recording = record(self.loop, self.boundaries)
+            recording = record_loop(self.loop, self.boundaries)
             with suppress(NotImplementedError):  # raised for programs with loops
                 self._program = NumberProgram(recording.rates)
                 self._law = NumberProgram(recording.torques)
@@ -238,7 +238,7 @@ class RecordedEquations(Equations):
                     yield begin + code.compiling_seconds / seconds
                     self._load(recording, code, numbers, lambda _code: True)
 
-    def _seconds(self, recording: Recording) -> float:
+    def _seconds(self, recording: LoopPrograms) -> float:
         """Return the time of an evaluation without compiled code, s."""
         operations = len(recording.rates.program.operations)
         return TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
@@ -247,10 +247,10 @@ class RecordedEquations(Equations):
         """Compile at once, for the engine "c"; yield like `_improving`. Failure raises an InputError."""
         yield 0.0
         with compiled_as_asked():
-            recording = record(self.loop, self.boundaries)
+            recording = record_loop(self.loop, self.boundaries)
             self._load(recording, *loop_code(recording), lambda _code: True)
 
-    def _load(self, recording: Recording, code: Code, numbers: FloatArray, worthwhile: Worthwhile) -> None:
+    def _load(self, recording: LoopPrograms, code: Code, numbers: FloatArray, worthwhile: Worthwhile) -> None:
         """Load compiled code; compile it if `worthwhile`.
 
         Raises:
@@ -263,7 +263,7 @@ class RecordedEquations(Equations):
             self._compiled, self._compiler = CompiledLoop(loaded.library, numbers, recording), compiler.name
 
 
-def _finite(
+def _finite_values(
     function: Callable[[float, FloatArray], FloatArray] | None, time: float, vectors: FloatArray
 ) -> FloatArray | None:
     """Return the values of a function at states; None without a function, or if a value is not finite."""

@@ -56,7 +56,7 @@ DRAWN = 2048
 """Samples whose noise is drawn at a time."""
 
 
-class _Noise:
+class _NoiseRows:
     """Rows of normally distributed noise, drawn when they are needed, and kept until `dropped`.
 
     Args:
@@ -108,9 +108,9 @@ class Readings:
         joints, motors = len(robot.joints), len(drivetrain.joint)
         random = np.random.default_rng(sensors.seed)
         self._drivetrain = drivetrain
-        self._q = _Noise(random, samples, joints, sensors.position)
-        self._theta = _Noise(random, samples, motors, sensors.position)
-        self._torque = _Noise(random, samples, motors, sensors.torque)
+        self._q = _NoiseRows(random, samples, joints, sensors.position)
+        self._theta = _NoiseRows(random, samples, motors, sensors.position)
+        self._torque = _NoiseRows(random, samples, motors, sensors.torque)
         self._recorded = 0
         self._q_step, self._theta_step = np.zeros(joints), np.zeros(motors)
         if sensors.encoder_bits is not None:
@@ -126,8 +126,8 @@ class Readings:
         """Return readings of joints, (..., joints), and of all motors, (..., motors), at samples `rows`."""
         theta = self._drivetrain.of_all_motors(truth.q, truth.theta)
         return (
-            _rounded(truth.q + self._q[rows], self._q_step),
-            _rounded(theta + self._theta[rows], self._theta_step),
+            _quantized(truth.q + self._q[rows], self._q_step),
+            _quantized(theta + self._theta[rows], self._theta_step),
         )
 
     def phase(self, truth: Phase, sample: int) -> Phase:
@@ -166,7 +166,7 @@ def _turn(joint: Joint, gear_ratio: float | None = None) -> float:
     return upper - lower
 
 
-def _rounded(values: FloatArray, step: FloatArray) -> FloatArray:
+def _quantized(values: FloatArray, step: FloatArray) -> FloatArray:
     """Return values rounded to multiples of a step, unless that is zero."""
     whole = np.where(step > 0, step, 1.0)
     return np.where(step > 0, whole * np.round(values / whole), values)

@@ -22,7 +22,14 @@ from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, LinearizingFeedback
 from vsacli.control.simulation.ending import Budget, Ending, Progress
-from vsacli.control.simulation.history import History, StateBlock, continuous, histories, joined, sampled
+from vsacli.control.simulation.history import (
+    History,
+    StateBlock,
+    concatenate_histories,
+    continuous,
+    histories,
+    integrate_sampled,
+)
 from vsacli.control.simulation.integrator import Integrator, Tolerances
 from vsacli.control.simulation.joint_tracking import GoalTolerance
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
@@ -32,7 +39,7 @@ from vsacli.control.simulation.simulation_summary import Summary
 from vsacli.control.simulation.start import InitialError, start_state, strange_errors
 from vsacli.control.simulation.stick_slip import sliding
 from vsacli.control.simulation.stiff import check_rounding
-from vsacli.control.simulation.tabulated import Reference
+from vsacli.control.simulation.tabulated import TabulatedReference
 from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import adapt_trajectory, compute_block
 from vsacli.robot.model import Robot
@@ -172,7 +179,7 @@ class SimulationRun:
                 *(self._summary.stiffness_warnings() if ending is None else []),
                 *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
             ),
-            notes=(*trajectory.notes, *([] if self._gains is None else _unlimited(robot))),
+            notes=(*trajectory.notes, *([] if self._gains is None else _unlimited_torque_notes(robot))),
             joints=joints,
             with_full_state=tuple(joint.q for joint in full.joints) if full else (),
         )
@@ -247,7 +254,7 @@ def simulate(
         runs=runs,
         tell=tell,
     )
-    past = joined(list(run))
+    past = concatenate_histories(list(run))
     return Simulation(past, run.report(), run.provenance)
 
 
@@ -278,7 +285,7 @@ def _undetermined(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
                 )
 
 
-def _unlimited(robot: Robot) -> Iterator[str]:
+def _unlimited_torque_notes(robot: Robot) -> Iterator[str]:
     """Yield a note if no motor torque is limited: feedback then requires torques that no motor has."""
     motors = [motor for joint in robot.joints for motor in joint.actuator.motors]
     if all(math.isinf(motor.max_torque) for motor in motors):
@@ -286,7 +293,7 @@ def _unlimited(robot: Robot) -> Iterator[str]:
 
 
 def _closed_loop(robot: Robot, trajectory: Trajectory, model: Robot, gains: Gains | None) -> ClosedLoop:
-    reference = Reference(trajectory)
+    reference = TabulatedReference(trajectory)
     if gains is None:
         return ClosedLoop(robot, Feedforward(model, trajectory), reference)
     return ClosedLoop(robot, LinearizingFeedback(model, reference, gains), reference)
@@ -329,4 +336,4 @@ def _integration(
     integrator = Integrator(equations, tolerances, progress, slides)
     if feedback == "state":
         return integrator, continuous(loop, integrator, reached, vector)
-    return integrator, sampled(loop, integrator, reached, vector, readings)
+    return integrator, integrate_sampled(loop, integrator, reached, vector, readings)

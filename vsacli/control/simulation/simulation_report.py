@@ -21,8 +21,8 @@ from vsacli.control.simulation.joint_tracking import (
     Deviation,
     JointTracking,
     error_text,
-    rows,
     tracking_findings,
+    tracking_rows,
 )
 
 VERDICTS = ("ok", "over_limit", "off_target", "singular", "infeasible", INCOMPLETE, DIVERGED)
@@ -135,7 +135,10 @@ class SimulationReport(Stored):
             *self._effort(),
         ]
         return ReportText(
-            headline(self.verdict, self._title()), found, [rows(self.joints, self.with_full_state)], lines
+            headline(self.verdict, self._title()),
+            found,
+            [tracking_rows(self.joints, self.with_full_state)],
+            lines,
         )
 
     def __str__(self) -> str:

@@ -49,7 +49,7 @@ class Summary:
         self._late_errors: list[FloatArray] = []
         self.samples = self.flags = 0
         self._joints = [_JointTrackingSummary(joint, index) for index, joint in enumerate(robot.joints)]
-        self._energy = _Energy()
+        self._energy = _EnergySummary()
         self._stiffest: FloatArray = np.full(len(robot.joints), -np.inf)
         self._last: tuple[FloatArray, FloatArray] = self._stiffest, self._stiffest
 
@@ -114,7 +114,7 @@ class _JointTrackingSummary:
         self._lowest = min(self._lowest, float(block.q_ref[:, index].min()))
         self._highest = max(self._highest, float(block.q_ref[:, index].max()))
         self._over_limit += int(np.count_nonzero(has_flag(flags, LIMITS)))
-        names = {check.variable: _checked(check.variable) for check in self._checks}
+        names = {check.variable: _limited_variable(check.variable) for check in self._checks}
         values = of_joint({variable: getattr(block, name) for variable, name in names.items()}, index)
         for check in self._checks:
             keep_worse(
@@ -137,12 +137,12 @@ class _JointTrackingSummary:
         )
 
 
-def _checked(variable: str) -> str:
+def _limited_variable(variable: str) -> str:
     """Return the variable that a limit bounds: the commanded torque, else the simulated value."""
     return COMMANDS[variable] if variable == "tau_motor" else variable
 
 
-class _Energy:
+class _EnergySummary:
     """Energy of each joint, accumulated."""
 
     def __init__(self) -> None:

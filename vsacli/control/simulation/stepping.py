@@ -26,7 +26,7 @@ class Event(Protocol):
         """Return the distance at a time and state."""
 
 
-class Samples(NamedTuple):
+class StateSamples(NamedTuple):
     """Consecutive samples of a run: times, (samples,), s, and states, (samples, entries)."""
 
     time: FloatArray
@@ -51,13 +51,13 @@ class Stop(NamedTuple):
     failed: bool = False
 
 
-Pieces = Generator[Samples, None, Ending | None]
+Pieces = Generator[StateSamples, None, Ending | None]
 """A run in pieces, each of at least one sample; returns the early end of the run, None without one."""
 
 
-def steps(
+def step_samples(
     solver: Any, times: FloatArray, events: Sequence[Event], budget: Budget, reserve: int
-) -> Generator[Samples, None, Stop]:
+) -> Generator[StateSamples, None, Stop]:
     """Integrate to the first event or the end of the span; yield the samples within each step.
 
     Args:
@@ -81,7 +81,7 @@ def steps(
             first, done = done, int(times.searchsorted(stop.time, "right"))
             states = None if first == done else (inside or solver.dense_output())(times[first:done]).T
         if states is not None:  # outside of errstate, which the receiver of the samples must not inherit
-            yield Samples(times[first:done], states)
+            yield StateSamples(times[first:done], states)
         if stop.event is not None:
             return stop._replace(reached=done)
     return Stop(solver.t, solver.y, done)

@@ -18,7 +18,7 @@ _RELATIVE_STEP = math.sqrt(_EPSILON)
 """Step of forward differences, relative to an entry, at which truncation and rounding are equal."""
 
 
-def jacobian(function: Derivative, time: float, vector: FloatArray) -> FloatArray:
+def difference_jacobian(function: Derivative, time: float, vector: FloatArray) -> FloatArray:
     """Return the Jacobian of a function with respect to the state, (values, entries), by forward differences.
 
     An entry is zero if its difference leaves the range of a spring's law: Newton's iteration becomes slower,
@@ -36,7 +36,7 @@ def rounding(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     return changes
 
 
-def resolved(matrix: FloatArray, vector: FloatArray, rtol: float) -> FloatArray:
+def resolved_tolerances(matrix: FloatArray, vector: FloatArray, rtol: float) -> FloatArray:
     """Return the smallest absolute tolerances, (entries,), that rounding allows with an implicit method.
 
     Rounding makes the rates of the fastest mode uncertain, and this mode decays within 1/|lambda|. Newton's
@@ -82,7 +82,7 @@ def check_rounding(robot: Robot, loop: ClosedLoop, start: FloatArray, time: floa
         ),
         (loop.demand, drivetrain.joint, "poles are too fast", "choose slower ones"),
     ):
-        changes = rounding(jacobian(torques, time, start), start)
+        changes = rounding(difference_jacobian(torques, time, start), start)
         if changes.max(initial=0.0) > bound:
             worst = int(np.argmax(changes))
             joint = robot.joints[joints[worst]]

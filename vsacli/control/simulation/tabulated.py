@@ -1,7 +1,7 @@
 """Functions of time as piecewise polynomials, since evaluating them at one instant at a time is slow.
 
 `tabulate` interpolates at Chebyshev nodes, and halves cells until the error is small. A `Table` is an input
-of recorded programs; a `Reference` is the tabulated trajectory that a controller follows.
+of recorded programs; a `TabulatedReference` is the tabulated trajectory that a controller follows.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Table:
         return columns
 
 
-class Constant(Table):
+class ConstantTable(Table):
     """Columns that do not depend on time, (columns,), until they are set again."""
 
     def __init__(self, values: FloatArray) -> None:
@@ -146,11 +146,11 @@ def tabulate(
     peak: FloatArray | None = None
     cells: list[tuple[FloatArray, FloatArray]] = []
     for halving in range(HALVINGS + 1):
-        nodes, probes = _sampled(function, starts, lengths)
+        nodes, probes = _sample_cells(function, starts, lengths)
         peak = np.fmax.reduce(np.abs(nodes), axis=(0, 1)) if peak is None else peak
-        error = _misfit(nodes, probes, peak)
+        error = _polynomial_error(nodes, probes, peak)
         halve = (error > TOLERANCE) & ((error < before / GAIN) | np.isinf(error)) & (halving < HALVINGS)
-        cells.append((starts[~halve], _coefficients(nodes[~halve], lengths[~halve])))
+        cells.append((starts[~halve], _power_coefficients(nodes[~halve], lengths[~halve])))
         if not halve.any():
             break
         starts, lengths = _halved(starts[halve], lengths[halve])
@@ -160,7 +160,7 @@ def tabulate(
     return np.append(first[order], ends[-1]), coefficients[order]
 
 
-def _sampled(
+def _sample_cells(
     function: Callable[[FloatArray], FloatArray], starts: FloatArray, lengths: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return values at the nodes and at the probes of each cell, (cells, nodes, columns)."""
@@ -169,7 +169,7 @@ def _sampled(
     return values[:, : len(_NODES)], values[:, len(_NODES) :]
 
 
-def _misfit(nodes: FloatArray, probes: FloatArray, peak: FloatArray) -> FloatArray:
+def _polynomial_error(nodes: FloatArray, probes: FloatArray, peak: FloatArray) -> FloatArray:
     """Return the largest error of the polynomial in each cell, relative to the peak of its column, (cells,).
 
     It is infinite if a column is NaN in only a part of the cell; a column that is NaN throughout is ignored.
@@ -182,7 +182,7 @@ def _misfit(nodes: FloatArray, probes: FloatArray, peak: FloatArray) -> FloatArr
     return np.where(ends_here, np.inf, np.nan_to_num(share).max(axis=(1, 2)))
 
 
-def _coefficients(nodes: FloatArray, lengths: FloatArray) -> FloatArray:
+def _power_coefficients(nodes: FloatArray, lengths: FloatArray) -> FloatArray:
     """Return the coefficients of powers of the time elapsed in the cell, (cells, powers, columns)."""
     scale = lengths[:, None, None] ** -np.arange(DEGREE, -1.0, -1.0)[:, None]
     return np.asarray(np.einsum("pn,cnk->cpk", _TO_POWERS, nodes) * scale, dtype=np.float64)
@@ -192,7 +192,7 @@ def _halved(starts: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatA
     return np.concatenate((starts, starts + lengths / 2)), np.tile(lengths / 2, 2)
 
 
-class Reference:
+class TabulatedReference:
     """Commands of a trajectory and its wrench, as tabulated functions of time.
 
     Arrays are (joints,) at one time, and (samples, joints) at times (samples,).

@@ -120,7 +120,7 @@ def conditioned(
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
     positions, low_pass = np.concatenate((q[..., None], theta), axis=-1), Filter.low_pass(bandwidth, rate)
-    motion = _motion(time, positions, low_pass, rate)
+    motion = _filtered_motion(time, positions, low_pass, rate)
     inside = slice(low_pass.reach, len(time) - low_pass.reach)
     noise = np.sqrt(
         np.mean((positions[inside] - motion[0]) ** 2, axis=0) / (1 - 2 * WIDER * bandwidth / rate)
@@ -148,12 +148,14 @@ def disturbed(signals: Signals) -> Signals:
     assert signals.noise is not None, "of a record"
     samples = len(signals.time) + 2 * signals.filter.reach
     drawn = np.random.default_rng(0).normal(size=(samples, *signals.noise.shape)) * signals.noise
-    noise = _motion(np.arange(samples) / signals.rate, drawn, signals.filter, signals.rate)
+    noise = _filtered_motion(np.arange(samples) / signals.rate, drawn, signals.filter, signals.rate)
     changes = _by_name(noise).items()
     return signals._replace(**{name: getattr(signals, name) + change for name, change in changes})
 
 
-def _motion(time: FloatArray, positions: FloatArray, low_pass: Filter, rate: float) -> tuple[FloatArray, ...]:
+def _filtered_motion(
+    time: FloatArray, positions: FloatArray, low_pass: Filter, rate: float
+) -> tuple[FloatArray, ...]:
     """Return filtered positions and their first two derivatives, without the ends where filters ring."""
     smooth = Filter.low_pass(WIDER * low_pass.bandwidth, rate).smoothed(positions, ends="odd")
     inside = slice(low_pass.reach, len(time) - low_pass.reach)
@@ -200,14 +202,14 @@ def bandwidth_of(time: FloatArray, q: FloatArray, theta: FloatArray) -> float:
         q: joint positions, (samples, joints); NaN in columns that were not recorded.
         theta: motor positions, (samples, joints, 2); NaN in columns that were not recorded.
     """
-    lowest, highest = bounds(time)
+    lowest, highest = bandwidth_bounds(time)
     positions = np.concatenate((q[..., None], theta), axis=-1).reshape(len(time), -1)
     recorded = positions[:, np.isfinite(positions).all(axis=0)]
     edges, ends = zip(*(_motion_and_noise_ends(time, column) for column in recorded.T), strict=True)
     return float(np.clip(min(ROOM * max(edges), min(ends), FASTEST), lowest, highest))
 
 
-def bounds(time: FloatArray) -> tuple[float, float]:
+def bandwidth_bounds(time: FloatArray) -> tuple[float, float]:
     """Return the smallest and the largest possible bandwidth of a recording, Hz."""
     duration = float(time[-1] - time[0])
     return SLOWEST_SPANS / duration, (len(time) - 1) / duration / SAMPLES

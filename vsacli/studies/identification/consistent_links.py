@@ -123,8 +123,8 @@ def consistent_links(robot: Robot, estimate: LinkEstimate) -> ConsistentLinks:
     bodies = np.concatenate([_body_near(joint.link, robot) for joint in robot.joints])
     parts, shift = _parts_near(estimate, len(bodies))
     root = np.asarray(np.linalg.cholesky(estimate.spread), dtype=np.float64)
-    problem = _Problem.of(estimate, root, bodies, parts, shift)
-    of_links, of_parts = _nearest(problem, np.concatenate((bodies, parts)))
+    problem = _ConsistencyProblem.of(estimate, root, bodies, parts, shift)
+    of_links, of_parts = _nearest_parameters(problem, np.concatenate((bodies, parts)))
     found = np.concatenate((of_links.ravel(), of_parts))
     off = (estimate.shares @ found - estimate.values) / np.linalg.norm(root, axis=1)
     nearest = ConsistentLinks((), off)
@@ -185,7 +185,7 @@ def _parts_near(estimate: LinkEstimate, bodies: int) -> tuple[FloatArray, FloatA
     )
 
 
-class _Problem(NamedTuple):
+class _ConsistencyProblem(NamedTuple):
     """Coordinates s of the parameters x = center + directions @ s; the first s are errors of the result.
 
     Attributes:
@@ -213,7 +213,7 @@ class _Problem(NamedTuple):
         bodies: FloatArray,
         parts: FloatArray,
         shift: FloatArray,
-    ) -> _Problem:
+    ) -> _ConsistencyProblem:
         """Return the problem for an estimate; `root` is a square root of its covariance."""
         q, r = map(np.asarray, np.linalg.qr(estimate.shares.T, mode="complete"))
         count = len(estimate.values)
@@ -264,7 +264,7 @@ class _Problem(NamedTuple):
         )
 
 
-def _nearest(problem: _Problem, start: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _nearest_parameters(problem: _ConsistencyProblem, start: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the parameters of links and the further ones with the least value, from a consistent start."""
     s = np.asarray(np.linalg.solve(problem.directions, start - problem.center), dtype=np.float64)
     off = float(s[: problem.errors] @ s[: problem.errors])
@@ -274,7 +274,7 @@ def _nearest(problem: _Problem, start: FloatArray) -> tuple[FloatArray, FloatArr
     return problem.parameters(s)
 
 
-def _minimum(problem: _Problem, s: FloatArray, weight: float) -> FloatArray:
+def _minimum(problem: _ConsistencyProblem, s: FloatArray, weight: float) -> FloatArray:
     """Return the minimum by Newton steps, halved until the value decreases, at most to 1/(1 + decrement)."""
     for _ in range(STEPS):
         gradient, hessian = problem.slopes(s, weight)
@@ -310,11 +310,15 @@ def found_links(robot: Robot, found: Solution) -> ConsistentLinks:
         for part, share in zip(system.parts, own[number], strict=True)
         if share
     }
-    alone = dict(_alone(system, found, estimate, among, nearest)) if nearest.within and len(among) else {}
+    alone = (
+        dict(_separate_estimates(system, found, estimate, among, nearest))
+        if nearest.within and len(among)
+        else {}
+    )
     return nearest._replace(parts={**nearest.parts, **held, **alone})
 
 
-def _alone(
+def _separate_estimates(
     system: LinkSystem, found: Solution, estimate: LinkEstimate, among: IndexArray, nearest: ConsistentLinks
 ) -> Iterator[tuple[str, float]]:
     """Yield the likeliest values of parameters found alone, by path, where sums are those of the links.

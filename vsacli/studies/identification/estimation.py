@@ -176,7 +176,7 @@ SETTLED = 0.01
 """Relative change of the noise of every group below which the estimates have converged."""
 
 
-class Combination(NamedTuple):
+class IdentifiableSum(NamedTuple):
     """An identifiable combination of indistinguishable unknowns: the sum of factor times unknown.
 
     Attributes:
@@ -194,7 +194,7 @@ class Combination(NamedTuple):
         return in_words(self.terms, names)
 
 
-class Fit(NamedTuple):
+class LeastSquaresFit(NamedTuple):
     """Unknowns estimated by least squares.
 
     Attributes:
@@ -215,13 +215,13 @@ class Fit(NamedTuple):
     solution: FloatArray
     covariance: FloatArray
     condition: float
-    inseparable: tuple[Combination, ...]
+    inseparable: tuple[IdentifiableSum, ...]
     unexcited: IndexArray
     residual_rms: dict[str, float]
     converged: bool = True
 
 
-class Step(NamedTuple):
+class LinearSolution(NamedTuple):
     """A solution of the linear equations.
 
     Attributes:
@@ -243,7 +243,7 @@ def least_squares(
     records: Sequence[Equations],
     present: FloatArray,
     tolerance: float = SEPARABLE,
-) -> Fit:
+) -> LeastSquaresFit:
     """Solve linear equations, weighted by the noise of each group, which is estimated from the residuals.
 
     Standard errors hold for residuals of any color, also common to groups; see `score_covariance`.
@@ -257,10 +257,10 @@ def least_squares(
         InputError: there are not more equations than unknowns.
     """
     system = System.of(records)
-    return fit_of(system, present, solved(system, tolerance), present)
+    return fit_of(system, present, solve_system(system, tolerance), present)
 
 
-def solved(system: System, tolerance: float = SEPARABLE) -> Step:
+def solve_system(system: System, tolerance: float = SEPARABLE) -> LinearSolution:
     """Return the solution of linear equations, without standard errors.
 
     Raises:
@@ -269,29 +269,29 @@ def solved(system: System, tolerance: float = SEPARABLE) -> Step:
     rows, unknowns = system.slopes.shape
     if rows <= unknowns:
         raise InputError.one(f"{rows} equations do not tell {unknowns} unknowns; record for longer")
-    floor = QUIET * _noise(system, system.measured, np.zeros(rows))
-    noise = np.maximum(_noise(system, system.residual, np.zeros(rows)), floor)
+    floor = QUIET * _group_noises(system, system.measured, np.zeros(rows))
+    noise = np.maximum(_group_noises(system, system.residual, np.zeros(rows)), floor)
     for _ in range(PASSES):
-        step = _weighted(system, np.where(noise > 0, noise, 1.0), tolerance)
+        step = _solve_weighted(system, np.where(noise > 0, noise, 1.0), tolerance)
         left = system.residual - system.slopes @ step.change
         leverage = np.einsum("rc,rc->r", step.split.q, step.split.q)
-        before, noise = noise, np.maximum(_noise(system, left, leverage), floor)
+        before, noise = noise, np.maximum(_group_noises(system, left, leverage), floor)
         if np.all(np.abs(noise - before) <= SETTLED * before):
             break
     return step._replace(noise=noise)
 
 
-def _weighted(system: System, noise: FloatArray, tolerance: float) -> Step:
+def _solve_weighted(system: System, noise: FloatArray, tolerance: float) -> LinearSolution:
     """Return the solution for a given noise of each group, (groups,)."""
     weight = 1 / noise[system.group]
     split = independence(system.slopes * weight[:, None], tolerance, system.noise()[1] * weight[:, None])
     target = split.q.T @ (system.residual * weight)
     change = np.zeros(system.slopes.shape[1])
     change[split.kept] = scipy.linalg.solve_triangular(split.r, target) / split.scale[split.kept]
-    return Step(change, split, weight, noise, float(np.linalg.norm(target)))
+    return LinearSolution(change, split, weight, noise, float(np.linalg.norm(target)))
 
 
-def _noise(system: System, left: FloatArray, leverage: FloatArray) -> FloatArray:
+def _group_noises(system: System, left: FloatArray, leverage: FloatArray) -> FloatArray:
     """Return the rms residual of each group, (groups,), per row minus fitted unknowns."""
     freedom = np.maximum(system.by_group(1 - leverage), 1.0)
     return np.sqrt(system.by_group(left**2) / freedom)
@@ -300,9 +300,9 @@ def _noise(system: System, left: FloatArray, leverage: FloatArray) -> FloatArray
 def fit_of(
     system: System,
     present: FloatArray,
-    step: Step,
+    step: LinearSolution,
     before: FloatArray,
-) -> Fit:
+) -> LeastSquaresFit:
     """Return the fit of a solution, with standard errors.
 
     Args:
@@ -313,13 +313,13 @@ def fit_of(
     """
     split, left = step.split, system.residual - system.slopes @ step.change
     solution = present + step.change
-    covariance = _covariance(system, step, left)
+    covariance = _solution_covariance(system, step, left)
     errors = np.sqrt(np.diagonal(covariance))
     combinations = tuple(_combinations(split, solution, errors))
     identifiable = np.zeros(len(present), dtype=bool)
     identifiable[split.kept] = True
     identifiable[[at for each in combinations for at, _ in each.terms]] = False
-    return Fit(
+    return LeastSquaresFit(
         values=np.where(identifiable, solution, before),
         standard_errors=np.where(identifiable, errors, np.nan),
         solution=solution,
@@ -331,7 +331,7 @@ def fit_of(
     )
 
 
-def _covariance(system: System, step: Step, left: FloatArray) -> FloatArray:
+def _solution_covariance(system: System, step: LinearSolution, left: FloatArray) -> FloatArray:
     """Return the covariance of the solution due to noise, errors of earlier parameters, and bias.
 
     Noise in the columns makes unknowns too small (W. A. Fuller, Measurement Error Models, 1987, section 1.1).
@@ -353,7 +353,7 @@ def _covariance(system: System, step: Step, left: FloatArray) -> FloatArray:
     return covariance
 
 
-def _combinations(split: Independence, solution: FloatArray, errors: FloatArray) -> list[Combination]:
+def _combinations(split: Independence, solution: FloatArray, errors: FloatArray) -> list[IdentifiableSum]:
     """Return the combination of each kept column on which dropped columns depend."""
     found = []
     for place, kept in enumerate(split.kept):
@@ -362,7 +362,7 @@ def _combinations(split: Independence, solution: FloatArray, errors: FloatArray)
         if others:
             terms = ((int(kept), 1.0), *others)
             value = sum(factor * solution[at] for at, factor in terms)
-            found.append(Combination(terms, float(value), float(errors[kept])))
+            found.append(IdentifiableSum(terms, float(value), float(errors[kept])))
     return found
 
 
@@ -379,7 +379,7 @@ ARRIVED = 0.1
 
 def gauss_newton(
     equations: Callable[[FloatArray], Sequence[Equations]], start: FloatArray, tolerance: float = SEPARABLE
-) -> Fit:
+) -> LeastSquaresFit:
     """Solve nonlinear equations by the Gauss-Newton method; of indistinguishable unknowns some are kept.
 
     A step is halved until it reduces the residuals in units of the noise. `scipy.optimize.least_squares`,
@@ -400,7 +400,7 @@ def gauss_newton(
     """
     present, system = start, System.of(equations(start))
     for _ in range(STEPS):
-        step = solved(system, tolerance)
+        step = solve_system(system, tolerance)
         if step.length <= ARRIVED * np.sqrt(len(step.split.kept)):
             return fit_of(system, present, step, start)
         found = _shorter(equations, present, system, step)
@@ -412,19 +412,22 @@ def gauss_newton(
 
 
 def _shorter(
-    equations: Callable[[FloatArray], Sequence[Equations]], present: FloatArray, system: System, step: Step
+    equations: Callable[[FloatArray], Sequence[Equations]],
+    present: FloatArray,
+    system: System,
+    step: LinearSolution,
 ) -> tuple[FloatArray, System] | None:
     """Return unknowns and equations after the longest halved step that reduces the residuals, or None."""
-    before = _left(system, step)
+    before = _squared_residuals(system, step)
     for halving in range(HALVINGS):
         there = present + step.change / 2**halving
         moved = System.of(equations(there))
-        if _left(moved, step) < before:
+        if _squared_residuals(moved, step) < before:
             return there, moved
     return None
 
 
-def _left(system: System, step: Step) -> float:
+def _squared_residuals(system: System, step: LinearSolution) -> float:
     """Return the sum of squared residuals in units of the noise; infinite if a prediction is not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
         left = float(np.sum((system.residual * step.weight) ** 2))

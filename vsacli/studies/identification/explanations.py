@@ -1,9 +1,9 @@
 """Explanations of residuals: possible causes, and the parameters that these make wrong.
 
-Residuals of pure noise have no structure. `addition` tests each cause of `causes`; the one that explains most
-is chosen, then the remaining residual is tested again. A cause is reported if it matters: if it would change
-a parameter by more than its standard error admits, if it explains most of the residual, or if the residual is
-too large anyway.
+Residuals of pure noise have no structure. `addition` tests each cause of `residual_causes`; the one that
+explains most is chosen, then the remaining residual is tested again. A cause is reported if it matters: if it
+would change a parameter by more than its standard error admits, if it explains most of the residual, or if
+the residual is too large anyway.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from vsacli.studies.identification.estimation import (
     wider,
 )
 from vsacli.studies.identification.fitted_system import Solution
-from vsacli.studies.identification.identification_text import significant
+from vsacli.studies.identification.identification_text import rounded_by_error
 from vsacli.studies.identification.identified_values import CHANGED
 from vsacli.studies.identification.independence import independence
-from vsacli.studies.identification.residual_causes import Cause, causes
+from vsacli.studies.identification.residual_causes import Cause, residual_causes
 
 FEWEST_ROWS = 3
 """Equations per unknown below which residuals do not determine missing columns."""
@@ -149,13 +149,15 @@ def explanation(robot: Robot, found: Solution, records: Sequence[Signals], *, fa
     of_free = [each._replace(slopes=each.slopes[:, found.free]) for each in equations]
     if sum(len(each.measured) for each in equations) < FEWEST_ROWS * (len(found.free) + 1):
         return NOTHING
-    chosen = _chosen(causes(robot, found, exact, equations), of_free, found.fit.residual_rms)
+    chosen = _explaining_causes(
+        residual_causes(robot, found, exact, equations), of_free, found.fit.residual_rms
+    )
     if not chosen:
         return NOTHING
     longer = _longer(of_free, chosen)
     fit = least_squares(longer, np.zeros(longer[0].slopes.shape[1]))
     count = len(found.free)
-    moved = tuple(_moved(found, fit.values[:count], fit.standard_errors[:count]))
+    moved = tuple(_changed_value_clauses(found, fit.values[:count], fit.standard_errors[:count]))
     left = [_share_left(cause, longer, fit.solution) for cause in chosen]
     matters = bool(moved) or min(left) <= 1 - MOST
     if not (matters or fails):
@@ -163,27 +165,27 @@ def explanation(robot: Robot, found: Solution, records: Sequence[Signals], *, fa
     sentences, at = [], count
     for cause, share in zip(chosen, left, strict=True):
         size, error = float(fit.values[at]), float(fit.standard_errors[at])
-        sentences.append(_sentence(cause, size, error, share))
+        sentences.append(_cause_sentence(cause, size, error, share))
         at += cause.width
     if moved:
         sentences.append(f"{found.system.title}: with that, {'; '.join(moved)}")
     return Explanation(tuple(dict.fromkeys(sentences)), matters)
 
 
-def _moved(found: Solution, changes: FloatArray, errors: FloatArray) -> Iterator[str]:
+def _changed_value_clauses(found: Solution, changes: FloatArray, errors: FloatArray) -> Iterator[str]:
     """Yield clauses on identified values that would change with the causes in the equations."""
     for at, number in enumerate(found.free):
         value, before = float(found.fit.values[at]), float(found.fit.standard_errors[at])
         name, unit, error = found.system.names[number], found.system.units[number], float(errors[at])
-        there = f"{significant(value, before)} +- {before:.2g} {unit}"
+        there = f"{rounded_by_error(value, before)} +- {before:.2g} {unit}"
         if np.isfinite(before) and not np.isfinite(error):
             yield f"{name} would be unidentifiable, not {there}"
         elif abs(changes[at]) > CHANGED * before:
-            now = f"{significant(value + float(changes[at]), error)} +- {error:.2g}"
+            now = f"{rounded_by_error(value + float(changes[at]), error)} +- {error:.2g}"
             yield f"{name} would be {now}, not {there}"
 
 
-def _chosen(
+def _explaining_causes(
     possible: Sequence[Cause], equations: Sequence[Equations], noise: dict[str, float]
 ) -> list[Cause]:
     """Return the causes that explain something beyond chance, the one that explains most first."""
@@ -220,9 +222,9 @@ def _share_left(cause: Cause, longer: Sequence[Equations], solution: FloatArray)
     return float(np.sum((residual - np.concatenate(explained)) ** 2) / np.sum(residual**2))
 
 
-def _sentence(cause: Cause, size: float, error: float, left: float) -> str:
+def _cause_sentence(cause: Cause, size: float, error: float, left: float) -> str:
     total = cause.neutral + size
-    rounded = significant(total, error)
+    rounded = rounded_by_error(total, error)
     signed = rounded if cause.neutral or total < 0 else f"+{rounded}"
     share = "most" if 1 - left >= MOST else "a part"
     return cause.words.format(

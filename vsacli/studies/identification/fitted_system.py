@@ -12,7 +12,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.studies.identification.conditioning import Signals, disturbed
-from vsacli.studies.identification.estimation import Equations, Fit, gauss_newton
+from vsacli.studies.identification.estimation import Equations, LeastSquaresFit, gauss_newton
 
 FEWEST_ROWS = 5
 """Equations per unknown below which a recording is too short to hold out a part of it."""
@@ -85,7 +85,7 @@ class Solution(NamedTuple):
 
     system: SystemOfEquations
     free: tuple[int, ...]
-    fit: Fit
+    fit: LeastSquaresFit
     bound: dict[int, Bound]
 
     @property

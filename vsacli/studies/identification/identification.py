@@ -23,7 +23,7 @@ from vsacli.robot.file import text_to_change
 from vsacli.robot.model import Robot, check_robot
 from vsacli.robot.modified_dh import modified_link
 from vsacli.robot.parameters import JOINTS, parameters
-from vsacli.studies.identification.conditioning import Signals, bandwidth_of, bounds, conditioned
+from vsacli.studies.identification.conditioning import Signals, bandwidth_bounds, bandwidth_of, conditioned
 from vsacli.studies.identification.consistent_links import ConsistentLinks, doubts_of, found_links
 from vsacli.studies.identification.explanations import Explanation, explanation
 from vsacli.studies.identification.fitted_system import Solution, solution
@@ -34,9 +34,9 @@ from vsacli.studies.identification.identification_report import (
     UNRELIABLE,
     Identification,
     system_report,
-    torques,
+    torque_comparisons,
 )
-from vsacli.studies.identification.identification_text import significant
+from vsacli.studies.identification.identification_text import rounded_by_error
 from vsacli.studies.identification.identified_values import (
     Number,
     RecordReport,
@@ -61,11 +61,16 @@ from vsacli.studies.identification.recording_checks import (
     Delay,
     Gain,
     delay,
-    gains,
+    gain_findings,
     model_doubts,
     without_delay,
 )
-from vsacli.studies.identification.recordings import Record, check_distinct, complete_joints, read_record
+from vsacli.studies.identification.recordings import (
+    Record,
+    check_distinct,
+    complete_joints,
+    read_motor_recording,
+)
 from vsacli.studies.identification.torque_deviations import torque_deviations
 
 WORDS = (*GROUPS, LINKS)
@@ -107,16 +112,16 @@ def identify(
     """
     check_robot(robot)
     check_fit(robot, fit, WORDS)
-    records = _read(robot, recordings, columns)
+    records = _read_all_recordings(robot, recordings, columns)
     complete = {joint for record in records for joint in complete_joints(robot, record)}
     joints = [joint for joint in sorted(complete) if not robot.joints[joint].damper_at("transmission")]
-    signals = [_conditioned(record, bandwidth) for record in records]
+    signals = [_condition_record(record, bandwidth) for record in records]
     pushed = [each.path for each in records if not set(each.unused).isdisjoint(FORCES)]
     if LINKS not in fit and all(robot.joints[index].actuator.sprung for index in joints):
         pushed = []
     sought = with_friction(robot, joints) if FRICTION in fit else robot
     first = solutions(sought, joints, fit, signals, pushed=bool(pushed))
-    notes = list(_notes(robot, joints, fit, signals, records, pushed))
+    notes = list(_identification_notes(robot, joints, fit, signals, records, pushed))
     if not first:
         wanted = any(unknowns(sought, index, fit) for index in joints)
         nothing = "nothing can be identified" if wanted else describe_lack(robot, joints, fit)
@@ -126,18 +131,20 @@ def identify(
     found = solutions(sought, joints, fit, signals, pushed=bool(pushed)) if moved else first
     with progress(2 * len(found)) as bar:
         systems = Countdown(bar.update, 2 * len(found))
-        reports = tuple(_counted(systems, (system_report(robot, each, signals) for each in found)))
+        reports = tuple(_count_results(systems, (system_report(robot, each, signals) for each in found)))
         doubts = [tuple(model_doubts(robot, joints, *each)) for each in zip(records, signals, strict=True)]
         of_gains, explained = [], []
         if not any(doubts):
-            of_gains = gains(sought, joints, [each for each in found if each.system.title != LINKS], signals)
-            explained = list(_counted(systems, _explanations(robot, found, reports, signals, of_gains)))
+            of_gains = gain_findings(
+                sought, joints, [each for each in found if each.system.title != LINKS], signals
+            )
+            explained = list(_count_results(systems, _explanations(robot, found, reports, signals, of_gains)))
         systems.finish()
     links = next((found_links(sought, each) for each in found if each.system.title == LINKS), None)
     of_motors = (each for each in found if each.system.title != LINKS)
     of_sums = {path: value for each in of_motors for path, value in values_of_sums(each).items()}
-    fitted = _fitted(robot, sought, reports, links, of_sums)
-    used = tuple(map(_used, records, signals, delays, doubts))
+    fitted = _identified_robot(robot, sought, reports, links, of_sums)
+    used = tuple(map(_record_report, records, signals, delays, doubts))
     far = far_from_file(number for report in reports for number in report.numbers)
     return Identification(
         robot=robot.name,
@@ -153,7 +160,7 @@ def identify(
         ),
         fitted=fitted,
         deviations=torque_deviations(fitted, found, signals),
-        torques=tuple(torques(robot, found, records, signals)),
+        torques=tuple(torque_comparisons(robot, found, records, signals)),
         sources=(*robot.sources, *(each.source for each in records)),
     )
 
@@ -161,7 +168,7 @@ def identify(
 _Result = TypeVar("_Result")
 
 
-def _counted(systems: Countdown, results: Iterable[_Result]) -> Iterator[_Result]:
+def _count_results(systems: Countdown, results: Iterable[_Result]) -> Iterator[_Result]:
     """Yield the results, and count each when it is there."""
     for result in results:
         systems.count()
@@ -175,7 +182,7 @@ def _without_delays(signals: Sequence[Signals], delays: Sequence[Delay]) -> tupl
     return [without_delay(each, by.seconds) if matters else each for each, by, matters in moved], any(late)
 
 
-def _read(
+def _read_all_recordings(
     robot: Robot, recordings: str | Path | Sequence[str | Path], columns: str | Path | None
 ) -> list[Record]:
     """Read all recordings.
@@ -187,19 +194,19 @@ def _read(
     if not paths:
         raise InputError.one("identification needs at least 1 recording")
     mapping = load_columns(columns)
-    records = [read_record(robot, path, mapping) for path in paths]
+    records = [read_motor_recording(robot, path, mapping) for path in paths]
     check_distinct(records)
     return records
 
 
-def _conditioned(record: Record, bandwidth: float | None) -> Signals:
+def _condition_record(record: Record, bandwidth: float | None) -> Signals:
     """Return a recording filtered and differentiated.
 
     Raises:
         InputError: the requested bandwidth does not fit the recording.
     """
     chosen = bandwidth_of(record.time, record.q, record.theta) if bandwidth is None else bandwidth
-    low, high = bounds(record.time)
+    low, high = bandwidth_bounds(record.time)
     if not low <= chosen <= high:
         raise InputError.one(
             f"the bandwidth must be between {low:.3g} and {high:.4g} Hz for {record.path} "
@@ -255,7 +262,7 @@ def _fails(residual: Residual) -> bool:
     return worst > max(ABOVE_NOISE * noise, ABOVE_TORQUE * residual.torque)
 
 
-def _used(record: Record, signals: Signals, late: Delay, doubts: tuple[str, ...]) -> RecordReport:
+def _record_report(record: Record, signals: Signals, late: Delay, doubts: tuple[str, ...]) -> RecordReport:
     return RecordReport(
         path=record.path,
         duration=float(signals.time[-1] - signals.time[0]),
@@ -269,7 +276,7 @@ def _used(record: Record, signals: Signals, late: Delay, doubts: tuple[str, ...]
     )
 
 
-def _notes(
+def _identification_notes(
     robot: Robot,
     joints: Sequence[int],
     fit: Sequence[str],
@@ -331,7 +338,7 @@ def _explanations(
             yield explained[-1]
 
 
-def _fitted(
+def _identified_robot(
     robot: Robot,
     sought: Robot,
     systems: Sequence[SystemReport],
@@ -385,7 +392,7 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
     for number in to_write(robot, found.systems):
         path = _in_text(robot, number.path)
         value = written.get(number.path, number.value)
-        value = float(significant(value, number.standard_error / FINER, math.inf))
+        value = float(rounded_by_error(value, number.standard_error / FINER, math.inf))
         errors[path] = f"{number.standard_error:.2g}"
         if written.get(number.path, number.value) == number.before:
             continue
@@ -414,7 +421,7 @@ def _changed_parts(robot: Robot, fitted: Robot, identified: set[str]) -> Iterato
         path = str(each)
         changed = each.part != "link" and values.get(path, each.value) != each.value
         if changed and (place := _in_text(robot, path)) not in identified:
-            yield place, _rounded(values[path])
+            yield place, _rounded_parameter(values[path])
 
 
 def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:
@@ -425,12 +432,14 @@ def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:
         if joint.link != before.link:
             link = modified_link(joint) if modified else joint.link
             place = f"{JOINTS}.{index}.link"
-            found[f"{place}.mass"] = _rounded(link.mass)
-            found[f"{place}.com"] = [_rounded(each) for each in link.com]
-            found[f"{place}.inertia"] = {key: _rounded(value) for key, value in vars(link.inertia).items()}
+            found[f"{place}.mass"] = _rounded_parameter(link.mass)
+            found[f"{place}.com"] = [_rounded_parameter(each) for each in link.com]
+            found[f"{place}.inertia"] = {
+                key: _rounded_parameter(value) for key, value in vars(link.inertia).items()
+            }
     return found
 
 
-def _rounded(value: float) -> float:
+def _rounded_parameter(value: float) -> float:
     """Return a value with 7 digits, more than recordings determine, and 0 for a rounding error."""
     return 0.0 if abs(value) < NOTHING else float(f"{value:.7g}")

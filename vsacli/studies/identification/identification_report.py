@@ -25,13 +25,13 @@ from vsacli.studies.identification.identification_text import (
     INDISTINCT,
     NO_EFFECT,
     NOT_PHYSICAL,
-    counts,
-    definitions,
+    agreement_counts,
     deviation_rows,
     findings,
     parameter_rows,
     residual_rows,
-    significant,
+    rounded_by_error,
+    sum_definitions,
     use_line,
 )
 from vsacli.studies.identification.identified_values import (
@@ -117,7 +117,9 @@ class Identification(Published):
     @property
     def title(self) -> str:
         """Name of the robot, and how many of its parameters agree with the file."""
-        return f"{self.robot} from {counted(len(self.records), 'recording')}: {counts(self.numbers)}"
+        return (
+            f"{self.robot} from {counted(len(self.records), 'recording')}: {agreement_counts(self.numbers)}"
+        )
 
     def as_text(self, *, verbose: bool = False) -> ReportText:
         """Return the report in parts.
@@ -125,7 +127,7 @@ class Identification(Published):
         Args:
             verbose: whether to add the definitions of base parameters that are sums.
         """
-        lines = [*map(use_line, self.records), *definitions(self.numbers, verbose=verbose)]
+        lines = [*map(use_line, self.records), *sum_definitions(self.numbers, verbose=verbose)]
         return ReportText(
             headline(self.verdict, self.title),
             list(findings(self.systems, self.records, self.notes)),
@@ -148,7 +150,7 @@ def system_report(robot: Robot, found: Solution, signals: list[Signals]) -> Syst
     of_joint = f"{JOINTS}.{system.title}.actuator."
     names = [system.names[number].removeprefix(of_joint) for number in found.free]
     combinations = [
-        f"only {each.words(names)} is identifiable: {significant(each.value, each.standard_error)} "
+        f"only {each.words(names)} is identifiable: {rounded_by_error(each.value, each.standard_error)} "
         f"+- {each.standard_error:.2g}"
         for each in fit.inseparable
     ]
@@ -198,23 +200,25 @@ def _residuals(robot: Robot, found: Solution, signals: list[Signals]) -> Iterato
             unit=_unit(robot, name),
             torque=rms(measured[rows]),
             residual=rms(residual[rows]),
-            noise=_noise(robot, name, signals, equations),
+            noise=_group_noise(robot, name, signals, equations),
             held_out=beyond.get(name, float("nan")),
         )
 
 
-def _joint_of(robot: Robot, group: str) -> int:
+def _joint_of_group(robot: Robot, group: str) -> int:
     """Return the index of the joint whose motor or link a group is."""
     return robot.joint_names.index(group.rpartition(" ")[2])
 
 
 def _unit(robot: Robot, group: str) -> str:
-    return VARIABLES[TORQUE].quantity.unit(robot.joint_types[_joint_of(robot, group)])
+    return VARIABLES[TORQUE].quantity.unit(robot.joint_types[_joint_of_group(robot, group)])
 
 
-def _noise(robot: Robot, group: str, signals: Sequence[Signals], equations: Sequence[Equations]) -> float:
+def _group_noise(
+    robot: Robot, group: str, signals: Sequence[Signals], equations: Sequence[Equations]
+) -> float:
     """Return the noise of a group's residual from that of torques and positions; NaN if either is unknown."""
-    index = _joint_of(robot, group)
+    index = _joint_of_group(robot, group)
     motors, sprung = motor_names(robot, index), robot.joints[index].actuator.sprung
     of_positions = [each.noise()[0][each.group == group] for each in equations if each.noise is not None]
     noise = rms(np.concatenate(of_positions)) if of_positions else math.nan
@@ -225,7 +229,7 @@ def _noise(robot: Robot, group: str, signals: Sequence[Signals], equations: Sequ
     return math.hypot(noise, rms(of_torque[~np.isnan(of_torque)]))
 
 
-def torques(
+def torque_comparisons(
     robot: Robot, found: Sequence[Solution], records: Sequence[Record], signals: Sequence[Signals]
 ) -> Iterator[Torques]:
     """Yield measured and predicted torques of all recordings and systems."""

@@ -43,7 +43,7 @@ ACTUATOR = "actuator."
 """Part of a path that is omitted after the name of the joint: nothing else has springs and motors."""
 
 
-def significant(value: float, error: float, digits: float = MOST_DIGITS) -> str:
+def rounded_by_error(value: float, error: float, digits: float = MOST_DIGITS) -> str:
     """Return a value rounded to two digits of its standard error, with at most so many digits in all."""
     if not (math.isfinite(error) and error > 0):
         return f"{value:.6g}"
@@ -66,7 +66,7 @@ def _with_decimals(value: float, decimals: int, sign: str = "") -> str:
     return f"{rounded:{sign if rounded else ''}.{max(decimals, 0)}f}"
 
 
-def counts(numbers: Sequence[Number]) -> str:
+def agreement_counts(numbers: Sequence[Number]) -> str:
     """Return how many parameters agree with the file, differ from it, or are unidentifiable."""
     identifiable = sum(each.identifiable for each in numbers)
     changed = sum(each.changed for each in numbers)
@@ -79,7 +79,7 @@ def counts(numbers: Sequence[Number]) -> str:
     return f"{counted(len(numbers), 'parameter')}: {listed}"
 
 
-def joint_of(path: str, joints: Sequence[str]) -> str:
+def joint_of_path(path: str, joints: Sequence[str]) -> str:
     """Return the name of the joint of a parameter or base parameter; empty if it has none."""
     beginning = path.removeprefix(f"{JOINTS}.")
     return max((joint for joint in joints if beginning.startswith(f"{joint}.")), key=len, default="")
@@ -93,13 +93,15 @@ class Named(Protocol):
         """Path in the robot, or name of a base parameter."""
 
 
-def by_joint(numbers: Sequence[T], joints: Sequence[str]) -> Iterator[tuple[str, list[str], list[T]]]:
+def parameters_by_joint(
+    numbers: Sequence[T], joints: Sequence[str]
+) -> Iterator[tuple[str, list[str], list[T]]]:
     """Yield joints, names for a table and parameters; those of no joint last, with an empty name.
 
     The names are paths without the beginning that they share, indented below the name of the joint.
     """
     for joint in (*joints, ""):
-        own = [each for each in numbers if joint_of(each.path, joints) == joint]
+        own = [each for each in numbers if joint_of_path(each.path, joints) == joint]
         if not own:
             continue
         if not joint:
@@ -116,16 +118,16 @@ def parameter_rows(numbers: Sequence[Number], joints: Sequence[str]) -> list[tup
     ordered = sorted(
         numbers, key=lambda each: (not each.identifiable, -abs(each.off) if each.identifiable else 0.0)
     )
-    for joint, names, of_joint in by_joint(ordered, joints):
+    for joint, names, of_joint in parameters_by_joint(ordered, joints):
         rows += [(joint, *[""] * (len(rows[0]) - 1))] if joint else []
         rows += [
-            (name, each.unit, *_values(each), _deviation(each))
+            (name, each.unit, *_value_texts(each), _deviation_from_file(each))
             for name, each in zip(names, of_joint, strict=True)
         ]
     return rows
 
 
-def _values(number: Number) -> tuple[str, str, str]:
+def _value_texts(number: Number) -> tuple[str, str, str]:
     """Return value in the file, value found and its error, all to two digits of the error."""
     before, value, error = number.before, number.value, number.standard_error
     if not number.identifiable or error <= 0:
@@ -140,7 +142,7 @@ def _values(number: Number) -> tuple[str, str, str]:
     )
 
 
-def _deviation(number: Number) -> str:
+def _deviation_from_file(number: Number) -> str:
     if not number.identifiable:
         return "-"
     size = abs(number.off)
@@ -194,7 +196,7 @@ def findings(
         )
 
 
-def definitions(numbers: Sequence[Number], *, verbose: bool) -> Iterator[str]:
+def sum_definitions(numbers: Sequence[Number], *, verbose: bool) -> Iterator[str]:
     """Yield the definitions of sums if verbose, otherwise how to see them, and which terms are written."""
     sums = [f"{each.path} is {each.sum}" for each in numbers if each.sum not in ("", each.path)]
     yield from sums if verbose else ()

@@ -133,9 +133,11 @@ def in_words(terms: Iterable[tuple[int, float]], names: Sequence[str]) -> str:
         names: names of all unknowns.
     """
     (first, _), *others = terms
-    signed = (f" {'-' if factor < 0 else '+'} {_times(abs(factor))}{names[at]}" for at, factor in others)
+    signed = (
+        f" {'-' if factor < 0 else '+'} {_factor_text(abs(factor))}{names[at]}" for at, factor in others
+    )
     return "".join((names[first], *signed))
 
 
-def _times(factor: float) -> str:
+def _factor_text(factor: float) -> str:
     return "" if f"{factor:.4g}" == "1" else f"{factor:.4g} "

@@ -41,7 +41,7 @@ from vsacli.studies.identification.regressor import (
     UNITS,
     BaseParameters,
     all_parameters,
-    names,
+    link_parameter_names,
     preferred_order,
     random_motion,
     regressor,
@@ -76,7 +76,7 @@ class LinkSystem(SystemOfEquations):
         self.title, self.base, self.parts = LINKS, base, tuple(parts)
         self._robot, self._springs = robot, tuple(springs)
         self._errors = np.zeros((0, 0)) if errors is None else errors
-        of_links = names(robot)
+        of_links = link_parameter_names(robot)
         self._first = len(of_links)
         self.bodies = int(np.searchsorted(base.kept, self._first))
         every = [*of_links, *map(str, parts)]
@@ -165,7 +165,7 @@ def link_system(
         for each in unknowns(robot, index, words)
         if each.path[-1] != WIDTH and (group_of(each) == LINKS or not robot.joints[index].actuator.sprung)
     ]
-    return LinkSystem(robot, _link_combinations(robot, parts, links=links), parts, *_springs(motors))
+    return LinkSystem(robot, _link_combinations(robot, parts, links=links), parts, *_best_springs(motors))
 
 
 SLOWEST = 1e-4
@@ -189,7 +189,7 @@ def _link_combinations(robot: Robot, parts: Sequence[Parameter], *, links: bool)
     return BaseParameters.of_columns(np.moveaxis(columns, 1, -1).reshape(-1, columns.shape[1]), order)
 
 
-def _springs(motors: Sequence[Solution]) -> tuple[list[Parameter], FloatArray | None]:
+def _best_springs(motors: Sequence[Solution]) -> tuple[list[Parameter], FloatArray | None]:
     """Return spring parameters that predict best, and their errors as sums of independent errors."""
     springs, roots = [], []
     for each in motors:

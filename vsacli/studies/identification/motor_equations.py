@@ -163,7 +163,7 @@ def motor_names(robot: Robot, index: int) -> tuple[str, ...]:
 def joint_motion(signals: Signals, index: int) -> JointVariables:
     """Return the motion of a joint and its motors, samples last, as duals without derivatives."""
     # NumPy functions of duals accept robot parameters that are duals, which those of arrays do not
-    return as_duals(_arrays(signals, index))
+    return as_duals(_motor_arrays(signals, index))
 
 
 def as_duals(arrays: Mapping[str, FloatArray]) -> JointVariables:
@@ -172,7 +172,7 @@ def as_duals(arrays: Mapping[str, FloatArray]) -> JointVariables:
     return JointVariables(**motion)
 
 
-def _arrays(signals: Signals, index: int) -> dict[str, FloatArray]:
+def _motor_arrays(signals: Signals, index: int) -> dict[str, FloatArray]:
     q, theta = signals.q[:, index], signals.theta[:, index].T
     return {
         "q": q,
@@ -324,7 +324,7 @@ def _motor_combinations(
 ) -> BaseParameters | None:
     """Return the combinations of parameters that motor torques of any motion determine; None if unknown."""
     random = np.random.default_rng(0)
-    recorded = [_arrays(each, index) for each in records]
+    recorded = [_motor_arrays(each, index) for each in records]
     q, phi = (np.concatenate([each[name] for each in recorded], axis=-1) for name in ("q", "phi"))
     chosen = random.integers(len(q), size=SAMPLES)
     phi = phi[:, chosen] * (1 + NEARBY * random.uniform(-1, 1, (SIDES, SAMPLES)))

@@ -16,7 +16,7 @@ from vsacli.base.variables import VARIABLES, Variable
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.csv_file import split_heading
 from vsacli.robot.model import Robot
-from vsacli.studies.measured.measured_columns import Measured, Recording, preferred, read_recording
+from vsacli.studies.measured.measured_columns import MeasuredSignal, Recording, preferred, read_recording
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 
 POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
@@ -31,7 +31,7 @@ Where: TypeAlias = tuple[str, int, int | None]
 """Variable, joint index, and number of the motor or None."""
 
 
-class Column(NamedTuple):
+class RecordedColumn(NamedTuple):
     """A recorded column.
 
     Attributes:
@@ -76,7 +76,7 @@ class _RobotColumns(NamedTuple):
 
 def recorded_columns(
     robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED
-) -> tuple[list[Column], tuple[str, ...], Recording]:
+) -> tuple[list[RecordedColumn], tuple[str, ...], Recording]:
     """Return the required columns, the names of the others, and the recording as read.
 
     Args:
@@ -92,23 +92,23 @@ def recorded_columns(
     recording = read_recording(path, _RobotColumns(robot), wanted, robot.name, mapping)
     united = {name for name, unit in map(split_heading, recording.table.columns) if unit is not None}
     stamps, columns = elapsed_times(recording.time), []
-    for place, signal in _preferred(recording.signals).items():
+    for place, signal in _preferred_columns(recording.signals).items():
         there = np.isfinite(signal.values)
         values = signal.values[there] * _torque_of_current(robot, signal)
-        columns.append(Column(signal.column, place, stamps[there], values, signal.column in united))
+        columns.append(RecordedColumn(signal.column, place, stamps[there], values, signal.column in united))
     used = {column.name for column in columns}
     others = [signal.column for signal in recording.signals if signal.column not in used]
     return columns, (*others, *recording.table.unknown_columns), recording
 
 
-def _preferred(signals: Sequence[Measured]) -> dict[Where, Measured]:
+def _preferred_columns(signals: Sequence[MeasuredSignal]) -> dict[Where, MeasuredSignal]:
     """Return the preferred column for each place: sensor readings first, torques before currents."""
     best = preferred(signals)
     currents = {place: best.pop(place) for place in tuple(best) if place[0] == CURRENT}
     return {(TORQUE, *place[1:]): signal for place, signal in currents.items()} | best
 
 
-def _torque_of_current(robot: Robot, signal: Measured) -> float:
+def _torque_of_current(robot: Robot, signal: MeasuredSignal) -> float:
     """Return the factor that converts a column to torques if it holds currents, otherwise 1."""
     variable, joint, motor, *_ = signal.place
     if variable != CURRENT or motor is None:

@@ -1,8 +1,8 @@
 """Recordings compared with the robot: misnamed columns, delayed torques, and torque gains.
 
 Before a fit, `model_doubts` finds wrong units and signs, exchanged columns and exchanged motors. After it,
-`delay` finds by how much torques lag behind positions, and `gains` finds joints whose parameters all differ
-from the file by one factor.
+`delay` finds by how much torques lag behind positions, and `gain_findings` finds joints whose parameters all
+differ from the file by one factor.
 
 Equations of motors are linear in inertias, dampings, friction and spring coefficients: torques that read 3 %
 too large make all of these 3 % too large, without a residual. No motion distinguishes such a gain from a
@@ -27,7 +27,7 @@ from vsacli.robot.model import Robot
 from vsacli.studies.identification.conditioning import Signals
 from vsacli.studies.identification.estimation import SEPARABLE, Equations, least_squares
 from vsacli.studies.identification.fitted_system import Solution
-from vsacli.studies.identification.identification_text import significant
+from vsacli.studies.identification.identification_text import rounded_by_error
 from vsacli.studies.identification.independence import independence
 from vsacli.studies.identification.link_equations import link_system, without_links
 from vsacli.studies.identification.motor_equations import MOTORS as MOTORS_GROUP
@@ -75,16 +75,16 @@ def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: S
     """
     sprung = [index for index in joints if robot.joints[index].actuator.sprung]
     sprung = [index for index in sprung if (TORQUE, index, MOTORS[0]) in record.columns]
-    torques = [each for index in sprung for each in _torques(robot, index, record, signals)]
+    torques = [each for index in sprung for each in _torque_agreements(robot, index, record, signals)]
     if torques:
         agreements, ratios = zip(*torques, strict=True)
-        yield from likely_causes(_followed(agreements), ratios)
+        yield from likely_causes(_exchanged_torques(agreements), ratios)
     for index in sprung:
         yield from _positions(robot, index, record, signals)
-        yield from _branch(robot, index, signals)
+        yield from _branch_sentences(robot, index, signals)
 
 
-def _followed(torques: Sequence[Agreement]) -> list[Agreement]:
+def _exchanged_torques(torques: Sequence[Agreement]) -> list[Agreement]:
     """Return the torques, with the column whose prediction each follows if columns look exchanged."""
     found, units = list(torques), {torque.unit for torque in torques}
     if len(units) > 1 or len({torque.samples for torque in torques}) > 1:
@@ -123,7 +123,9 @@ def _follows(theta: FloatArray, q: FloatArray, own: float) -> bool:
     return about < FOLLOWS_BETTER * own and about < FOLLOWS * float(np.var(q))
 
 
-def _torques(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[tuple[Agreement, float]]:
+def _torque_agreements(
+    robot: Robot, index: int, record: Record, signals: Signals
+) -> Iterator[tuple[Agreement, float]]:
     """Yield the agreement of each motor's measured torque with its prediction, and the gear ratio."""
     system = MotorSystem(robot, index)
     equations = system.of_record(system.before, signals)
@@ -134,7 +136,7 @@ def _torques(robot: Robot, index: int, record: Record, signals: Signals) -> Iter
         rows = equations.group == name
         computed, measured = equations.predicted[rows], equations.measured[rows]
         yield (
-            _agreement(
+            _torque_agreement(
                 record.columns[TORQUE, index, MOTORS[motor]],
                 (joint.name, MOTORS[motor], VARIABLES[TORQUE].quantity.unit(joint.type)),
                 signals.time[:: signals.filter.stride],
@@ -145,7 +147,7 @@ def _torques(robot: Robot, index: int, record: Record, signals: Signals) -> Iter
         )
 
 
-def _agreement(
+def _torque_agreement(
     column: str,
     whose: tuple[str, int, str],
     time: FloatArray,
@@ -178,7 +180,7 @@ def _agreement(
     )
 
 
-def _branch(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
+def _branch_sentences(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
     """Yield a sentence if most deflections are on another branch than that of the robot."""
     actuator = robot.joints[index].actuator
     if not actuator.commanded or actuator.opposite_branch is None:
@@ -278,7 +280,7 @@ class Factor(NamedTuple):
         return abs(self.value - other) > CERTAIN_FACTOR * self.error
 
     def __str__(self) -> str:
-        return f"{significant(self.value, self.error)} +- {self.error:.2g}"
+        return f"{rounded_by_error(self.value, self.error)} +- {self.error:.2g}"
 
 
 class Gain(NamedTuple):
@@ -293,7 +295,7 @@ class Gain(NamedTuple):
     unreliable: bool
 
 
-def gains(
+def gain_findings(
     robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[Signals]
 ) -> list[Gain]:
     """Return findings on joints whose parameters all differ from the file by one factor.

@@ -16,7 +16,7 @@ from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.recorded_columns import (
     TORQUE,
-    Column,
+    RecordedColumn,
 )
 from vsacli.trajectory.recorded.faults import angle_wraps
 from vsacli.trajectory.recorded.health import column_faults
@@ -44,7 +44,7 @@ CUT_SHARE = 5.0
 sine without noise has 2.4."""
 
 
-def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
+def stopping_faults(columns: Sequence[RecordedColumn], robot: Robot) -> Iterator[str]:
     """Yield sentences on faults that make columns unusable."""
     few = [column for column in columns if len(column.time) < FEWEST_SAMPLES]
     if few:
@@ -54,10 +54,10 @@ def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
     if unit is not None:  # the columns of a file share their times
         yield unit
         return
-    yield from _together((column.name, clause) for column in columns for clause in _gap_clauses(column))
+    yield from _merge_clauses((column.name, clause) for column in columns for clause in _gap_clauses(column))
     if not any(_gap_clauses(column) for column in columns):
-        yield from _apart(columns)
-    yield from _together(
+        yield from _too_short_in_common(columns)
+    yield from _merge_clauses(
         (column.name, clause)
         for column in columns
         if column.place[0] != TORQUE
@@ -66,12 +66,14 @@ def stopping_faults(columns: Sequence[Column], robot: Robot) -> Iterator[str]:
     yield from _still(columns, robot.joint_names)
 
 
-def doubts(columns: Sequence[Column]) -> Iterator[str]:
+def unreliable_fit_sentences(columns: Sequence[RecordedColumn]) -> Iterator[str]:
     """Yield sentences on reasons for an unreliable fit."""
-    yield from _together((column.name, clause) for column in columns for clause in _fault_clauses(column))
+    yield from _merge_clauses(
+        (column.name, clause) for column in columns for clause in _fault_clauses(column)
+    )
 
 
-def _together(clauses: Iterable[tuple[str, str]]) -> Iterator[str]:
+def _merge_clauses(clauses: Iterable[tuple[str, str]]) -> Iterator[str]:
     """Yield a sentence for each clause that columns share."""
     shared: dict[str, list[str]] = {}
     for name, clause in clauses:
@@ -81,7 +83,7 @@ def _together(clauses: Iterable[tuple[str, str]]) -> Iterator[str]:
         yield f"column {first!r}{beside} {clause}"
 
 
-def _too_few(few: Sequence[Column]) -> str:
+def _too_few(few: Sequence[RecordedColumn]) -> str:
     """Return a sentence on columns with too few samples for a fit."""
     fewest = min(few, key=lambda column: len(column.time))
     rows = counted(len(fewest.time), "row")
@@ -89,17 +91,17 @@ def _too_few(few: Sequence[Column]) -> str:
     return f"has {rows}{name}; identification needs at least {FEWEST_SAMPLES}"
 
 
-def _usual_step(column: Column) -> float:
+def _usual_step(column: RecordedColumn) -> float:
     return float(np.median(np.diff(column.time)))
 
 
-def _unit_of_time(column: Column) -> Iterator[str]:
+def _unit_of_time(column: RecordedColumn) -> Iterator[str]:
     """Yield a sentence if the times are probably not in seconds."""
     if not SHORTEST_STEP <= _usual_step(column) <= LONGEST_STEP:
         yield from (f"time {fault.message}" for fault in stamp_faults(column.time))
 
 
-def _gap_clauses(column: Column) -> list[str]:
+def _gap_clauses(column: RecordedColumn) -> list[str]:
     steps, usual = np.diff(column.time), _usual_step(column)
     longest = int(np.argmax(steps))
     if steps[longest] <= GAP_STEPS * usual:
@@ -111,7 +113,7 @@ def _gap_clauses(column: Column) -> list[str]:
     ]
 
 
-def _apart(columns: Sequence[Column]) -> Iterator[str]:
+def _too_short_in_common(columns: Sequence[RecordedColumn]) -> Iterator[str]:
     """Yield a sentence if the columns have too little time in common for a fit."""
     last = max(columns, key=lambda column: column.time[0])
     first = min(columns, key=lambda column: column.time[-1])
@@ -124,7 +126,7 @@ def _apart(columns: Sequence[Column]) -> Iterator[str]:
         )
 
 
-def _position_clauses(column: Column, robot: Robot) -> Iterator[str]:
+def _position_clauses(column: RecordedColumn, robot: Robot) -> Iterator[str]:
     _, index, motor = column.place
     turns = robot.joints[index].is_revolute
     follows = motor is None or robot.joints[index].actuator.has_columns(VARIABLES["phi"])[motor - 1]
@@ -141,7 +143,7 @@ def _position_clauses(column: Column, robot: Robot) -> Iterator[str]:
         )
 
 
-def _still(columns: Sequence[Column], joints: Sequence[str]) -> Iterator[str]:
+def _still(columns: Sequence[RecordedColumn], joints: Sequence[str]) -> Iterator[str]:
     """Yield sentences on joints that do not move, and on constant columns while others of a joint change."""
     resting = []
     for index, joint in enumerate(joints):
@@ -164,7 +166,7 @@ def _still(columns: Sequence[Column], joints: Sequence[str]) -> Iterator[str]:
         )
 
 
-def _fault_clauses(column: Column) -> Iterator[str]:
+def _fault_clauses(column: RecordedColumn) -> Iterator[str]:
     is_torque = column.place[0] == TORQUE
     inner = slice(1, -1) if is_torque else slice(None)  # dry friction jumps at both ends of a motion
     time, values = column.time[inner], column.values[inner]
@@ -173,7 +175,7 @@ def _fault_clauses(column: Column) -> Iterator[str]:
         yield from _cut(column)
 
 
-def _cut(column: Column) -> Iterator[str]:
+def _cut(column: RecordedColumn) -> Iterator[str]:
     """Yield sentences on noisy readings that saturate at the largest or smallest value."""
     quantization = Quantization.of(column.time, column.values)
     if not np.median(quantization.noise) > NOISY * np.ptp(column.values):

@@ -21,11 +21,11 @@ from vsacli.studies.identification.recorded_columns import (
     MOTOR,
     POSITION,
     TORQUE,
-    Column,
+    RecordedColumn,
     Where,
     recorded_columns,
 )
-from vsacli.studies.identification.recording_faults import doubts, stopping_faults
+from vsacli.studies.identification.recording_faults import stopping_faults, unreliable_fit_sentences
 
 INTERPOLATION = 3
 """Degree of the spline that resamples a column."""
@@ -61,7 +61,7 @@ class Record(NamedTuple):
     doubts: tuple[str, ...]
 
 
-def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED) -> Record:
+def read_motor_recording(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED) -> Record:
     """Read a recording, a CSV file with columns named as by `vsacli export`, each at its own rate.
 
     Args:
@@ -87,7 +87,7 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
     }
     for column in columns:
         variable, joint, motor = column.place
-        arrays[variable][:, joint, (motor or 1) - 1] = _on_grid(column, time)
+        arrays[variable][:, joint, (motor or 1) - 1] = _resample_column(column, time)
     for index, joint_ in enumerate(robot.joints):
         if not joint_.actuator.sprung:
             arrays[MOTOR][:, index, 0] = arrays[POSITION][:, index, 0]
@@ -100,7 +100,7 @@ def read_record(robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAME
         tau_motor=arrays[TORQUE],
         columns={column.place: column.name for column in columns},
         unused=unused,
-        doubts=(*filter(None, [recording.stranger]), *doubts(columns)),
+        doubts=(*filter(None, [recording.stranger]), *unreliable_fit_sentences(columns)),
     )
 
 
@@ -119,17 +119,17 @@ def check_distinct(records: Sequence[Record]) -> None:
     for before, record in combinations(records, 2):
         if before.path == record.path:
             problems.append(Problem(record.path, 0, "is given twice; give each recording once"))
-        elif all(map(_same, _values(before), _values(record))):
+        elif all(map(_equal_arrays, _signal_values(before), _signal_values(record))):
             problems.append(Problem(record.path, 0, f"equals {before.path}; give each recording once"))
     if problems:
         raise InputError(problems)
 
 
-def _values(record: Record) -> tuple[FloatArray, ...]:
+def _signal_values(record: Record) -> tuple[FloatArray, ...]:
     return record.q, record.theta, record.tau_motor
 
 
-def _same(before: FloatArray, after: FloatArray) -> bool:
+def _equal_arrays(before: FloatArray, after: FloatArray) -> bool:
     """Return whether arrays, with NaN for missing columns, are equal up to rounding."""
     if before.shape != after.shape or not np.array_equal(np.isnan(before), np.isnan(after)):
         return False
@@ -139,7 +139,7 @@ def _same(before: FloatArray, after: FloatArray) -> bool:
     )
 
 
-def _grid(columns: Sequence[Column]) -> FloatArray:
+def _grid(columns: Sequence[RecordedColumn]) -> FloatArray:
     """Return uniform times at the rate of the fastest column, over the time span common to all columns."""
     fastest = max(columns, key=lambda column: (len(column.time) - 1) / np.ptp(column.time))
     step = float(np.ptp(fastest.time)) / (len(fastest.time) - 1)
@@ -148,7 +148,7 @@ def _grid(columns: Sequence[Column]) -> FloatArray:
     return np.asarray(start + step * np.arange(int((stop - start) / step + EVEN) + 1))
 
 
-def _on_grid(column: Column, time: FloatArray) -> FloatArray:
+def _resample_column(column: RecordedColumn, time: FloatArray) -> FloatArray:
     """Return values at the times of the grid: samples if they lie on it, otherwise a spline through them."""
     step = float(time[1] - time[0])
     first = int(np.argmin(np.abs(column.time - time[0])))
@@ -184,7 +184,7 @@ def complete_joints(robot: Robot, record: Record) -> tuple[int, ...]:
         needed = [place for index in range(len(robot.joints)) for place in _needed(robot, index)]
         lacking = [place for place in needed if place not in record.columns]
     if lacking:
-        raise InputError.one(_lacking(robot, lacking), record.path)
+        raise InputError.one(_missing_columns_text(robot, lacking), record.path)
     return tuple(found)
 
 
@@ -196,7 +196,7 @@ def _needed(robot: Robot, index: int) -> list[Where]:
     return [(POSITION, index, None), *positions, *((TORQUE, index, motor) for motor in motors)]
 
 
-def _lacking(robot: Robot, places: Sequence[Where]) -> str:
+def _missing_columns_text(robot: Robot, places: Sequence[Where]) -> str:
     """Return a sentence on missing columns, by kind."""
     clauses = []
     for variable, words in KINDS.items():

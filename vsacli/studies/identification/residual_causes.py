@@ -81,7 +81,7 @@ SPRING = (
 PLACE = "{name}: what is left depends on its position: a cable, a stop or a weight is not in the file"
 
 
-def causes(
+def residual_causes(
     robot: Robot, found: Solution, records: Sequence[Signals], equations: Sequence[Equations]
 ) -> list[Cause]:
     """Return possible causes of residuals of a joint's motors, or of all links.
@@ -94,10 +94,10 @@ def causes(
     """
     if found.system.title == LINKS:
         return list(_of_links(robot, records, equations))
-    return list(_of_motors(robot, found, records, equations))
+    return list(_motor_causes(robot, found, records, equations))
 
 
-def _of_motors(
+def _motor_causes(
     robot: Robot, found: Solution, records: Sequence[Signals], equations: Sequence[Equations]
 ) -> Iterator[Cause]:
     index = robot.joint_names.index(found.system.title)
@@ -116,7 +116,7 @@ def _of_motors(
         yield Cause(name, OFF, zero, position, FARTHEST)
         yield _bias(name, own, equations, torque)
         of_both = [
-            _gain(name, own, equations),
+            _gain_cause(name, own, equations),
             *_frictions(name, own, records, [each.dtheta[:, index, motor] for each in records]),
             _law(SPRING, name, own, records, _polynomial_terms(pulled, motor, float(pulls[motor]))),
         ]
@@ -140,7 +140,7 @@ def _of_links(robot: Robot, records: Sequence[Signals], equations: Sequence[Equa
         name = f"link of {joint.name}"
         own = [each.group == name for each in equations]
         if any(each.any() for each in own):
-            yield _gain(name, own, equations)
+            yield _gain_cause(name, own, equations)
             yield from _frictions(name, own, records, [each.dq[:, index] for each in records])
             positions = [each.q[:, index][None] for each in records]
             yield _law(PLACE, name, own, records, _polynomial_terms(positions, 0, 1.0))
@@ -154,7 +154,7 @@ def _bias(name: str, own: Sequence[BoolArray], equations: Sequence[Equations], u
     return Cause(name, BIASED, columns, unit, SMALL * largest)
 
 
-def _gain(name: str, own: Sequence[BoolArray], equations: Sequence[Equations]) -> Cause:
+def _gain_cause(name: str, own: Sequence[BoolArray], equations: Sequence[Equations]) -> Cause:
     columns = [(each.predicted * there)[:, None] for each, there in zip(equations, own, strict=True)]
     return Cause(name, GAIN, columns, largest=2 * SMALL, neutral=1.0)
 

@@ -22,7 +22,7 @@ from vsacli.studies.measured.comparison_warnings import Overlap, comparison_warn
 from vsacli.studies.measured.likely_causes import NOTABLE, WILD, exchanged_places, likely_causes, wrong_model
 from vsacli.studies.measured.line_fit import LineFit, fit_line, root_mean_square, still_signal
 from vsacli.studies.measured.measured_columns import (
-    Measured,
+    MeasuredSignal,
     Recording,
     preferred,
     read_recording,
@@ -70,13 +70,15 @@ def compare(
     wanted = stand_ins(_variables(result))
     read = read_recording(recording, result, wanted, result.robot_name, load_columns(columns))
     recorded, behind = _most_direct(read)
-    computed = _interpolated(result, recorded.signals)
+    computed = _interpolate_signals(result, recorded.signals)
     duration = float(result.time[-1] - result.time[0])
     pairings = [
-        Pairing(function, duration, *_sampled(recorded, signal))
+        Pairing(function, duration, *_signal_samples(recorded, signal))
         for function, signal in zip(computed, recorded.signals, strict=True)
     ]
-    alignment = _aligned(recorded, pairings, recording) if time_offset is None else Alignment(time_offset)
+    alignment = (
+        _align_recording(recorded, pairings, recording) if time_offset is None else Alignment(time_offset)
+    )
     overlap = _overlap(recorded.time, alignment.time_offset, duration, recording)
     signals = _agreements(result, recorded, pairings, alignment)
     ratios = _gear_ratios(recorded, result)
@@ -85,7 +87,7 @@ def compare(
         *_common_lag(signals, alignment.time_offset),
         *likely_causes(signals, ratios),
         *wrong_model(signals, ratios),
-        *_left_out(recorded, behind),
+        *_columns_left_out(recorded, behind),
     )
     return Comparison(
         result=str(result.path),
@@ -120,7 +122,7 @@ def _most_direct(recorded: Recording) -> tuple[Recording, list[str]]:
     return recorded._replace(signals=kept), behind
 
 
-def _sampled(recorded: Recording, signal: Measured) -> tuple[FloatArray, FloatArray]:
+def _signal_samples(recorded: Recording, signal: MeasuredSignal) -> tuple[FloatArray, FloatArray]:
     """Return times and values of a signal, without rows in which it has none."""
     there = np.isfinite(signal.values)
     if np.count_nonzero(there) < FEWEST_SAMPLES and not there.all():
@@ -130,7 +132,7 @@ def _sampled(recorded: Recording, signal: Measured) -> tuple[FloatArray, FloatAr
     return recorded.time[there], signal.values[there]
 
 
-def _interpolated(result: StoredResult, signals: Sequence[Measured]) -> list[Computed]:
+def _interpolate_signals(result: StoredResult, signals: Sequence[MeasuredSignal]) -> list[Computed]:
     """Return each computed signal as a function of the time since the start of the result."""
     found, time = [], result.time - result.time[0]
     names = {signal.place.variable for signal in signals}
@@ -145,8 +147,8 @@ def _interpolated(result: StoredResult, signals: Sequence[Measured]) -> list[Com
     return found
 
 
-def _aligned(recorded: Recording, pairings: Sequence[Pairing], path: str | Path) -> Alignment:
-    groups = [_group(signal) for signal in recorded.signals]
+def _align_recording(recorded: Recording, pairings: Sequence[Pairing], path: str | Path) -> Alignment:
+    groups = [_exchange_group(signal) for signal in recorded.signals]
     of_positions = [signal.place.variable.startswith(POSITIONS) for signal in recorded.signals]
     positions = align(list(compress(pairings, of_positions)), list(compress(groups, of_positions)))
     alignment = positions or align(pairings, groups)
@@ -159,7 +161,7 @@ def _aligned(recorded: Recording, pairings: Sequence[Pairing], path: str | Path)
     return alignment
 
 
-def _group(signal: Measured) -> tuple[str, str]:
+def _exchange_group(signal: MeasuredSignal) -> tuple[str, str]:
     """Return the key of a group of columns that may have been exchanged with each other."""
     return signal.place.variable, signal.place.unit
 
@@ -195,19 +197,19 @@ def _agreements(
     result: StoredResult, recorded: Recording, pairings: Sequence[Pairing], alignment: Alignment
 ) -> tuple[Agreement, ...]:
     """Return the agreement of every column with the result."""
-    groups = [_group(signal) for signal in recorded.signals]
+    groups = [_exchange_group(signal) for signal in recorded.signals]
     places = exchanged_places(pairings, groups, alignment.time_offset)
     followed = [
         None if place == index else recorded.signals[place].column for index, place in enumerate(places)
     ]
     return tuple(
-        _agreement(result, signal, pairing, alignment, follows)
+        _signal_agreement(result, signal, pairing, alignment, follows)
         for signal, pairing, follows in zip(recorded.signals, pairings, followed, strict=True)
     )
 
 
-def _agreement(
-    result: StoredResult, signal: Measured, pairing: Pairing, alignment: Alignment, follows: str | None
+def _signal_agreement(
+    result: StoredResult, signal: MeasuredSignal, pairing: Pairing, alignment: Alignment, follows: str | None
 ) -> Agreement:
     computed, there = pairing.overlap(alignment.time_offset)
     time, computed = (pairing.time - alignment.time_offset)[there], computed[there]
@@ -277,7 +279,7 @@ def _gear_ratios(recorded: Recording, result: StoredResult) -> list[float]:
     ]
 
 
-def _left_out(recorded: Recording, behind: Sequence[str]) -> Iterator[str]:
+def _columns_left_out(recorded: Recording, behind: Sequence[str]) -> Iterator[str]:
     commanded = [column for column in recorded.table.unknown_columns if role_of(column)[0] == COMMANDED]
     unknown = [column for column in recorded.table.unknown_columns if column not in commanded]
     if behind:

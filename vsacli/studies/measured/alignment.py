@@ -85,8 +85,8 @@ def align(pairings: Sequence[Pairing], groups: Sequence[object]) -> Alignment | 
     groups = [group for group, moves in zip(groups, moving, strict=True) if moves]
     if not pairings:
         return None
-    candidates, others = _search(pairings)
-    refined = [_refined(pairings, groups, each, _step(pairings)) for each in candidates]
+    candidates, others = _search_shifts(pairings)
+    refined = [_refined(pairings, groups, each, _grid_step(pairings)) for each in candidates]
     if not refined:
         return None
     _, shift, paired = min(refined, key=lambda each: each[0])
@@ -96,10 +96,10 @@ def align(pairings: Sequence[Pairing], groups: Sequence[object]) -> Alignment | 
     return Alignment(shift, error, others if len(candidates) > 1 else ())
 
 
-def _search(pairings: Sequence[Pairing]) -> tuple[list[float], tuple[float, ...]]:
+def _search_shifts(pairings: Sequence[Pairing]) -> tuple[list[float], tuple[float, ...]]:
     """Return the shifts of the lowest minima in order, and those that are as good as the first."""
-    step = _step(pairings)
-    shifts, left = _on_grid(pairings, step)
+    step = _grid_step(pairings)
+    shifts, left = _unexplained_on_grid(pairings, step)
     minima = np.flatnonzero((left < np.roll(left, 1)) & (left <= np.roll(left, -1)) & (left < 0))
     chosen: list[int] = []
     for index in minima[np.argsort(left[minima])].tolist():
@@ -111,13 +111,13 @@ def _search(pairings: Sequence[Pairing]) -> tuple[list[float], tuple[float, ...]
     return [float(shifts[each]) for each in chosen], tuple(others)
 
 
-def _step(pairings: Sequence[Pairing]) -> float:
+def _grid_step(pairings: Sequence[Pairing]) -> float:
     """Return the step of the grid: the shortest sampling interval, unless the grid would be too large."""
     span = pairings[0].duration + max(float(pairing.time[-1]) for pairing in pairings)
     return max(min(float(np.median(np.diff(each.time))) for each in pairings), span / MOST_POINTS)
 
 
-def _on_grid(pairings: Sequence[Pairing], step: float) -> tuple[FloatArray, FloatArray]:
+def _unexplained_on_grid(pairings: Sequence[Pairing], step: float) -> tuple[FloatArray, FloatArray]:
     """Return the shifts of the grid, and the mean unexplained part of all columns at each."""
     grid = np.arange(0.0, pairings[0].duration + step / 2, step)
     last = max(float(pairing.time[-1]) for pairing in pairings)
@@ -130,7 +130,7 @@ def _on_grid(pairings: Sequence[Pairing], step: float) -> tuple[FloatArray, Floa
 def _by_shift(pairing: Pairing, grid: FloatArray, recorded: FloatArray) -> FloatArray:
     """Return the unexplained part of one column at every shift, (len(grid) + len(recorded) - 1,)."""
     tamed, computed = tame(pairing.measured), pairing.computed.at(grid)
-    there, known = np.isfinite(computed), _known(pairing.time, recorded)
+    there, known = np.isfinite(computed), _sampled_mask(pairing.time, recorded)
     middle, center = float(np.nanmean(computed)), float(np.mean(tamed))
     first = np.where(there, computed - middle, 0.0)
     second = np.where(known, np.interp(recorded, pairing.time, tamed) - center, 0.0)
@@ -151,7 +151,7 @@ def _by_shift(pairing: Pairing, grid: FloatArray, recorded: FloatArray) -> Float
     return np.where(count >= needed, np.clip(covered, 0, 1) * unlikeness(moments, exactness(tamed)), 0.0)
 
 
-def _known(time: FloatArray, recorded: FloatArray) -> BoolArray:
+def _sampled_mask(time: FloatArray, recorded: FloatArray) -> BoolArray:
     """Return a mask of the grid points between consecutive samples without a gap."""
     steps = np.diff(time)
     follows = np.append(steps <= LONGEST_STEP * np.median(steps), True)
@@ -179,7 +179,9 @@ def _refined(
     tamed = [tame(each.measured) for each in thin]
 
     def left(pairs: Sequence[Pairing], candidate: float) -> float:
-        return float(np.mean([_left(*each, candidate) for each in zip(pairs, tamed, exact, strict=True)]))
+        return float(
+            np.mean([_unexplained_part(*each, candidate) for each in zip(pairs, tamed, exact, strict=True)])
+        )
 
     found = scipy.optimize.minimize_scalar(
         lambda at: left(thin, at),
@@ -195,7 +197,7 @@ def _refined(
     return unexplained, best, paired
 
 
-def _left(pairing: Pairing, tamed: FloatArray, exact: float, shift: float) -> float:
+def _unexplained_part(pairing: Pairing, tamed: FloatArray, exact: float, shift: float) -> float:
     """Return the unexplained part of one column at a shift."""
     moments = moments_of(pairing.overlap(shift)[0], tamed)
     if moments.samples < FEWEST_SAMPLES:

@@ -70,7 +70,7 @@ def comparison_warnings(
         rows = counted(overlap.rows, "row")
         yield f"only {overlap.duration:.3g} s ({rows}) of {overlap.whole:.4g} s overlap"
     if result.verdict in WITHOUT_TORQUES:
-        yield f"{result.path} is {result.verdict}{_samples(result)}; its motors are not compared there"
+        yield f"{result.path} is {result.verdict}{_lost_torques(result)}; its motors are not compared there"
 
 
 def _poor_fit(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
@@ -91,7 +91,7 @@ def _poor_fit(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Ite
     )
 
 
-def _samples(result: StoredResult) -> str:
+def _lost_torques(result: StoredResult) -> str:
     """Return at how many samples motor torques are missing, if the result has flags; otherwise ""."""
     if "flags" not in result.variables:
         return ""

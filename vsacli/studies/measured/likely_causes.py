@@ -60,7 +60,9 @@ def exchanged(
     """
     if len(measured) < 2:
         return []
-    costs = np.array([_costs(values, exact[row], computed(row)) for row, values in enumerate(measured)])
+    costs = np.array(
+        [_unexplained_parts(values, exact[row], computed(row)) for row, values in enumerate(measured)]
+    )
     rows, columns = scipy.optimize.linear_sum_assignment(costs)
     moved = rows != columns
     left, own = costs[rows, columns][moved], np.diag(costs)[moved]
@@ -82,7 +84,7 @@ def _reversed(
 
 
 @np.errstate(all="ignore")  # constant signals explain nothing
-def _costs(measured: FloatArray, exact: float, computed: Sequence[FloatArray]) -> FloatArray:
+def _unexplained_parts(measured: FloatArray, exact: float, computed: Sequence[FloatArray]) -> FloatArray:
     """Return the unexplained part of measured values for each computed signal, (signals,)."""
     moments = [moments_of(each, tame(measured)) for each in computed]
     if min(float(each.samples) for each in moments) < FEWEST_SAMPLES:

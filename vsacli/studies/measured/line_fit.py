@@ -103,7 +103,7 @@ class LineFit(NamedTuple):
     used: BoolArray = np.zeros(0, dtype=bool)
 
 
-class _Step(NamedTuple):
+class _LineStep(NamedTuple):
     """A least-squares solution at one lag: unknowns, covariance, correlation, and mask of used samples."""
 
     unknowns: FloatArray
@@ -120,18 +120,18 @@ def fit_line(pairing: Pairing, shift: float) -> LineFit:
         pairing: computed and measured values.
         shift: time in the recording at which the result begins, s.
     """
-    at_shift = _step(pairing, shift)
+    at_shift = _line_step(pairing, shift)
     if at_shift is None:
         return LineFit()
-    return _line(pairing, *(_lagging(pairing, shift, at_shift) or (at_shift, math.nan)))
+    return _line_with_errors(pairing, *(_lagging(pairing, shift, at_shift) or (at_shift, math.nan)))
 
 
-def _lagging(pairing: Pairing, shift: float, start: _Step) -> tuple[_Step, float] | None:
+def _lagging(pairing: Pairing, shift: float, start: _LineStep) -> tuple[_LineStep, float] | None:
     """Return the line and its lag; None if they are not determined."""
     bound, lag, step = LAG_SHARE * pairing.duration, 0.0, start
     change, error = math.inf, 0.0
     for _ in range(MOST_STEPS):
-        found = _step(pairing, shift + lag, float(step.unknowns[1]))
+        found = _line_step(pairing, shift + lag, float(step.unknowns[1]))
         if found is None or not math.isfinite(found.covariance[2, 2]):
             return None
         change, error = float(found.unknowns[2]), _lag_error(pairing, found)
@@ -143,13 +143,13 @@ def _lagging(pairing: Pairing, shift: float, start: _Step) -> tuple[_Step, float
     return (step, lag) if abs(change) <= error else None  # may alternate as samples enter at the ends
 
 
-def _lag_error(pairing: Pairing, step: _Step) -> float:
+def _lag_error(pairing: Pairing, step: _LineStep) -> float:
     """Return the standard error of a lag, with the interpolation error of the computed signal."""
     slope = pairing.computed.slope(np.linspace(0.0, pairing.duration, len(pairing.time)))
     return math.hypot(math.sqrt(step.covariance[2, 2]), pairing.computed.error / math.sqrt(np.mean(slope**2)))
 
 
-def _step(pairing: Pairing, shift: float, gain: float | None = None) -> _Step | None:
+def _line_step(pairing: Pairing, shift: float, gain: float | None = None) -> _LineStep | None:
     """Return the least-squares solution at a shift; None if samples do not determine the unknowns.
 
     Args:
@@ -165,14 +165,14 @@ def _step(pairing: Pairing, shift: float, gain: float | None = None) -> _Step | 
         columns.append(-gain * pairing.computed.slope((pairing.time - shift)[there]))
     design, measured = np.stack(columns, axis=1), np.clip(pairing.measured[there], -LARGEST, LARGEST)
     kept = _usual_rows(design, tame(pairing.measured)[there], measured)
-    unknowns = None if kept is None else _solved(design[kept], measured[kept])
+    unknowns = None if kept is None else _solve_scaled(design[kept], measured[kept])
     if kept is None or unknowns is None:
         return None
     used = there.copy()
     used[there] = kept
-    return _Step(
+    return _LineStep(
         unknowns,
-        _covariance(design[kept], measured[kept] - design[kept] @ unknowns),
+        _line_covariance(design[kept], measured[kept] - design[kept] @ unknowns),
         float(np.corrcoef(design[kept, 1], measured[kept])[0, 1]),
         used,
     )
@@ -184,7 +184,7 @@ def _usual_rows(design: FloatArray, tamed: FloatArray, measured: FloatArray) -> 
     few = max(1, math.ceil(FEW * len(design)))
     kept, values = np.ones(len(design), dtype=bool), tamed
     for _ in range(TRIALS):
-        unknowns = _solved(design[kept], values[kept])
+        unknowns = _solve_scaled(design[kept], values[kept])
         if unknowns is None:
             return None
         size, values = np.abs(measured - design @ unknowns), measured
@@ -193,7 +193,7 @@ def _usual_rows(design: FloatArray, tamed: FloatArray, measured: FloatArray) -> 
     return kept
 
 
-def _solved(design: FloatArray, values: FloatArray) -> FloatArray | None:
+def _solve_scaled(design: FloatArray, values: FloatArray) -> FloatArray | None:
     """Return the least-squares solution with scaled columns; None if the columns are dependent."""
     sizes = np.linalg.norm(design, axis=0)
     if len(design) <= design.shape[1] or not np.all(sizes > 0):
@@ -202,7 +202,7 @@ def _solved(design: FloatArray, values: FloatArray) -> FloatArray | None:
     return np.asarray(solution / sizes) if rank == design.shape[1] else None
 
 
-def _covariance(design: FloatArray, residual: FloatArray) -> FloatArray:
+def _line_covariance(design: FloatArray, residual: FloatArray) -> FloatArray:
     """Return the covariance of the unknowns for white or for colored residuals, whichever is larger."""
     sizes = np.linalg.norm(design, axis=0)
     scaled = design / sizes
@@ -222,7 +222,7 @@ def _covariance(design: FloatArray, residual: FloatArray) -> FloatArray:
     return np.asarray(white * np.outer(larger, larger) / np.outer(sizes, sizes))
 
 
-def _line(pairing: Pairing, step: _Step, lag: float) -> LineFit:
+def _line_with_errors(pairing: Pairing, step: _LineStep, lag: float) -> LineFit:
     """Return a line with its standard errors, including interpolation; a lag of NaN is unknown."""
     offset, gain = (float(each) for each in step.unknowns[:2])
     error, deviations = pairing.computed.error, np.sqrt(np.diag(step.covariance))

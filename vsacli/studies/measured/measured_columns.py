@@ -78,7 +78,7 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredSignal:
     """A recorded signal.
 
     Attributes:
@@ -103,7 +103,7 @@ class Recording(NamedTuple):
     """
 
     time: FloatArray
-    signals: tuple[Measured, ...]
+    signals: tuple[MeasuredSignal, ...]
     table: CsvTable
     stranger: str
 
@@ -147,7 +147,9 @@ def read_recording(
         raise InputError(Problem(table.source.path, table.header.line, text) for text in problems)
     order = {name: number for number, name in enumerate(places)}
     signals = [
-        Measured(name, places[name], _scaled(table.values[:, index], factors[index] * places[name].gear))
+        MeasuredSignal(
+            name, places[name], _scaled_values(table.values[:, index], factors[index] * places[name].gear)
+        )
         for index, name in enumerate(names)
         if name in places
     ]
@@ -187,17 +189,19 @@ def known_columns(jointed: Jointed, named: Iterable[tuple[str, int, Variable]]) 
         column: place
         for name, rank, variable in named
         if "joint" in variable.dims and variable.name != "flags"
-        for column, place in _names(jointed, name, rank, variable)
+        for column, place in _names_and_places(jointed, name, rank, variable)
     }
 
 
-def preferred(signals: Iterable[Measured]) -> dict[tuple[str, int, int | None], Measured]:
+def preferred(signals: Iterable[MeasuredSignal]) -> dict[tuple[str, int, int | None], MeasuredSignal]:
     """Return the most direct column for each variable of a joint or motor."""
     ranked = sorted(signals, key=lambda signal: signal.place.rank)
     return {signal.place.target: signal for signal in ranked}
 
 
-def _names(jointed: Jointed, name: str, rank: int, variable: Variable) -> Iterator[tuple[str, Place]]:
+def _names_and_places(
+    jointed: Jointed, name: str, rank: int, variable: Variable
+) -> Iterator[tuple[str, Place]]:
     """Yield names and places of the columns of a variable, for the joints and motors that have it."""
     of_motors = "motor" in variable.dims
     for joint, there in enumerate(jointed.existing(variable)):
@@ -273,7 +277,7 @@ def _no_column(header: ColumnNames, places: Mapping[str, Place]) -> str:
 
 
 @np.errstate(over="ignore")  # an overflow to infinity means a missing sample
-def _scaled(values: FloatArray, factor: float) -> FloatArray:
+def _scaled_values(values: FloatArray, factor: float) -> FloatArray:
     return np.asarray(values * factor)
 
 

@@ -25,7 +25,7 @@ from vsacli.dynamics.inverse import compute_block, usual_block
 from vsacli.dynamics.limits import MARGIN, Finding, limit_checks, limit_flags, worst_excess
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.search.loads import Instants, Load, TaskSamples, evenly_chosen, joined
+from vsacli.studies.search.loads import Instants, Load, TaskSamples, concatenate_task_samples, evenly_chosen
 from vsacli.studies.search.recorded_limits import RecordedLimits
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -119,7 +119,7 @@ class Acceptance:
         parts = [evenly_chosen(trajectory, steps)]
         if self.between.size:
             parts.append(TaskSamples.between(trajectory, self.between))
-        return joined(parts)
+        return concatenate_task_samples(parts)
 
     def refused_joints(self, trajectory: Trajectory, factor: float = 1.0) -> BoolArray:
         """Return a mask of the joints with a sample that is not accepted, (joints,)."""

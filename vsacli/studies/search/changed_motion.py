@@ -158,7 +158,7 @@ def as_one_function(trajectory: Trajectory) -> Trajectory:
     """
     if trajectory.estimates or not trajectory.known_between:
         return trajectory
-    divided = (trajectory if parts == 1 else _divided(trajectory, parts) for parts in PARTS)
+    divided = (trajectory if parts == 1 else _refined_motion(trajectory, parts) for parts in PARTS)
     return next((each for each in divided if reads_back(each)), trajectory)
 
 
@@ -171,7 +171,7 @@ def reads_back(trajectory: Trajectory) -> bool:
     )
 
 
-def _divided(trajectory: Trajectory, parts: int) -> Trajectory:
+def _refined_motion(trajectory: Trajectory, parts: int) -> Trajectory:
     """Return the same functions sampled more finely; closed forms remain closed forms."""
     steps = trajectory.times.block(0, trajectory.samples)
     shares = np.arange(parts) / parts

@@ -24,7 +24,7 @@ from vsacli.studies.search.fix_report import Fix
 from vsacli.studies.search.loads import Load, joint_loads, periods, rests
 from vsacli.studies.search.optimum import JointOptimum, Optimum
 from vsacli.studies.search.splines import SplineSpace
-from vsacli.studies.search.stiffness import Profile, StiffnessSearch
+from vsacli.studies.search.stiffness import OptimizedStiffness, StiffnessSearch
 from vsacli.studies.search.task import Task
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -118,8 +118,8 @@ def cheapest_stiffness(
 class Found(NamedTuple):
     """The best profiles and best constants, by joint index, and the trajectory with the best profiles."""
 
-    best: dict[int, Profile]
-    constant: dict[int, Profile | None]
+    best: dict[int, OptimizedStiffness]
+    constant: dict[int, OptimizedStiffness | None]
     trajectory: Trajectory
 
 
@@ -175,8 +175,8 @@ class CheapestStiffness:
         """
         robot, reasons = acceptance.robot, list(self._reasons_of_others())
         loads = joint_loads(robot, self._trajectory, self._joints, between=self._between(acceptance))
-        best: dict[int, Profile] = {}
-        constant: dict[int, Profile | None] = {}
+        best: dict[int, OptimizedStiffness] = {}
+        constant: dict[int, OptimizedStiffness | None] = {}
         for index, load in zip(self._joints, loads, strict=True):
             try:
                 constant[index], best[index] = self._of_joint(acceptance, index, load)
@@ -239,7 +239,9 @@ class CheapestStiffness:
     def _criterion_of(self, index: int) -> Criterion:
         return type(self._criterion)(repeating=self._periods[index] > 0)
 
-    def _of_joint(self, acceptance: Acceptance, index: int, load: Load) -> tuple[Profile | None, Profile]:
+    def _of_joint(
+        self, acceptance: Acceptance, index: int, load: Load
+    ) -> tuple[OptimizedStiffness | None, OptimizedStiffness]:
         """Return the best constant, if there is one, and the best profile of a joint over one period."""
         steps = np.arange(len(load.time))[load.steps][: self._steps_of_period(index) + 1]
         period = replace(load.at(slice(steps[-1] + 1)), steps=steps)
@@ -259,7 +261,7 @@ class CheapestStiffness:
     def _steps_of_period(self, index: int) -> int:
         return (self._trajectory.samples - 1) // max(self._periods[index], 1)
 
-    def _with_stiffness(self, profiles: Mapping[int, Profile]) -> Trajectory:
+    def _with_stiffness(self, profiles: Mapping[int, OptimizedStiffness]) -> Trajectory:
         """Return the motion with other stiffness profiles, given by joint index."""
         commanded = self._trajectory.block(0, self._trajectory.samples).commanded
         changes = {}

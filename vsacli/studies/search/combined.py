@@ -20,7 +20,7 @@ from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffness
-from vsacli.studies.search.loads import Instants, Load, TaskSamples, joined
+from vsacli.studies.search.loads import Instants, Load, TaskSamples, concatenate_task_samples
 from vsacli.studies.search.path_commands import PathCommands, Speeds
 from vsacli.studies.search.scans import FACTORS_AT_ONCE, FIRST_STEPS, LARGEST_FACTOR, WATCHED_STEPS, Factors
 from vsacli.studies.search.task import Combination, Form, Task, branch_path, constant_change
@@ -55,7 +55,7 @@ class CombinedSearch:
     def __init__(self, task: Task, form: Form = constant_change, *, branches: bool = False) -> None:
         self.task, self.form = task, form
         watched = task.acceptance.watched(task.trajectory, WATCHED_STEPS)
-        self._choices = _choices(task.acceptance.robot, watched if branches else None)
+        self._choices = _branch_variants(task.acceptance.robot, watched if branches else None)
         self._factors = Factors.of(task.trajectory)
         self._watch(watched)
         self._impossible = task.impossible.setdefault((form, branches), set())
@@ -87,7 +87,7 @@ class CombinedSearch:
             refused = None if found is None or self.form is not constant_change else self._refused(found)
             if refused is None:
                 return found
-            self._watch(joined([self._watched, refused]))
+            self._watch(concatenate_task_samples([self._watched, refused]))
         return None
 
     def _watch(self, part: TaskSamples) -> None:
@@ -190,7 +190,7 @@ class CombinedSearch:
         # limits allow for the noise of a recording, which the admissible range does not know
         if self.form is constant_change and not self.task.trajectory.estimates and numbers:
             few = self._watched.select(evenly(len(self._watched.factor), BOUNDING_STEPS))
-            part = joined(few.slowed(self._factors.factor(each)) for each in numbers)
+            part = concatenate_task_samples(few.slowed(self._factors.factor(each)) for each in numbers)
             of_joints = self._least_of_joints(part.loads(self.task.acceptance.robot), len(numbers))
             least = [math.hypot(own, *of_joint) for own, of_joint in zip(least, of_joints.T, strict=True)]
         return {number: bound for number, bound in zip(numbers, least, strict=True) if bound < math.inf}
@@ -220,7 +220,9 @@ class CombinedSearch:
         numbers, found = list(self._scanned()), set[int]()
         for start in range(0, len(numbers), FACTORS_AT_ONCE):
             tried = numbers[start : start + FACTORS_AT_ONCE]
-            impossible = self._refusing(joined(few.slowed(self._factors.factor(each)) for each in tried))
+            impossible = self._refusing(
+                concatenate_task_samples(few.slowed(self._factors.factor(each)) for each in tried)
+            )
             of_factors = impossible.reshape(len(tried), -1).any(axis=1)
             found.update(tried[index] for index in np.flatnonzero(of_factors).tolist())
             if not of_factors.all():
@@ -347,7 +349,7 @@ def _least_offsets(joint: Joint, load: Load, min_margin: float, parts: int) -> F
     return np.where(impossible, np.inf, np.maximum(np.maximum(rise, -fall), 0.0))
 
 
-def _choices(robot: Robot, watched: TaskSamples | None) -> list[dict[str, Joint]]:
+def _branch_variants(robot: Robot, watched: TaskSamples | None) -> list[dict[str, Joint]]:
     """Return the variants of each joint by branch; the key "" is the unchanged joint.
 
     Args:

@@ -197,7 +197,7 @@ class Torque(Criterion):
         self, joint: Joint, driven: JointVariables, _level: Values | None, scale: Scale
     ) -> Sequence[Any]:
         """Return the mean square of the motor torques."""
-        torques = _of_motors(joint, driven.tau_motor)
+        torques = _motor_rows(joint, driven.tau_motor)
         return [sum(torque * torque for torque in torques) / (len(torques) * scale.cost**2)]
 
     def weights(self, time: FloatArray) -> FloatArray:
@@ -238,7 +238,7 @@ class CopperLoss(Criterion):
         self, joint: Joint, driven: JointVariables, _level: Values | None, scale: Scale
     ) -> Sequence[Any]:
         """Return the copper loss of all motors."""
-        return [sum(_of_motors(joint, driven.copper_loss)) / scale.cost]
+        return [sum(_motor_rows(joint, driven.copper_loss)) / scale.cost]
 
     def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the heat, J."""
@@ -267,7 +267,7 @@ class Energy(Criterion):
     ) -> Sequence[Any]:
         """Return the smoothed positive part of the motor power, and the energy in the springs."""
         width = scale.smoothing * scale.cost / scale.duration
-        powers = _of_motors(joint, driven.motor_power)
+        powers = _motor_rows(joint, driven.motor_power)
         positive = [(power + np.sqrt(power * power + width * width)) / 2 for power in powers]
         return [sum(positive) / scale.cost, driven.elastic_energy / scale.cost]
 
@@ -279,7 +279,7 @@ class Energy(Criterion):
 
     def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the energy, J."""
-        spent = sum(np.maximum(power, 0.0) for power in _of_motors(joint, driven.motor_power))
+        spent = sum(np.maximum(power, 0.0) for power in _motor_rows(joint, driven.motor_power))
         return float(np.sum(self.weights(time) * np.stack([spent, driven.elastic_energy])))
 
     def of_run(self, run: MotorsOfRun, index: int) -> float:
@@ -289,7 +289,7 @@ class Energy(Criterion):
 
     def size(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the absolute work of the motors, since their positive work may be zero."""
-        passed = sum(map(np.abs, _of_motors(joint, driven.motor_power)))
+        passed = sum(map(np.abs, _motor_rows(joint, driven.motor_power)))
         return float(trapezoidal(time) @ passed) or 1.0
 
 
@@ -321,12 +321,12 @@ class Peak(Criterion):
         self, joint: Joint, driven: JointVariables, level: Values | None, scale: Scale
     ) -> Sequence[Any]:
         """Return the excess of each torque, in both directions, over the level."""
-        torques = _of_motors(joint, driven.tau_motor)
+        torques = _motor_rows(joint, driven.tau_motor)
         return [sign * torque / scale.cost - level for torque in torques for sign in (1.0, -1.0)]
 
     def of(self, joint: Joint, driven: JointVariables, _time: FloatArray) -> float:
         """Return the peak torque, N m (N)."""
-        return float(max(np.abs(torque).max() for torque in _of_motors(joint, driven.tau_motor)))
+        return float(max(np.abs(torque).max() for torque in _motor_rows(joint, driven.tau_motor)))
 
     def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the peak torque, N m (N)."""
@@ -386,7 +386,7 @@ def made_to_carry(joint: Joint, directions: int, *, moving_corridor: bool) -> Jo
     return carrying
 
 
-def _of_motors(joint: Joint, variable: Any) -> list[Any]:
+def _motor_rows(joint: Joint, variable: Any) -> list[Any]:
     """Return the rows of the motors that the joint has."""
     return [variable[motor] for motor in range(joint.actuator.motor_count)]
 

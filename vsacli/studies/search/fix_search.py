@@ -88,13 +88,13 @@ def fixes(
     found_causes = dict(causes(asked))
     with progress(len(ALONE) + len(COMBINED)) as bar:
         searches = Countdown(bar.update, len(ALONE) + len(COMBINED))
-        tried = _tried(asked, found_causes, searches)
+        tried = _search_fixes(asked, found_causes, searches)
         if not tried.chosen and any(cause.fixable for cause in found_causes.values()):
             found_causes = {
                 index: replace(cause, fixable=cause.fixable and is_fixable(asked, index))
                 for index, cause in found_causes.items()
             }
-            tried = _tried(asked, found_causes, searches)
+            tried = _search_fixes(asked, found_causes, searches)
         searches.finish()
     return Fixes(
         min_margin,
@@ -126,23 +126,23 @@ class _Tried(NamedTuple):
         return any(each.longer > 0 for each in candidates)
 
 
-def _tried(task: Task, found_causes: Mapping[int, Finding], searches: Countdown) -> _Tried:
+def _search_fixes(task: Task, found_causes: Mapping[int, Finding], searches: Countdown) -> _Tried:
     """Search for fixes of all joints that can be fixed."""
     hopeless = frozenset(index for index, cause in found_causes.items() if not cause.fixable)
     if hopeless == found_causes.keys():
         reasons = NotPossible(tuple(map(str, found_causes.values())))
         return _Tried({name: reasons for name in ALONE if name != "transition"}, [], [])
     asked = Task(replace(task.acceptance, ignored=hopeless), task.trajectory, task.cost)
-    tried = _searched(asked, searches)
+    tried = _search_and_confirm(asked, searches)
     # new samples between the recorded ones may exceed a position limit that these keep, at any speed
     lost = not tried.chosen or (tried.slower(tried.failed) and not tried.slower(tried.chosen))
     if lost and isinstance(task.trajectory.times, RecordedTimes):
-        at_samples = _searched(replace(asked, keeps_rate=False), searches)
+        at_samples = _search_and_confirm(replace(asked, keeps_rate=False), searches)
         return at_samples if at_samples.chosen else tried
     return tried
 
 
-def _searched(asked: Task, progress: Countdown) -> _Tried:
+def _search_and_confirm(asked: Task, progress: Countdown) -> _Tried:
     """Run all searches; repeat those whose fix a run refuses, with the refused instants as samples."""
     searches = {**ALONE, **COMBINED}
     if not has_transitions(asked.trajectory):
@@ -183,7 +183,7 @@ def _constants(task: Task) -> Iterator[Fix]:
     return (task.with_constants(found) for found in combinations if found is not None)
 
 
-def _profiles(task: Task) -> Iterator[Fix]:
+def _profile_fixes(task: Task) -> Iterator[Fix]:
     least = CombinedSearch(task, least_change)
     profiles = list(_with_profiles(task, least.smallest(), least.fastest()))
     yield from profiles or _with_profiles(task, CombinedSearch(task).smallest())
@@ -217,7 +217,7 @@ ALONE: Mapping[str, _Search] = {
 
 COMBINED: Mapping[str, _Search] = {
     "constants": _constants,
-    "profiles": _profiles,
+    "profiles": _profile_fixes,
     "branches": _other_branches,
 }
 """Searches for fixes that may combine several kinds of change."""
@@ -272,7 +272,7 @@ def causes(task: Task) -> Iterator[tuple[int, Finding]]:
 
 def is_fixable(task: Task, index: int) -> bool:
     """Return whether any kind of change fixes a joint, with the other joints ignored."""
-    alone = _alone(task, index)
+    alone = _single_joint_task(task, index)
     if CombinedSearch(alone, branches=True).possible():
         return True
     with suppress(ImpossibleError):
@@ -283,7 +283,7 @@ def is_fixable(task: Task, index: int) -> bool:
     return False
 
 
-def _alone(task: Task, index: int) -> Task:
+def _single_joint_task(task: Task, index: int) -> Task:
     """Return the task with all other joints ignored."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
     return Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
@@ -307,12 +307,12 @@ def _cause(task: Task, index: int, moving: Load, resting: Load) -> Finding:
     except ImpossibleError:
         why = f"no slower motion and no constant stiffness helps{_in_the_way(acceptance, joint, resting)}"
         return replace(found, advice=why)
-    return replace(found, advice=_constant(task, index, moving), fixable=True)
+    return replace(found, advice=_constant_fix_text(task, index, moving), fixable=True)
 
 
-def _constant(task: Task, index: int, moving: Load) -> str:
+def _constant_fix_text(task: Task, index: int, moving: Load) -> str:
     """Return the constant stiffness that fixes a joint, as a run confirms, or the constant addition to it."""
-    alone = _alone(task, index)
+    alone = _single_joint_task(task, index)
 
     def attempt(rule: Acceptance) -> tuple[float, FloatArray | None]:
         found = replace(alone, acceptance=rule).constants()

@@ -60,7 +60,7 @@ def write_fixed(fix: Fix, path: str | Path, outputs: Outputs) -> None:
     """
     document, table, robot = fixed_paths(path)
     trajectory, names = fix.declared, fix.robot.joint_names
-    declared = _declared(trajectory, table.name)
+    declared = _signal_declarations(trajectory, table.name)
     recorded = [signal for signal, keys in declared.items() if keys["type"] == "csv"]
     beside = None
     if recorded:
@@ -77,7 +77,7 @@ def write_fixed(fix: Fix, path: str | Path, outputs: Outputs) -> None:
             write(stream)
 
 
-def _declared(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]]:
+def _signal_declarations(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]]:
     """Return the keys and values that declare each signal; signals without a formula refer to the table."""
     profiles: dict[Signal, Profile] = {POSITION: trajectory.position}
     chosen = [key for key in trajectory.commanded if trajectory.chosen(key).any()]
@@ -88,7 +88,9 @@ def _declared(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]
     if None not in formulas.values() and not isinstance(trajectory.times, UniformTimes):
         formulas[POSITION] = None  # the table has the times
     declared = {
-        signal: {"type": "csv", "file": table, **_choice(profiles[signal].estimate)} if keys is None else keys
+        signal: {"type": "csv", "file": table, **_fit_options(profiles[signal].estimate)}
+        if keys is None
+        else keys
         for signal, keys in formulas.items()
     }
     if trajectory.wrench is not None:
@@ -96,7 +98,7 @@ def _declared(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]
     return declared
 
 
-def _choice(estimate: SampledProfile | None) -> dict[str, Any]:
+def _fit_options(estimate: SampledProfile | None) -> dict[str, Any]:
     """Return the options of a recording's fit that were given, by key."""
     if estimate is None:
         return {}
@@ -145,7 +147,7 @@ def _write_table(
     names = [name for signal in recorded for name in records.get(signal, signal.names)]
     raw = {name: rows for columns in records.values() for name, rows in columns.items()}
     chosen = {name: trajectory.chosen(key) for key in trajectory.commanded for name in COMMANDED[key].names}
-    headers = [np.array(_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
+    headers = [np.array(_signal_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *np.concatenate(headers).tolist()])
     stamps, samples = _stamps(trajectory), usual_block(len(joint_names))
@@ -165,7 +167,7 @@ def _stamps(trajectory: Trajectory) -> FloatArray:
     return trajectory.times.block(0, trajectory.samples)
 
 
-def _columns(name: str, joint_names: Sequence[str]) -> list[str]:
+def _signal_columns(name: str, joint_names: Sequence[str]) -> list[str]:
     return wrench_columns(name) if name in WRENCH.names else [f"{joint}.{name}" for joint in joint_names]
 
 

@@ -37,27 +37,40 @@ def formula(profile: Profile) -> dict[str, Any] | None:
     """Return the keys and values that declare a profile over its span; None if it has no formula."""
     match profile:
         case RestToRest(degree=degree, start=start, end=end):
-            return {"type": "polynomial", "degree": degree, "start": _values(start), "end": _values(end)}
+            return {
+                "type": "polynomial",
+                "degree": degree,
+                "start": _values_or_null(start),
+                "end": _values_or_null(end),
+            }
         case ConstantProfile(value=value):
-            return {"type": "constant", "value": _values(value)}
+            return {"type": "constant", "value": _values_or_null(value)}
         case ViaPoints(degree=degree, points=points, breakpoints=passed):
             times = (passed - passed[0]).tolist()
-            return {"type": "via", "degree": degree, "points": list(map(_values, points)), "times": times}
+            return {
+                "type": "via",
+                "degree": degree,
+                "points": list(map(_values_or_null, points)),
+                "times": times,
+            }
         case Sinusoids():
             return _sinusoids(profile)
         case PiecewiseProfile():
-            return _sequence(profile) if profile.signal is POSITION else _steps(profile)
+            return _sequence(profile) if profile.signal is POSITION else _step_keys(profile)
     return None
 
 
 def _sinusoids(profile: Sinusoids) -> dict[str, Any]:
-    amplitudes = {"sine": list(map(_values, profile.sine)), "cosine": list(map(_values, profile.cosine))}
+    amplitudes = {
+        "sine": list(map(_values_or_null, profile.sine)),
+        "cosine": list(map(_values_or_null, profile.cosine)),
+    }
     return {
         "type": "sinusoids",
-        "frequency": profile.cycles / _length(profile),
-        "offset": _values(profile.offset),
+        "frequency": profile.cycles / _profile_duration(profile),
+        "offset": _values_or_null(profile.offset),
         **{name: harmonics for name, harmonics in amplitudes.items() if harmonics},
-        "ramp": profile.ramp * _length(profile),
+        "ramp": profile.ramp * _profile_duration(profile),
     }
 
 
@@ -70,7 +83,7 @@ def _sequence(chain: PiecewiseProfile) -> dict[str, Any] | None:
             return None
         if isinstance(part, ConstantProfile):
             declared = {"type": "dwell"}
-        parts.append(declared if "times" in declared else {**declared, "duration": _length(part)})
+        parts.append(declared if "times" in declared else {**declared, "duration": _profile_duration(part)})
     return {"type": "sequence", "parts": parts}
 
 
@@ -78,7 +91,7 @@ def changes_of_steps(chain: PiecewiseProfile) -> list[RestToRest] | None:
     """Return the transitions of a step profile, which have equal durations; None for another chain."""
     changes = [part for part in chain.parts if isinstance(part, RestToRest)]
     held = [part for part in chain.parts if isinstance(part, ConstantProfile)]
-    durations = list(map(_length, changes))
+    durations = list(map(_profile_duration, changes))
     if len(changes) + len(held) < len(chain.parts) or not changes:
         return None
     if len({change.degree for change in changes}) > 1 or not math.isclose(
@@ -88,7 +101,7 @@ def changes_of_steps(chain: PiecewiseProfile) -> list[RestToRest] | None:
     return changes
 
 
-def _steps(chain: PiecewiseProfile) -> dict[str, Any] | None:
+def _step_keys(chain: PiecewiseProfile) -> dict[str, Any] | None:
     """Return the keys of a step profile: levels, start times and duration of its transitions."""
     changes = changes_of_steps(chain)
     if changes is None:
@@ -96,18 +109,18 @@ def _steps(chain: PiecewiseProfile) -> dict[str, Any] | None:
     return {
         "type": "steps",
         "degree": changes[0].degree,
-        "levels": [_values(changes[0].start), *(_values(change.end) for change in changes)],
+        "levels": [_values_or_null(changes[0].start), *(_values_or_null(change.end) for change in changes)],
         "times": [change.span[0] - chain.span[0] for change in changes],
-        "transition": min(map(_length, changes)),
+        "transition": min(map(_profile_duration, changes)),
     }
 
 
-def _length(profile: ClosedForm) -> float:
+def _profile_duration(profile: ClosedForm) -> float:
     first, last = profile.span
     return last - first
 
 
-def _values(values: Sequence[float]) -> list[float | None]:
+def _values_or_null(values: Sequence[float]) -> list[float | None]:
     return [None if math.isnan(value) else value for value in values]
 
 
@@ -167,33 +180,33 @@ def _candidates(fix: Fix, asked: Trajectory, text: str) -> Iterator[Values]:
     fixed = fix.declared
     named = {"name": fixed.name}
     if fix.factor == 1:
-        yield named | _changed(root, asked, fixed, names) | _duration(root, asked, fixed)
+        yield named | _changed_formulas(root, asked, fixed, names) | _duration(root, asked, fixed)
     factor = 1 + fix.longer
     unstretched = fixed if fix.factor != 1 else fixed.stretched(1 / factor)
     before = node_at(root, "slow_down")
     declared = float(before.value) if isinstance(before, ScalarNode) else 1.0
-    slower = {} if factor == 1 else {"slow_down": _rounded(declared * factor)}
-    yield named | _changed(root, asked, unstretched, names) | slower
+    slower = {} if factor == 1 else {"slow_down": _rounded_number(declared * factor)}
+    yield named | _changed_formulas(root, asked, unstretched, names) | slower
 
 
 def _duration(root: Node, asked: Trajectory, fixed: Trajectory) -> Values:
     if asked.duration == fixed.duration or node_at(root, "duration") is None:
         return {}
-    return {"duration": _rounded(fixed.duration)}
+    return {"duration": _rounded_number(fixed.duration)}
 
 
-def _changed(root: Node, asked: Trajectory, fixed: Trajectory, names: Sequence[str]) -> Values:
+def _changed_formulas(root: Node, asked: Trajectory, fixed: Trajectory, names: Sequence[str]) -> Values:
     """Return the values of formulas that differ, by path, where the text has them."""
     values: Values = {}
-    for signal, profile in _profiles(asked).items():
-        old, new = formula(profile), formula(_profiles(fixed)[signal])
+    for signal, profile in _profiles_by_signal(asked).items():
+        old, new = formula(profile), formula(_profiles_by_signal(fixed)[signal])
         node = node_at(root, signal.key)
         if old is not None and new is not None and node is not None:
-            values |= dict(_differences(node, signal.key, old, new, names))
+            values |= dict(_changed_values(node, signal.key, old, new, names))
     return values
 
 
-def _profiles(trajectory: Trajectory) -> dict[Signal, Profile]:
+def _profiles_by_signal(trajectory: Trajectory) -> dict[Signal, Profile]:
     found = {POSITION: trajectory.position}
     found |= {COMMANDED[key]: profile for key, profile in trajectory.commanded.items()}
     if trajectory.wrench is not None:
@@ -201,7 +214,7 @@ def _profiles(trajectory: Trajectory) -> dict[Signal, Profile]:
     return found
 
 
-def _differences(
+def _changed_values(
     node: Node, path: str, old: Any, new: Any, names: Sequence[str]
 ) -> Iterator[tuple[str, Any]]:
     """Yield paths below `path` and their new values: single values if the text has them, else whole lists."""
@@ -209,9 +222,9 @@ def _differences(
         for key, value in old.items():
             below = node_at(node, key)
             if below is not None:
-                yield from _differences(below, f"{path}.{key}", value, new[key], names)
+                yield from _changed_values(below, f"{path}.{key}", value, new[key], names)
     elif isinstance(old, list):
-        if _same(old, new):
+        if _equal_up_to_rounding(old, new):
             return
         words = list(names) if isinstance(node, MappingNode) else list(map(str, range(len(old))))
         if isinstance(node, ScalarNode):
@@ -220,15 +233,15 @@ def _differences(
         for word, before, after in zip(words, old, new, strict=True):
             below = node_at(node, word)
             if below is not None:
-                yield from _differences(below, f"{path}.{word}", before, after, names)
-    elif not _same(old, new):
-        yield path, _rounded(new)
+                yield from _changed_values(below, f"{path}.{word}", before, after, names)
+    elif not _equal_up_to_rounding(old, new):
+        yield path, _rounded_number(new)
 
 
-def _same(old: Any, new: Any) -> bool:
+def _equal_up_to_rounding(old: Any, new: Any) -> bool:
     """Return whether numbers, or lists of them, are equal but for rounding."""
     if isinstance(old, list):
-        return all(map(_same, old, new))
+        return all(map(_equal_up_to_rounding, old, new))
     if isinstance(old, float | int) and isinstance(new, float | int):
         return math.isclose(old, new, rel_tol=SAME, abs_tol=SAME * SAME)
     return bool(old == new)
@@ -236,11 +249,11 @@ def _same(old: Any, new: Any) -> bool:
 
 def _shared(values: list[Any]) -> Any:
     """Return one number if it holds for all joints, else the list."""
-    given = [None if value is None else _rounded(value) for value in values]
+    given = [None if value is None else _rounded_number(value) for value in values]
     return given[0] if all(value == given[0] for value in given) else given
 
 
-def _rounded(value: float) -> float | int:
+def _rounded_number(value: float) -> float | int:
     number = float(f"{value:.{DIGITS}g}")
     return int(number) if number.is_integer() and abs(number) < 10**DIGITS else number
 

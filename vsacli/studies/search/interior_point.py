@@ -117,7 +117,7 @@ def minimize(
         stalled: relative change of the cost within `PATIENCE` steps below which the search ends.
         enough: test of unknowns that ends the search early.
     """
-    return _together(problem, [_search(start, gap, last, stalled, enough)])[0]
+    return _run_searches(problem, [_search_from(start, gap, last, stalled, enough)])[0]
 
 
 def minimize_all(
@@ -132,7 +132,7 @@ def minimize_all(
     The searches take their steps together: evaluating a problem at several places costs little more than at
     one. No search depends on the others.
     """
-    return _together(problem, [_search(start, gap, last, stalled) for start in starts])
+    return _run_searches(problem, [_search_from(start, gap, last, stalled) for start in starts])
 
 
 class _Wanted(NamedTuple):
@@ -146,7 +146,7 @@ _Search = Generator[_Wanted, Any, Minimum]
 """A search, which receives a `Point`, or cost and bounds, for each `_Wanted`."""
 
 
-def _together(problem: Problem, searches: Sequence[_Search]) -> list[Minimum]:
+def _run_searches(problem: Problem, searches: Sequence[_Search]) -> list[Minimum]:
     """Run searches, each round of which needs one evaluation of the problem."""
     found: dict[int, Minimum] = {}
     wanted = {number: next(search) for number, search in enumerate(searches)}
@@ -165,7 +165,7 @@ def _together(problem: Problem, searches: Sequence[_Search]) -> list[Minimum]:
     return [found[number] for number in range(len(searches))]
 
 
-def _search(
+def _search_from(
     start: FloatArray,
     gap: float,
     last: float,
@@ -193,7 +193,7 @@ def _search(
         if moved is None:
             break
         unknowns, point, direct = moved
-        multipliers = _moved(multipliers, step.multipliers, gap / count / -point.bounds)
+        multipliers = _step_multipliers(multipliers, step.multipliers, gap / count / -point.bounds)
         costs.append(point.cost)
     return Minimum(unknowns, point.cost, gap + step.gain <= FOUND * last)
 
@@ -204,7 +204,7 @@ def _stalled(costs: Sequence[float], share: float) -> bool:
     return len(recent) > PATIENCE and max(recent) - min(recent) < share * abs(recent[-1])
 
 
-class _Step(NamedTuple):
+class _NewtonStep(NamedTuple):
     """A step of unknowns and multipliers; its predicted decrease of the barrier function is `gain`/2."""
 
     unknowns: FloatArray
@@ -218,9 +218,9 @@ class _Newton:
     def __init__(self, point: Point, multipliers: FloatArray) -> None:
         self._point, self._multipliers, self._slack = point, multipliers, -point.bounds
         self._stiffening = multipliers / self._slack
-        self.factor = _factor(point, multipliers, self._stiffening)
+        self.factor = _newton_factor(point, multipliers, self._stiffening)
 
-    def step(self, barrier: float) -> _Step:
+    def step(self, barrier: float) -> _NewtonStep:
         """Return the step; multipliers are eliminated, and the Cholesky factor solves for the unknowns."""
         assert self.factor is not None
         right = -(self._point.gradient + self._point.pull(barrier / self._slack))
@@ -228,7 +228,7 @@ class _Newton:
         multipliers = (
             barrier / self._slack - self._multipliers + self._stiffening * self._point.changes(unknowns)
         )
-        return _Step(unknowns, multipliers, float(right @ unknowns))
+        return _NewtonStep(unknowns, multipliers, float(right @ unknowns))
 
     def centered(self, barrier: float) -> bool:
         """Return whether all products of slack and multiplier are near the barrier parameter."""
@@ -236,7 +236,9 @@ class _Newton:
         return bool(off.max(initial=0.0) <= CENTERED * barrier)
 
 
-def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tuple[FloatArray, bool] | None:
+def _newton_factor(
+    point: Point, multipliers: FloatArray, stiffening: FloatArray
+) -> tuple[FloatArray, bool] | None:
     """Return the Cholesky factor of Newton's matrix, or of a convex one plus a multiple of its diagonal.
 
     Return None if that fails, because values overflow or nothing depends on some unknown.
@@ -253,7 +255,7 @@ def _factor(point: Point, multipliers: FloatArray, stiffening: FloatArray) -> tu
 
 
 def _line_search(
-    point: Point, unknowns: FloatArray, step: _Step, barrier: float, *, direct: bool
+    point: Point, unknowns: FloatArray, step: _NewtonStep, barrier: float, *, direct: bool
 ) -> Generator[_Wanted, Any, tuple[FloatArray, Point, bool] | None]:
     """Return the unknowns after a share of the step that lowers the barrier function inside the bounds.
 
@@ -293,7 +295,7 @@ def _line_search(
     return None
 
 
-def _moved(multipliers: FloatArray, step: FloatArray, central: FloatArray) -> FloatArray:
+def _step_multipliers(multipliers: FloatArray, step: FloatArray, central: FloatArray) -> FloatArray:
     """Return the multipliers after a step, positive and within `SAFEGUARD` of the central ones."""
     moved = multipliers + _share_to_boundary(multipliers, step) * step
     return np.clip(moved, central / SAFEGUARD, central * SAFEGUARD)

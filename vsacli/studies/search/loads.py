@@ -106,14 +106,14 @@ def evenly_chosen(trajectory: Trajectory, steps: int) -> TaskSamples:
     """Return at most this many samples of a trajectory, both ends included."""
     chosen = evenly(trajectory.samples, steps)
     samples = usual_block(trajectory.joints)
-    return joined(
+    return concatenate_task_samples(
         TaskSamples.of(trajectory, start, start + samples).select(inside - start)
         for start in range(0, trajectory.samples, samples)
         if (inside := chosen[(start <= chosen) & (chosen < start + samples)]).size
     )
 
 
-def joined(parts: Iterable[TaskSamples]) -> TaskSamples:
+def concatenate_task_samples(parts: Iterable[TaskSamples]) -> TaskSamples:
     """Return the samples of several parts, concatenated."""
     motions, factors = zip(*parts, strict=True)
     variables = [motion.variables() for motion in motions]
@@ -186,16 +186,16 @@ def joint_loads(
         middles = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
         for motion, first in ((steps, 2 * start), (middles, 2 * start + 1)):
             places = slice(first, first + 2 * len(motion.time), 2)
-            time[places], rows[:, :, places] = motion.time, _rows(robot, motion, joints, names)
+            time[places], rows[:, :, places] = motion.time, _command_rows(robot, motion, joints, names)
     if between is not None and between.size:
         motion = motion_between(trajectory, between, factor)
         time, chosen = np.unique(np.concatenate([time, motion.time]), return_index=True)
-        rows = np.concatenate([rows, _rows(robot, motion, joints, names)], axis=2)[:, :, chosen]
+        rows = np.concatenate([rows, _command_rows(robot, motion, joints, names)], axis=2)[:, :, chosen]
     commands = (Command.of(dict(zip(names, of_joint, strict=True))) for of_joint in rows)
     return [Load.over(trajectory, factor, time, command) for command in commands]
 
 
-def _rows(robot: Robot, motion: Motion, joints: list[int], names: tuple[str, ...]) -> FloatArray:
+def _command_rows(robot: Robot, motion: Motion, joints: list[int], names: tuple[str, ...]) -> FloatArray:
     """Return commands of joints along a motion, with elastic torques, (joints, names, instants)."""
     if not (joints and len(motion.time)):
         return np.empty((len(joints), len(names), len(motion.time)))

@@ -95,7 +95,7 @@ def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = 
     Raises:
         NoSplineError: the bounds are too narrow or change too fast.
     """
-    knots, free, smoothing = _knots(bounds, smoothing, knots)
+    knots, free, smoothing = _choose_knots(bounds, smoothing, knots)
     shapes = _shapes(free)
     size = float(np.max(bounds.missed_by(np.zeros_like(bounds.time))))
     scaled = Bounds(bounds.time, bounds.low / size, bounds.high / size)
@@ -103,7 +103,7 @@ def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = 
     return scipy.interpolate.BSpline(knots, size * (shapes @ amounts), DEGREE)
 
 
-def _knots(
+def _choose_knots(
     bounds: Bounds, smoothing: float, allowed: FloatArray | None
 ) -> tuple[FloatArray, BoolArray, float]:
     """Return the knots, a mask of the free coefficients, and the smoothing time that the pieces resolve."""
@@ -252,13 +252,13 @@ def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: f
     """
     _check_possible(acceptance, joint, load)
     nearest, *others = product(MARGIN_FACTORS, SMOOTHING_FACTORS)
-    change = _change(acceptance, joint, load, *nearest)
+    change = _change_with_margins(acceptance, joint, load, *nearest)
     tried = [change] if constant is None else [change, Change.constant(load.time, constant)]
     if not _accepted(acceptance, joint, load, change):
-        tried += [_change(acceptance, joint, load, *factors) for factors in others]
+        tried += [_change_with_margins(acceptance, joint, load, *factors) for factors in others]
     accepted = [each for each in tried if each is not None and _accepted(acceptance, joint, load, each)]
     if not accepted:
-        raise ImpossibleError(_reason(acceptance, joint, load, change))
+        raise ImpossibleError(_refusal_reason(acceptance, joint, load, change))
     return min(accepted, key=lambda each: each.rms)
 
 
@@ -274,7 +274,7 @@ def _check_possible(acceptance: Acceptance, joint: Joint, load: Load) -> None:
         )
 
 
-def _change(
+def _change_with_margins(
     acceptance: Acceptance, joint: Joint, load: Load, margins: float, smoothings: float
 ) -> Change | None:
     """Return the nearest change for multiples of margin and smoothing time; None if no spline is found."""
@@ -317,7 +317,7 @@ def _accepted(acceptance: Acceptance, joint: Joint, load: Load, change: Change |
     return change is not None and not acceptance.refused_steps(joint, load.changed(*change.rows)).any()
 
 
-def _reason(acceptance: Acceptance, joint: Joint, load: Load, change: Change | None) -> str:
+def _refusal_reason(acceptance: Acceptance, joint: Joint, load: Load, change: Change | None) -> str:
     if change is None:
         return f"what {joint.name} may have is too narrow, or changes too fast, for a smooth profile"
     reason = acceptance.reason(joint, load.changed(*change.rows))

@@ -98,7 +98,7 @@ def optimize(
     what = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin, warnings=warnings)
     if minimize == TIME:
         check_timing_varies(vary)
-        return fastest(what, trajectory, varied, seed, progress)
+        return optimize_timing(what, trajectory, varied, seed, progress)
     shared = vary in (TIMING, BOTH)
     criterion = checked_criterion(robot, minimize, range(len(robot.joints)) if shared else varied)
     what = replace(what, words=criterion.words)
@@ -122,7 +122,7 @@ ROOM = 0.02
 _Search = TypeVar("_Search", bound=PacedSearch)
 
 
-def fastest(
+def optimize_timing(
     what: Optimum, trajectory: Trajectory, varied: Sequence[int], seed: int, progress: Callable[[int], object]
 ) -> Optimum:
     """Return the fastest timing, with the stiffness of the joints `varied` (indices), confirmed by runs.
@@ -130,15 +130,17 @@ def fastest(
     If no slow-down makes the commanded stiffness feasible, the search starts from the smallest slow-down
     with constant changes of the stiffness.
     """
-    bar, ends = Countdown(progress, SEARCHES), _ends(what, trajectory)
+    bar, ends = Countdown(progress, SEARCHES), _loads_at_ends(what, trajectory)
     try:
         try:
-            uniform, found, best = _fastest(what, trajectory, ends, varied, seed, bar.count)
+            uniform, found, best = _fastest_timing(what, trajectory, ends, varied, seed, bar.count)
         except NoStartError:
             if not varied:
                 raise
-            path = with_raised_stiffness(trajectory, _smallest_slow_down(what, trajectory).constants)
-            _, found, best = _fastest(what, path, ends, varied, seed, bar.count)
+            path = with_raised_stiffness(
+                trajectory, _smallest_confirmed_slow_down(what, trajectory).constants
+            )
+            _, found, best = _fastest_timing(what, path, ends, varied, seed, bar.count)
             uniform = math.nan
     except ImpossibleError as error:
         return replace(what, reasons=error.reasons)
@@ -155,7 +157,7 @@ def fastest(
     return replace(what, timing=optimum, trajectory=best, pace=found.pace(max(ends.periods, 1)))
 
 
-def _fastest(
+def _fastest_timing(
     what: Optimum,
     path: Trajectory,
     ends: Ends,
@@ -185,7 +187,7 @@ def cheapest_pace(
     slow-down. If it lasts no longer than commanded, the search for least cost starts from it; otherwise the
     motion is slowed down by that factor.
     """
-    ends = _ends(what, trajectory)
+    ends = _loads_at_ends(what, trajectory)
     criterion = type(criterion)(repeating=ends.periods > 0)
 
     def along(path: Trajectory, near: Pacing | None = None, slow_down: float = 1.0) -> Optimum:
@@ -194,16 +196,16 @@ def cheapest_pace(
         def search(rule: Acceptance) -> CheapestPaceSearch:
             duration = path.duration / max(ends.periods, 1)
             motion = PacedMotion(what.robot, path, instants_of(path, duration, rule.between))
-            costed = _costed(rule, motion, criterion, _sizes(what, criterion, trajectory, path), varied)
+            costed = _costed(rule, motion, criterion, _cost_scales(what, criterion, trajectory, path), varied)
             return CheapestPaceSearch(motion, costed, varied, ends, seed, bar.count, near)
 
         _, found, best = _confirmed(what, path, ends, search)
         bar.finish()
-        joints = _joints(what.robot, criterion, found, trajectory, best)
+        joints = _joint_costs(what.robot, criterion, found, trajectory, best)
         return replace(
             what,
             joints=joints,
-            together=_together(criterion, joints),
+            together=_total_cost(criterion, joints),
             slow_down=slow_down,
             trajectory=best,
             pace=_of_faster(found.pace(max(ends.periods, 1)), slow_down),
@@ -218,9 +220,11 @@ def cheapest_pace(
         try:
             return along(stiffness.confirmed(what).trajectory)
         except ImpossibleError:
-            slower = _smallest_slow_down(what, trajectory)
+            slower = _smallest_confirmed_slow_down(what, trajectory)
         path = with_raised_stiffness(trajectory, slower.constants)
-        _, near, quickest = _fastest(what, path, ends, varied, seed, Countdown(progress, SEARCHES).count)
+        _, near, quickest = _fastest_timing(
+            what, path, ends, varied, seed, Countdown(progress, SEARCHES).count
+        )
         if quickest.duration <= path.duration:
             return along(path, near)
         return along(path.stretched(slower.factor), slow_down=slower.factor)
@@ -233,11 +237,11 @@ def _of_faster(pace: BSpline[np.float64], factor: float) -> BSpline[np.float64]:
     return pace if factor == 1 else type(pace)(pace.t / factor, factor * pace.c, pace.k)
 
 
-def _ends(what: Optimum, trajectory: Trajectory) -> Ends:
+def _loads_at_ends(what: Optimum, trajectory: Trajectory) -> Ends:
     return Ends.of(trajectory, joint_loads(what.robot, trajectory, list(range(len(what.robot.joints)))))
 
 
-def _smallest_slow_down(what: Optimum, trajectory: Trajectory) -> Combination:
+def _smallest_confirmed_slow_down(what: Optimum, trajectory: Trajectory) -> Combination:
     """Return the smallest slow-down at which constant stiffness changes keep every limit, and the changes.
 
     Raises:
@@ -272,7 +276,7 @@ def _confirmed(
     def attempt(rule: Acceptance) -> tuple[tuple[_Search, Pacing, Trajectory], FloatArray | None]:
         search = search_by(rule)
         found = search.best()
-        best, short = _retimed(what, path, found, count)
+        best, short = _retime_and_check(what, path, found, count)
         if short is not None:
             short = np.mod(path_at(short, found.pace(count), path.duration), path.duration / count)
         return (search, found, best), short
@@ -283,7 +287,7 @@ def _confirmed(
     return found
 
 
-def _retimed(
+def _retime_and_check(
     what: Optimum, path: Trajectory, found: Pacing, count: int
 ) -> tuple[Trajectory, FloatArray | None]:
     """Return the motion at a pace, and the instants at which a run of it fails, or None.
@@ -326,7 +330,7 @@ def _costed(
     ]
 
 
-def _sizes(what: Optimum, criterion: Criterion, *motions: Trajectory) -> list[float]:
+def _cost_scales(what: Optimum, criterion: Criterion, *motions: Trajectory) -> list[float]:
     """Return the scale of each joint's cost, from the first motion along which it is finite."""
     sizes = np.full(len(what.robot.joints), np.nan)
     for motion in motions:
@@ -337,7 +341,7 @@ def _sizes(what: Optimum, criterion: Criterion, *motions: Trajectory) -> list[fl
     return [size if math.isfinite(size) and size > 0 else 1.0 for size in sizes.tolist()]
 
 
-def _joints(
+def _joint_costs(
     robot: Robot, criterion: Criterion, found: Pacing, asked: Trajectory, best: Trajectory
 ) -> dict[str, JointOptimum]:
     """Return the costs of each joint before and after, by name."""
@@ -358,7 +362,7 @@ def _joints(
     }
 
 
-def _together(criterion: Criterion, joints: Mapping[str, JointOptimum]) -> TotalCost:
+def _total_cost(criterion: Criterion, joints: Mapping[str, JointOptimum]) -> TotalCost:
     if not criterion.relative:
         before, after = (
             criterion.together([getattr(each, when) for each in joints.values()])

@@ -99,12 +99,12 @@ class TimingOptimum(Published):
         }
         header = ("timing", "duration\ns", "change\n%")
         known = {words: value for words, value in durations.items() if not math.isnan(value)}
-        rows = [(words, f"{value:.4g}", _change(self.before, value)) for words, value in known.items()]
+        rows = [(words, f"{value:.4g}", _change_text(self.before, value)) for words, value in known.items()]
         return [header, *rows]
 
     def lines(self) -> Iterator[str]:
         """Yield how it was found, and the active bounds of each joint."""
-        yield _search(self)
+        yield _search_text(self)
         yield from (f"{name}: {_along(shares, 'path')}" for name, shares in self.bounding.items())
 
 
@@ -188,20 +188,20 @@ class Optimum(Published):
         if self.trajectory is None:
             return "nothing feasible was found"
         if self.timing is not None:
-            return _gain(self.timing.before, self.timing.after, "s")
+            return _cost_text(self.timing.before, self.timing.after, "s")
         if self.together is not None:
             total = self.together
             if total.unit:
-                return _gain(total.before, total.after, total.unit)
-            return f"{_change(total.before, total.after)} % on average over the joints"
+                return _cost_text(total.before, total.after, total.unit)
+            return f"{_change_text(total.before, total.after)} % on average over the joints"
         if len(self.joints) == 1:
             [only] = self.joints.values()
-            return _gain(only.before, only.after, only.unit)
+            return _cost_text(only.before, only.after, only.unit)
         known = {name: each for name, each in self.joints.items() if each.before > 0}
         if not known:
             return "feasible, which it is not as commanded"
         order = sorted(known, key=lambda name: known[name].after / known[name].before)
-        changes = [f"{_change(known[name].before, known[name].after)} % ({name})" for name in order]
+        changes = [f"{_change_text(known[name].before, known[name].after)} % ({name})" for name in order]
         return " to ".join(dict.fromkeys((changes[0], changes[-1])))
 
     def as_text(self) -> ReportText:
@@ -217,7 +217,8 @@ class Optimum(Published):
         )
         whole = "time" if self.together is None else "path"
         lines = [
-            f"{name}: {_along(each.bounding, whole)}; {_search(each)}" for name, each in self.joints.items()
+            f"{name}: {_along(each.bounding, whole)}; {_search_text(each)}"
+            for name, each in self.joints.items()
         ]
         found = [*([slowed] if self.slow_down != 1 else []), *warnings]
         return ReportText(self.title, found, [self._rows()], lines)
@@ -233,7 +234,7 @@ class Optimum(Published):
         rows = [("joint", *(f"{name}\n{units}".rstrip() for name in names), "change\n%")]
         for name, each in costs.items():
             constant = [_cost(each.constant)] if constants and isinstance(each, JointOptimum) else []
-            change = _change(each.before, each.after)
+            change = _change_text(each.before, each.after)
             rows.append((name, _cost(each.before), *constant, _cost(each.after), change))
         return rows
 
@@ -242,19 +243,19 @@ def _cost(cost: float) -> str:
     return "-" if math.isnan(cost) else f"{cost:.4g}"
 
 
-def _change(before: float, after: float) -> str:
+def _change_text(before: float, after: float) -> str:
     if not before > 0 or math.isnan(after):
         return "-"
     change = round(100 * (after / before - 1), 1)
     return f"{change:+.1f}" if change else "0.0"
 
 
-def _gain(before: float, after: float, unit: str) -> str:
+def _cost_text(before: float, after: float, unit: str) -> str:
     """Return a cost before and after with its change; only the latter if the former is infeasible."""
     found = f"{_cost(after)} {unit}".rstrip()
     if math.isnan(before):
         return f"{found} (infeasible as commanded)"
-    change = _change(before, after)
+    change = _change_text(before, after)
     return f"{_cost(before)} to {found}" + ("" if change == "-" else f" ({change} %)")
 
 
@@ -267,6 +268,6 @@ def _along(bounding: Mapping[str, float], whole: str) -> str:
     return f"active bounds: {', '.join(along) or 'none'}"
 
 
-def _search(optimum: JointOptimum | TimingOptimum) -> str:
+def _search_text(optimum: JointOptimum | TimingOptimum) -> str:
     ended = "local optimum" if optimum.found else "no local optimum: the search ended before"
     return f"{ended}; reached from {optimum.agreeing} of {counted(optimum.starts, 'start')}"

@@ -19,7 +19,7 @@ from vsacli.base.units import STIFFNESS
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range
 from vsacli.studies.search.changed_motion import rate_of
-from vsacli.studies.search.loads import Load, TaskSamples, joined
+from vsacli.studies.search.loads import Load, TaskSamples, concatenate_task_samples
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -162,7 +162,9 @@ def _scan_start(acceptance: Acceptance, few: TaskSamples, factors: Factors) -> i
         numbers.append(min(numbers[-1] + _stride(numbers[-1]), factors.last))
     for start in range(0, len(numbers), FACTORS_AT_ONCE):
         tried = numbers[start : start + FACTORS_AT_ONCE]
-        refused = acceptance.refused(joined(few.slowed(factors.factor(number)) for number in tried))
+        refused = acceptance.refused(
+            concatenate_task_samples(few.slowed(factors.factor(number)) for number in tried)
+        )
         accepted = np.flatnonzero(~refused.reshape(len(tried), -1).any(axis=1))
         if accepted.size:
             return numbers[max(start + int(accepted[0]) - 1, 0)]
@@ -191,7 +193,7 @@ class SlowDownCandidates:
             steps = np.flatnonzero(np.any(self._acceptance.refused(part), axis=1))
             if steps.size:
                 further = part.select(steps[evenly(len(steps), WATCHED_STEPS)])
-                self._watched = joined([self._watched, further.slowed(1 / factor)])
+                self._watched = concatenate_task_samples([self._watched, further.slowed(1 / factor)])
                 return False
         return True
 
@@ -233,7 +235,7 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
     Raises:
         ImpossibleError: no constant is accepted; the error has the reason.
     """
-    low, high = _bounds(acceptance, joint, load)
+    low, high = _offset_bounds(acceptance, joint, load)
     raised = OffsetCandidates(acceptance, joint, load, sign=1).smallest(low, high)
     most = -low if raised is None else min(-low, raised)
     lowered = OffsetCandidates(acceptance, joint, load, sign=-1).smallest(-high, most)
@@ -258,7 +260,7 @@ def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
     return float(rise[hardest] + ROUNDING * (asked[hardest] + rise[hardest]))
 
 
-def _bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, float]:
+def _offset_bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, float]:
     """Return the offsets that attainable range, stiffness limits and deflection limits admit."""
     admissible = checked_range(acceptance, joint, load)
     asked = load.command.commanded["stiffness"]

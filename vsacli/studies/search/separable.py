@@ -115,7 +115,7 @@ class Group:
     def sampled(self, rows: FloatArray, instants: IndexArray) -> tuple[Sampled, Sampled]:
         """Return integrands and bounds with their gradients."""
         integrands, bounds = self.functions(seeds(list(rows)), instants)
-        return _sampled(integrands, rows), _sampled(bounds, rows)
+        return _sample_functions(integrands, rows), _sample_functions(bounds, rows)
 
 
 def _stacked(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> FloatArray:
@@ -124,7 +124,7 @@ def _stacked(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> FloatA
     return np.stack(values) if values else np.zeros((0, *shape))
 
 
-def _sampled(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> Sampled:
+def _sample_functions(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> Sampled:
     gradients = [tangent_of(each, len(rows), rows.shape[1:]) for each in functions]
     stacked = np.stack(gradients) if gradients else np.zeros((0, *rows.shape))
     return Sampled(_stacked(functions, rows), stacked)
@@ -157,11 +157,11 @@ class _Expanded:
 
     def gradient(self) -> FloatArray:
         """Return the gradient of the cost by the own unknowns."""
-        return self._by_unknowns(_weighted(self.group.weights, self.integrands.gradients))
+        return self._by_unknowns(_weighted_gradient(self.group.weights, self.integrands.gradients))
 
     def pull(self, weights: FloatArray) -> FloatArray:
         """Return the weighted sum of the bounds' gradients, (own unknowns,)."""
-        return self._by_unknowns(_weighted(self._of_all(weights), self.bounds.gradients))
+        return self._by_unknowns(_weighted_gradient(self._of_all(weights), self.bounds.gradients))
 
     def changes(self, step: FloatArray) -> FloatArray:
         """Return the first-order changes of the existing bounds with a step."""
@@ -187,11 +187,12 @@ class _Expanded:
     def _curvature(self, multipliers: FloatArray) -> FloatArray:
         """Return the Hessian of the Lagrangian by rows, (instants, rows, rows), by finite differences."""
         moved = [
-            _weighted(self.group.weights, here.gradients) + _weighted(multipliers, of_bounds.gradients)
+            _weighted_gradient(self.group.weights, here.gradients)
+            + _weighted_gradient(multipliers, of_bounds.gradients)
             for here, of_bounds in zip(self._moved_integrands, self._moved_bounds, strict=True)
         ]
-        here = _weighted(self.group.weights, self.integrands.gradients)
-        here = here + _weighted(multipliers, self.bounds.gradients)
+        here = _weighted_gradient(self.group.weights, self.integrands.gradients)
+        here = here + _weighted_gradient(multipliers, self.bounds.gradients)
         second = (np.stack(moved, axis=1) - here[:, None, :]) / self._steps[None, :, None]
         symmetric: FloatArray = (second + second.swapaxes(0, 1)).transpose(2, 0, 1) / 2
         return symmetric
@@ -207,7 +208,7 @@ class _Expanded:
         return summed
 
 
-def _weighted(weights: FloatArray, gradients: FloatArray) -> FloatArray:
+def _weighted_gradient(weights: FloatArray, gradients: FloatArray) -> FloatArray:
     """Return the weighted sum of gradients, (rows, instants); gradients with zero weight may be NaN."""
     kept = np.where(weights[:, None, :] != 0, gradients, 0.0)
     summed: FloatArray = np.sum(weights[:, None, :] * kept, axis=0)

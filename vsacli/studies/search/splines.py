@@ -53,7 +53,7 @@ class SplineSpace:
             allowed: times at which pieces may begin and end, both ends of the span included; any if None.
         """
         # derivatives are zero at an end where three coefficients are equal
-        ends = _ends(span, pieces, allowed)
+        ends = _piece_ends(span, pieces, allowed)
         knots = np.concatenate([[ends[0]] * DEGREE, ends, [ends[-1]] * DEGREE])
         coefficients = len(ends) - 1 + DEGREE
         shape_of = np.clip(np.arange(coefficients) - FLAT_ENDS, 0, coefficients - 1 - 2 * FLAT_ENDS)
@@ -70,7 +70,7 @@ class SplineSpace:
         cls, span: tuple[float, float], pieces: int, allowed: FloatArray | None = None
     ) -> SplineSpace:
         """Return the periodic splines of this many equal pieces; see `at_rest`."""
-        ends = _ends(span, pieces, allowed)
+        ends = _piece_ends(span, pieces, allowed)
         pieces, period = len(ends) - 1, span[1] - span[0]
         turns, places = np.divmod(np.arange(-DEGREE, pieces + DEGREE + 1), pieces)
         return cls(ends[places] + turns * period, np.eye(pieces)[np.arange(pieces + DEGREE) % pieces])
@@ -132,7 +132,7 @@ class SplineSpace:
         return amounts
 
 
-def _ends(span: tuple[float, float], pieces: int, allowed: FloatArray | None) -> FloatArray:
+def _piece_ends(span: tuple[float, float], pieces: int, allowed: FloatArray | None) -> FloatArray:
     """Return the ends of pieces of about equal length, each at the nearest allowed time."""
     ends = np.linspace(*span, pieces + 1)
     if allowed is None:

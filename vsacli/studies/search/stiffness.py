@@ -60,7 +60,7 @@ ACTIVE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class OptimizedStiffness:
     """An optimized stiffness over the instants of a load.
 
     Attributes:
@@ -141,7 +141,7 @@ class StiffnessSearch:
         self._most = min(MOST_PIECES, len(self._steps) - 1)
         self._whole = FixedMotion(joint, load, self._admissible, criterion, Scale(), acceptance.reserve)
 
-    def best(self) -> Profile:
+    def best(self) -> OptimizedStiffness:
         """Return the best profile found from several starts.
 
         Raises:
@@ -164,7 +164,7 @@ class StiffnessSearch:
             f"no profile that was tried keeps every limit of the motors of {self._joint.name}"
         )
 
-    def best_constant(self) -> Profile | None:
+    def best_constant(self) -> OptimizedStiffness | None:
         """Return the best constant as a profile; None if no constant keeps all bounds."""
         space, stiffness = SplineSpace.constant(self._span), self._whole.stiffness
         low = float(self._admissible.low.max()) + CLEARANCE * stiffness
@@ -402,10 +402,10 @@ class StiffnessSearch:
         self._progress()
         return _Attempt(space, found, instants, start)
 
-    def _profile(self, attempt: _Attempt, starts: int, agreeing: int) -> Profile:
+    def _profile(self, attempt: _Attempt, starts: int, agreeing: int) -> OptimizedStiffness:
         amounts = attempt.minimum.unknowns[: attempt.space.size]
         rows = self._basis(attempt.space) @ amounts
-        return Profile(
+        return OptimizedStiffness(
             rows=rows,
             steps=self._load.steps,
             found=attempt.minimum.found,

@@ -202,7 +202,7 @@ class Task:
         """
         slower, acceptance = self.trajectory.stretched(found.factor), self.acceptance_with(found)
         robot = acceptance.robot
-        find = partial(_nearest_change, acceptance, slower)
+        find = partial(_nearest_profile_or_constant, acceptance, slower)
         changes = for_refused_joints(acceptance, slower, find, found.factor)
         summaries = tuple(_summary(robot.joints[index], change) for index, (_, change) in changes.items())
         stretched, factor = self._stretched(found.factor, changed=bool(changes))
@@ -313,7 +313,7 @@ class Task:
         refused = self._refused_between(fix)
         if report.self_check.passed and not short and not refused.size:
             return None
-        worst = [time for joint in short for time in (joint.margin_time, *_times(joint))]
+        worst = [time for joint in short for time in (joint.margin_time, *_violation_times(joint))]
         elapsed = (np.array(worst) - fix.trajectory.start) / (1 + fix.longer)
         return np.union1d(elapsed[np.isfinite(elapsed)], refused)
 
@@ -339,7 +339,7 @@ class Task:
         return found[evenly(len(found), WATCHED_STEPS)]
 
 
-def _times(joint: JointReport) -> Iterator[float]:
+def _violation_times(joint: JointReport) -> Iterator[float]:
     """Yield the time of the worst violation of each kind at a joint."""
     yield from (worst.time for worst in (*joint.worst.values(), *joint.between.values()))
 
@@ -380,7 +380,9 @@ def _counting(load: Load, trajectory: Trajectory) -> Load:
     return load if trajectory.known_between else load.at(load.steps)
 
 
-def _nearest_change(acceptance: Acceptance, trajectory: Trajectory, joint: Joint, load: Load) -> Change:
+def _nearest_profile_or_constant(
+    acceptance: Acceptance, trajectory: Trajectory, joint: Joint, load: Load
+) -> Change:
     """Return the nearest profile, or the smallest constant if that is nearer."""
     try:
         constant = smallest_offset(acceptance, joint, _counting(load, trajectory))

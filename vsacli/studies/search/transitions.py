@@ -23,10 +23,10 @@ DIGITS = 3
 
 def has_transitions(trajectory: Trajectory) -> bool:
     """Return whether the stiffness is given as levels with transitions between them."""
-    return bool(_changes(trajectory))
+    return bool(_transitions_between_levels(trajectory))
 
 
-def _changes(trajectory: Trajectory) -> list[RestToRest]:
+def _transitions_between_levels(trajectory: Trajectory) -> list[RestToRest]:
     """Return the transitions between levels; none if the stiffness is another curve."""
     stiffness = trajectory.commanded[STIFFNESS.key]
     return (changes_of_steps(stiffness) or []) if isinstance(stiffness, PiecewiseProfile) else []
@@ -55,7 +55,11 @@ class _Transitions:
     """Transition times on a decimal grid, checked at watched instants; see `Candidates`."""
 
     def __init__(self, acceptance: Acceptance, trajectory: Trajectory) -> None:
-        self._acceptance, self._trajectory, self._changes = acceptance, trajectory, _changes(trajectory)
+        self._acceptance, self._trajectory, self._changes = (
+            acceptance,
+            trajectory,
+            _transitions_between_levels(trajectory),
+        )
         self._limits = [*(change.span[0] for change in self._changes[1:]), trajectory.duration]
         self.shortest = min(change.span[1] - change.span[0] for change in self._changes)
         self.longest = min(

@@ -20,7 +20,13 @@ from vsacli.studies.sensitivities.band import Band
 from vsacli.studies.sensitivities.joint_derivatives import MARGIN
 from vsacli.studies.sensitivities.sensitivity_report import JointEffect, ParameterEffect, Sensitivity
 from vsacli.studies.sensitivities.slopes import Derivatives, SensitivityRun
-from vsacli.studies.sensitivities.tolerances import deviations, monte_carlo, step_of, tolerances_of, words_of
+from vsacli.studies.sensitivities.tolerances import (
+    monte_carlo,
+    step_of,
+    tolerance_deviations,
+    tolerances_of,
+    words_of,
+)
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -63,7 +69,7 @@ class Effects:
         """
         shape = (len(steps), joints)
         self._steps = steps
-        self._weights = _trapezoidal(times)
+        self._weights = _trapezoidal_weights(times)
         self._done = 0
         self.peak = np.zeros(joints)
         self.largest, self.time, self.spent = np.zeros((3, *shape))
@@ -119,7 +125,7 @@ class Effects:
         self.motor[at, joint] = 1 + worst[larger] // len(time)
 
 
-def _trapezoidal(times: FloatArray) -> FloatArray:
+def _trapezoidal_weights(times: FloatArray) -> FloatArray:
     """Return the weights of the trapezoidal rule over times, (samples,) in s."""
     halves = np.diff(times) / 2
     weights: FloatArray = np.append(halves, 0.0) + np.append(0.0, halves)
@@ -181,7 +187,7 @@ def analyzed(
     robot, given = run.robot, None if tolerances is None else tolerances_of(tolerances, run.parameters)
     steps = np.array([step_of(each) for each in run.parameters])
     effects = Effects(steps, run.trajectory.times.block(0, run.trajectory.samples), len(robot.joints))
-    sizes = np.zeros(len(run.parameters)) if given is None else deviations(given)
+    sizes = np.zeros(len(run.parameters)) if given is None else tolerance_deviations(given)
     band = None if given is None else Band(sizes, robot.actuators)
     for part in run:
         effects.add(part)
@@ -220,7 +226,7 @@ def _effect(
     joints = {
         name: JointEffect(
             torque=float(effects.largest[place, joint]),
-            share=_share(float(effects.largest[place, joint]), float(effects.peak[joint])),
+            share=_share_of_peak(float(effects.largest[place, joint]), float(effects.peak[joint])),
             time=float(effects.time[place, joint]),
             motor=int(effects.motor[place, joint]),
             margin=float(margins[joint]),
@@ -240,5 +246,5 @@ def _effect(
     )
 
 
-def _share(change: float, peak: float) -> float:
+def _share_of_peak(change: float, peak: float) -> float:
     return change / peak if peak > 0 else math.nan

@@ -130,7 +130,7 @@ class TorqueCurves(NamedTuple):
     deviation: FloatArray
 
 
-class _Part(NamedTuple):
+class _BandBlock(NamedTuple):
     """A block of a run: variables, their standard deviations, and the effect of motor reversals on them."""
 
     time: FloatArray
@@ -153,7 +153,7 @@ class Band:
     def __init__(self, deviations: FloatArray, actuators: Sequence[Actuator]) -> None:
         self._variances = deviations**2
         self._reversals = Reversals(actuators)
-        self._parts: list[_Part] = []
+        self._parts: list[_BandBlock] = []
 
     def add(self, part: Derivatives) -> None:
         """Include the next block."""
@@ -175,7 +175,7 @@ class Band:
             uncertain = self._reversals.uncertain(block.dtheta, of_speed)
         of_torque = np.sqrt(np.maximum(of_torque + by_reversals, 0.0))
         of_run = (part.time, block.tau_motor, part.margin, of_torque, np.sqrt(of_margin))
-        self._parts.append(_Part(*of_run, by_reversals, uncertain))
+        self._parts.append(_BandBlock(*of_run, by_reversals, uncertain))
 
     def _of_joints(self, part: Derivatives) -> Iterator[tuple[int, dict[str, FloatArray], FloatArray]]:
         """Yield joint, slopes by uncertain parameters, and the variances of these parameters."""
@@ -196,8 +196,8 @@ class Band:
         """Return the band of each joint."""
         run = self._together()
         return [
-            _of_joint(
-                _Part(
+            _joint_band(
+                _BandBlock(
                     time=run.time,
                     tau_motor=run.tau_motor[:, joint],
                     margin=run.margin[:, joint],
@@ -210,11 +210,11 @@ class Band:
             for joint in range(run.margin.shape[1])
         ]
 
-    def _together(self) -> _Part:
-        return _Part(*map(np.concatenate, zip(*self._parts, strict=True)))
+    def _together(self) -> _BandBlock:
+        return _BandBlock(*map(np.concatenate, zip(*self._parts, strict=True)))
 
 
-def _of_joint(run: _Part) -> JointBand:
+def _joint_band(run: _BandBlock) -> JointBand:
     spread = np.nan_to_num(np.fmax(*run.of_torque.T))
     worst = int(spread.argmax())
     deviation, motor = float(spread[worst]), int(np.nan_to_num(run.of_torque[worst]).argmax())
@@ -222,7 +222,7 @@ def _of_joint(run: _Part) -> JointBand:
     reversing = float(run.by_reversals[worst, motor]) / deviation**2 if deviation > 0 else 0.0
     of_torque = (
         deviation,
-        _share(deviation, peak),
+        _spread_share(deviation, peak),
         float(run.time[worst]),
         bool(run.uncertain.any()),
         reversing,
@@ -241,5 +241,5 @@ def _of_joint(run: _Part) -> JointBand:
     )
 
 
-def _share(spread: float, peak: float) -> float:
+def _spread_share(spread: float, peak: float) -> float:
     return spread / peak if peak > 0 else math.nan

@@ -30,7 +30,7 @@ AT_END = 1e-9
 """Relative distance below which phi is at the end of its range."""
 
 
-class _Slopes(NamedTuple):
+class _SpringSlopes(NamedTuple):
     """Derivatives of tau_e and sigma by phi, which are the rows of A, and by the directions at fixed phi.
 
     Attributes:
@@ -91,7 +91,7 @@ class ImplicitSolution:
         """Return the derivatives of a demand in all directions, (directions, samples)."""
         return tangent_of(demanded, self._directions, q.shape)
 
-    def _slopes(self, phi: FloatArray, q: FloatArray) -> _Slopes:
+    def _slopes(self, phi: FloatArray, q: FloatArray) -> _SpringSlopes:
         last = self._directions - len(phi)
         deflections: Any = np.stack(seeds(phi, last))  # type: ignore[arg-type]
         springs = self._carrying.springs(deflections, q)
@@ -100,7 +100,7 @@ class ImplicitSolution:
         )
         none = np.zeros((len(phi), *q.shape))
         by_directions = (np.concatenate((each[:last], none)) for each in (torque, stiffness))
-        return _Slopes(torque[last:], stiffness[last:], *by_directions)
+        return _SpringSlopes(torque[last:], stiffness[last:], *by_directions)
 
     def _end(
         self, tau_e: Dual | FloatArray, end: FloatArray, critical: BoolArray, slack: BoolArray, q: FloatArray

@@ -184,7 +184,7 @@ class Sensitivity(Published):
                     each.path,
                     each.words,
                     joint,
-                    _points(effect.share),
+                    _percentage_points(effect.share),
                     f"{effect.torque:.3g}",
                     f"{effect.time:.3f}",
                     _margins(each, joint),
@@ -231,11 +231,13 @@ class Sensitivity(Published):
         for joint, band in self.band.items():
             has_torque, has_margin = math.isfinite(band.share), math.isfinite(band.margin)
             torque = (
-                (f"{band.torque:.3g}", _points(band.share), f"{band.time:.3f}") if has_torque else ["-"] * 3
+                (f"{band.torque:.3g}", _percentage_points(band.share), f"{band.time:.3f}")
+                if has_torque
+                else ["-"] * 3
             )
             margin = (
                 (
-                    f"{100 * band.margin:.2f} +- {_points(band.margin_deviation)}",
+                    f"{100 * band.margin:.2f} +- {_percentage_points(band.margin_deviation)}",
                     f"{band.margin_time:.3f}",
                     _probability(band.lost),
                 )
@@ -270,13 +272,13 @@ def _margins(effect: ParameterEffect, shown: str) -> str:
 
 def _probability(share: float) -> str:
     """Return a probability in percent."""
-    return _points(share) if share >= 1e-6 or share == 0 else "< 1e-4"
+    return _percentage_points(share) if share >= 1e-6 or share == 0 else "< 1e-4"
 
 
 def _percent(share: float) -> str:
     """Return a percentage with two digits, or as an integer from 100 % on."""
-    return f"{_points(share)} %"
+    return f"{_percentage_points(share)} %"
 
 
-def _points(share: float) -> str:
+def _percentage_points(share: float) -> str:
     return f"{100 * share:.2g}" if abs(share) < 0.995 else f"{100 * share:.0f}"

@@ -60,8 +60,8 @@ def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> 
         LinkTorques(each, frame).recursion_inputs(rows) for each in (robot, seeded(robot, chosen))
     )
     bodies = forward(plain.links, plain.states, base_frame(plain.gravity))
-    for joint, places in _by_joint(chosen).items():
-        links, states, gravity, tip = _mixed(plain, carrying, joint)
+    for joint, places in _parameter_indices(chosen).items():
+        links, states, gravity, tip = _mixed_inputs(plain, carrying, joint)
         known = bodies[:joint] if joint else []
         previous = known[-1].frame if known else base_frame(gravity)
         moved = [*known, *forward(links[len(known) :], states[len(known) :], previous)]
@@ -69,7 +69,7 @@ def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> 
         yield TorqueSlopes(places, [_derivatives(each, places, len(motion.time)) for each in torques])
 
 
-def _by_joint(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
+def _parameter_indices(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
     """Return indices of the parameters of each joint, and (key None) of the robot as a whole."""
     places: dict[int | None, list[int]] = {}
     for place, parameter in enumerate(chosen):
@@ -77,7 +77,7 @@ def _by_joint(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
     return places
 
 
-def _mixed(plain: RecursionInputs, carrying: RecursionInputs, joint: int | None) -> RecursionInputs:
+def _mixed_inputs(plain: RecursionInputs, carrying: RecursionInputs, joint: int | None) -> RecursionInputs:
     """Return the chain with derivatives by the parameters of one joint, or of the robot as a whole."""
     if joint is None:
         return plain._replace(gravity=carrying.gravity, tip=carrying.tip)
@@ -124,7 +124,7 @@ class Known(Slopes):
 
     def total(self, name: str, weights: FloatArray) -> FloatArray:
         """See `Slopes.total`."""
-        return np.tensordot(_existing(self[name]), weights, 2)
+        return np.tensordot(_finite_or_zero(self[name]), weights, 2)
 
 
 class Chained(Slopes):
@@ -149,11 +149,11 @@ class Chained(Slopes):
 
     def total(self, name: str, weights: FloatArray) -> FloatArray:
         """See `Slopes.total`."""
-        by_torques = (_existing(self._by_torques[name]) * weights).sum(axis=1)
+        by_torques = (_finite_or_zero(self._by_torques[name]) * weights).sum(axis=1)
         return np.tensordot(self._of_torques, by_torques, 2)
 
 
-class Group(NamedTuple):
+class ParameterGroup(NamedTuple):
     """Derivatives by some parameters.
 
     Attributes:
@@ -179,7 +179,7 @@ class Derivatives:
 
     block: Block
     numbers: int
-    groups: Sequence[Group] = field(repr=False)
+    groups: Sequence[ParameterGroup] = field(repr=False)
 
     @property
     def time(self) -> FloatArray:
@@ -204,7 +204,7 @@ class Derivatives:
         return slopes
 
 
-def _existing(slopes: FloatArray) -> FloatArray:
+def _finite_or_zero(slopes: FloatArray) -> FloatArray:
     return np.where(np.isfinite(slopes), slopes, 0.0)
 
 
@@ -260,21 +260,21 @@ def derivatives_of(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) ->
     block, joints = compute_block(robot, motion), range(len(robot.joints))
     groups, by_torques = [], []
     for index in joints:
-        own = [place for place, each in enumerate(chosen) if _drives(each, index)]
+        own = [place for place, each in enumerate(chosen) if _is_drive_parameter(each, index)]
         command = command_of(index, block.arrays())
         derived = drive_derivatives(robot, index, command, [chosen[at] for at in own])
         by_torques.append(derived.by_torques)
         known = Known(derived.by_numbers)
-        groups.append(Group(own, [known if joint == index else None for joint in joints]))
+        groups.append(ParameterGroup(own, [known if joint == index else None for joint in joints]))
     of_links = [place for place, each in enumerate(chosen) if each.part != ACTUATOR]
     for places, of_torques in torque_slopes(robot, motion, [chosen[at] for at in of_links]):
         of_joints = [
             None if each is None else Chained(each, slopes)
             for each, slopes in zip(of_torques, by_torques, strict=True)
         ]
-        groups.append(Group([of_links[at] for at in places], of_joints))
+        groups.append(ParameterGroup([of_links[at] for at in places], of_joints))
     return Derivatives(block, len(chosen), groups)
 
 
-def _drives(parameter: Parameter, joint: int) -> bool:
+def _is_drive_parameter(parameter: Parameter, joint: int) -> bool:
     return parameter.joint == joint and parameter.part == ACTUATOR

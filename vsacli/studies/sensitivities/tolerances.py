@@ -105,9 +105,9 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
     """
     written = text.strip()
     if share := PER_CENT.fullmatch(written):
-        size = _share(share["number"], written)
+        size = _share_of_percent(share["number"], written)
     elif _PLAIN.fullmatch(written):
-        size = _number(written, written)
+        size = _tolerance_number(written, written)
         if size > 1:  # more likely percent than a multiple
             raise InputError.one(
                 f"{written!r} has no unit; write {written}% for all parameters, or name a YAML file"
@@ -121,7 +121,7 @@ def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | N
     )
 
 
-def deviations(tolerances: Sequence[Tolerance | None]) -> FloatArray:
+def tolerance_deviations(tolerances: Sequence[Tolerance | None]) -> FloatArray:
     """Return the standard deviation of each parameter, zero for exact ones."""
     return np.array([0.0 if each is None else each.deviation for each in tolerances])
 
@@ -170,19 +170,19 @@ def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
         raise InputError.one(f"expected a distribution, {FORM}, found {shape}: {size}")
     share = PER_CENT.fullmatch(size.text)
     if share is None:
-        return Tolerance(shape, _number(size.text, size.text, unit))
-    return Tolerance(shape, _share(share["number"], size.text) * abs(value))
+        return Tolerance(shape, _tolerance_number(size.text, size.text, unit))
+    return Tolerance(shape, _share_of_percent(share["number"], size.text) * abs(value))
 
 
-def _share(percent: str, whole: str) -> float:
+def _share_of_percent(percent: str, whole: str) -> float:
     """Return a share given in percent."""
-    share = _number(percent, whole) / 100
+    share = _tolerance_number(percent, whole) / 100
     if share > 1:
         raise InputError.one(f"must be at most 100 %, not {whole}")
     return share
 
 
-def _number(text: str, whole: str, unit: str = "") -> float:
+def _tolerance_number(text: str, whole: str, unit: str = "") -> float:
     try:
         number: float = evaluate(text, unit)
     except ExpressionError as error:
@@ -248,7 +248,7 @@ def monte_carlo(
             if tolerance is not None
         }
         try:
-            sums.add(*_run(robot.replace(drawn), trajectory))
+            sums.add(*_run_torques(robot.replace(drawn), trajectory))
         except InputError as error:
             refused += 1
             if refused == runs:
@@ -264,7 +264,7 @@ def monte_carlo(
     )
 
 
-def _run(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:
+def _run_torques(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:
     """Return tau_motor, (samples, joints, 2), and a mask of joints with a failed sample, (joints,)."""
     size = usual_block(len(robot.joints))
     blocks = [

@@ -120,10 +120,10 @@ def choices(
     ranked = np.where(trials.does.any(axis=0), np.where(trials.does, cost, np.inf), trials.largest)
     best = ranked.argmin(axis=0)
     found = [
-        _choice(motor, trials, (int(best[index]), index), possible, bool(gears.listed))
+        _best_choice(motor, trials, (int(best[index]), index), possible, bool(gears.listed))
         for index, motor in enumerate(motors)
     ]
-    return tuple(sorted(found, key=lambda choice: _order(choice, criterion)))
+    return tuple(sorted(found, key=lambda choice: _sort_key(choice, criterion)))
 
 
 class _Trials(NamedTuple):
@@ -174,16 +174,16 @@ def _best_of_range(
         balance = balanced(demand, shafts, ends)
         wanted = balance if criterion == "utilization" else np.where(within.empty, balance, wanted)
     found = np.where(within.empty, ends.nearest(wanted), within.nearest(wanted))
-    return _rounded(found, within)
+    return _rounded_ratios(found, within)
 
 
-def _rounded(ratios: FloatArray, within: Ratios) -> FloatArray:
+def _rounded_ratios(ratios: FloatArray, within: Ratios) -> FloatArray:
     """Return ratios rounded to `DIGITS`, unless rounding leaves the range."""
     short = np.array([float(f"{ratio:.{DIGITS}g}") for ratio in ratios])
     return np.where((short >= within.low) & (short <= within.high), short, ratios)
 
 
-def _choice(
+def _best_choice(
     motor: CatalogMotor, trials: _Trials, place: tuple[int, int], possible: Ratios, listed: bool
 ) -> Choice:
     """Return the choice of a motor from its best trial."""
@@ -206,7 +206,7 @@ def _choice(
     )
 
 
-def _order(choice: Choice, criterion: str) -> tuple[bool, float, str]:
+def _sort_key(choice: Choice, criterion: str) -> tuple[bool, float, str]:
     """Return the key by which choices are sorted."""
     return not choice.does, cost_of(choice, criterion), choice.motor
 
@@ -244,7 +244,7 @@ def coupled_choices(
     possible = _buildable(joint, *inertias)
     lacking, cost = (
         np.add.outer([not each.does for each in first], [not each.does for each in second]).astype(float),
-        _costs(first, second, criterion),
+        _pair_costs(first, second, criterion),
     )
     ranks = np.add.outer(np.arange(len(first)), np.arange(len(second)))
     order = np.lexsort([each.ravel() for each in (ranks, cost, lacking, ~possible)])
@@ -269,7 +269,7 @@ def _buildable(joint: Joint, first: Sequence[float], second: Sequence[float]) ->
     return possible
 
 
-def _costs(first: Sequence[Choice], second: Sequence[Choice], criterion: str) -> FloatArray:
+def _pair_costs(first: Sequence[Choice], second: Sequence[Choice], criterion: str) -> FloatArray:
     costs = [[cost_of(each, criterion) for each in some] for some in (first, second)]
     together = np.maximum if criterion == "utilization" else np.add
     return np.asarray(together.outer(*costs), dtype=np.float64)

@@ -248,7 +248,7 @@ def demanded(
         run = Run(robot, trajectory)
         blocks, left_out = [], 0
         for block in run:
-            blocks.append(_moved(robot, block))
+            blocks.append(_motor_motion(robot, block))
             springs.add(block, name)
             left_out += int(np.count_nonzero(np.any(has_flag(block.flags, UNDONE), axis=1)))
             progress(len(block.time))
@@ -266,7 +266,7 @@ def _distinguished(names: Sequence[str]) -> Iterator[str]:
         yield f"{name} ({earlier + 1})" if earlier else name
 
 
-def _moved(robot: Robot, block: Block) -> dict[str, FloatArray]:
+def _motor_motion(robot: Robot, block: Block) -> dict[str, FloatArray]:
     """Return motion, loads and torques of the motors in a block, (samples, joints, 2)."""
     load = block.tau_transmission.copy()
     for index, joint in enumerate(robot.joints):
@@ -284,13 +284,13 @@ def _motors(
 ) -> Iterator[MotorDemand]:
     for index, joint in enumerate(robot.joints):
         for side in range(min(SIDES, joint.actuator.motor_count)):
-            kept = [_kept(part, index, side) for part in parts]
+            kept = [_feasible_demand(part, index, side) for part in parts]
             runs = [np.full(len(each["time"]), number) for number, each in enumerate(kept)]
             together = {name: np.concatenate([each[name] for each in kept]) for name in kept[0]}
             yield MotorDemand(joint.name, joint.type, side + 1, names, np.concatenate(runs), **together)
 
 
-def _kept(part: dict[str, FloatArray], index: int, side: int) -> dict[str, FloatArray]:
+def _feasible_demand(part: dict[str, FloatArray], index: int, side: int) -> dict[str, FloatArray]:
     """Return the demand of one trajectory on a motor at feasible samples, with their weights."""
     of_motor = {name: values if values.ndim == 1 else values[:, index, side] for name, values in part.items()}
     known: BoolArray = np.all(np.isfinite([of_motor[name] for name in MOVED]), axis=0)

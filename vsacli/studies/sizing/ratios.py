@@ -139,7 +139,7 @@ def shares(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
         shafts: motors to compare.
         ratio: gear ratios, (motors,).
     """
-    torque, voltage = _peaks(demand, shafts, ratio)
+    torque, voltage = _peak_torque_and_voltage(demand, shafts, ratio)
     used = (torque, rms_torque(demand, shafts, ratio), demand.top_speed * ratio, voltage)
     bounds = shafts.bounds.values()
     return np.stack([each / bound for each, bound in zip(used, bounds, strict=True)], axis=-1)
@@ -152,7 +152,9 @@ def rms_torque(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatAr
     return np.sqrt(np.maximum(square, 0.0))  # if load and rotor cancel, rounding may leave a negative value
 
 
-def _peaks(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _peak_torque_and_voltage(
+    demand: MotorDemand, shafts: Shaft, ratio: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return the largest |torque| and |voltage|, each (motors,)."""
     coefficients = shafts.coefficients(ratio)
     of_voltage = shafts.volts_per_torque[:, None] * coefficients

@@ -80,7 +80,7 @@ def size_drives(
     offered = _offered(robot, demand.motors, table, by_joint, criterion)
     found = [_sized(*each, table) for each in zip(demand.motors, own, offered, strict=True)]
     of_motions = [warning for motion in trajectories for warning in motion.warnings]
-    warnings = [*robot.warnings, *of_motions, *_repeated(trajectories)]
+    warnings = [*robot.warnings, *of_motions, *_repetition_warnings(trajectories)]
     return Sizing(
         robot=robot.name,
         outcomes=demand.outcomes,
@@ -90,7 +90,7 @@ def size_drives(
         motors=tuple(found),
         springs=demand.springs,
         warnings=tuple(dict.fromkeys(warnings)),
-        notes=tuple(_notes(robot, table)),
+        notes=tuple(_assumption_notes(robot, table)),
     )
 
 
@@ -98,7 +98,7 @@ INSTANTS = 9
 """Evenly spread times at which two trajectories with the same file are compared."""
 
 
-def _repeated(trajectories: Sequence[Trajectory]) -> Iterator[str]:
+def _repetition_warnings(trajectories: Sequence[Trajectory]) -> Iterator[str]:
     """Yield a warning for each trajectory that is given several times, which weights means."""
 
     def content(trajectory: Trajectory) -> tuple[Any, ...]:
@@ -186,7 +186,7 @@ def _own(demand: MotorDemand, motor: JointMotor, points: WorkingPoints) -> OwnMo
     return replace(own, low=float(low), high=float(high))
 
 
-def _notes(robot: Robot, table: RecordTable[CatalogMotor] | None) -> Iterator[str]:
+def _assumption_notes(robot: Robot, table: RecordTable[CatalogMotor] | None) -> Iterator[str]:
     """Yield notes on assumptions that are not obvious."""
     coupled = [joint.name for joint in robot.joints if joint.actuator.coupled_rotors]
     if coupled and table is not None:

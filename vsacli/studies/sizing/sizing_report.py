@@ -121,14 +121,14 @@ class Sizing(Published):
 
 def _highest(motors: Sequence[MotorSizing]) -> str:
     """Return a clause with the highest utilization of all motors; empty if no limit is known."""
-    known = [motor for motor in motors if _shares(motor)]
+    known = [motor for motor in motors if _limit_shares(motor)]
     if not known:
         return ""
-    motor = max(known, key=lambda each: max(_shares(each).values()))
-    return f", utilization up to {_share(max(_shares(motor).values()))} ({motor.name})"
+    motor = max(known, key=lambda each: max(_limit_shares(each).values()))
+    return f", utilization up to {_share_text(max(_limit_shares(motor).values()))} ({motor.name})"
 
 
-def _shares(motor: MotorSizing) -> dict[str, float]:
+def _limit_shares(motor: MotorSizing) -> dict[str, float]:
     """Return the used share of each limit, of the best choice if there is a catalog."""
     return motor.best.shares if motor.best else motor.own.shares if motor.own else {}
 
@@ -261,8 +261,8 @@ def choice_rows(motors: Sequence[MotorSizing]) -> list[tuple[str, ...]]:
 def lacking(motors: Sequence[MotorSizing]) -> Iterator[str]:
     """Yield a sentence for each motor for which nothing suffices: nearest choice and violated limits."""
     for motor in motors:
-        shares = _shares(motor)
-        beyond = [_used(shares[name], WORDS[name]) for name in LIMITS if shares.get(name, 0) > 1]
+        shares = _limit_shares(motor)
+        beyond = [_used_text(shares[name], WORDS[name]) for name in LIMITS if shares.get(name, 0) > 1]
         if motor.asked is None:
             yield f"{motor.name}: no sample is feasible, so nothing is known of it"
         elif motor.best is not None:
@@ -279,7 +279,7 @@ def _other_gears(motor: MotorSizing) -> str:
         return ""
     if math.isnan(motor.own.low):
         return "; no other gear would suffice"
-    return f"; gears {_range(motor.own.low, motor.own.high)} would suffice"
+    return f"; gears {_gear_range_text(motor.own.low, motor.own.high)} would suffice"
 
 
 def spring_rows(springs: Sequence[SpringDemand], *, several: bool) -> list[tuple[str, ...]]:
@@ -318,10 +318,10 @@ def _without_empty(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
 def _gears(choice: Choice) -> str:
     if choice.ratios:
         return ", ".join(f"{ratio:g}" for ratio in choice.ratios)
-    return "-" if math.isnan(choice.low) else _range(choice.low, choice.high)
+    return "-" if math.isnan(choice.low) else _gear_range_text(choice.low, choice.high)
 
 
-def _range(low: float, high: float) -> str:
+def _gear_range_text(low: float, high: float) -> str:
     if low == 0:
         return "any" if math.isinf(high) else f"up to {high:.4g}"
     return f"from {low:.4g}" if math.isinf(high) else f"{low:.4g} to {high:.4g}"
@@ -343,14 +343,14 @@ MANY = 10
 """Share of a limit from which on it is shown as a multiple."""
 
 
-def _share(share: float) -> str:
+def _share_text(share: float) -> str:
     if math.isnan(share):
         return "-"
     return f"{100 * share:.3g} %" if share < MANY else f"{share:.3g} times"
 
 
-def _used(share: float, limit: str) -> str:
-    return f"{_share(share)} {'of ' if share < MANY else ''}its {limit}"
+def _used_text(share: float, limit: str) -> str:
+    return f"{_share_text(share)} {'of ' if share < MANY else ''}its {limit}"
 
 
 def _when(peak: Peak, *, several: bool) -> str:

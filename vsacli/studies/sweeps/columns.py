@@ -1,7 +1,7 @@
 """Columns of the table of a study: scalars of the report of each run, and variables over time.
 
 Each is declared once as a `Column`. The values of a run form a row of numbers, column after column: `scalars`
-and `Recorder` make such rows, `arrays_of` and `filled` convert many rows to arrays by name.
+and `Recorder` make such rows, `arrays_of` and `pad_curves` convert many rows to arrays by name.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ OVER_TIME = {
 """Variables of results that may be kept over time, by name; `time` is kept with them."""
 
 
-def over_time(names: Sequence[str]) -> tuple[Column, ...]:
+def curve_columns(names: Sequence[str]) -> tuple[Column, ...]:
     """Return the columns of the named variables, preceded by the time; none without names."""
     return tuple(OVER_TIME[name] for name in dict.fromkeys((TIME, *names))) if names else ()
 
@@ -198,7 +198,7 @@ def steps_of(curves: FloatArray, kept: Sequence[Column], joints: int) -> int:
     return len(curves) // width(kept, joints) if kept else 0
 
 
-def filled(
+def pad_curves(
     rows: Sequence[FloatArray], kept: Sequence[Column], steps: int, joints: int
 ) -> dict[str, FloatArray]:
     """Return curves of several runs as arrays (runs, steps, ...) by name, NaN after the end of a run."""

@@ -57,7 +57,7 @@ def file_numbers(numbers: Sequence[NumberAtPath], joint_types: Mapping[str, str]
         FileNumber(
             _dotted(each.path),
             _dotted(each.path, indexed=True),
-            each.quantity.unit(_type(each, joint_types)),
+            each.quantity.unit(_joint_type(each, joint_types)),
             each.value,
         )
         for each in numbers
@@ -70,7 +70,7 @@ def _dotted(path: NumberPath, *, indexed: bool = False) -> str:
     )
 
 
-def _type(number: NumberAtPath, joint_types: Mapping[str, str]) -> str:
+def _joint_type(number: NumberAtPath, joint_types: Mapping[str, str]) -> str:
     names = (step.name for step in number.path if isinstance(step, PathIndex))
     return next((joint_types[name] for name in names if name in joint_types), "revolute")
 
@@ -138,7 +138,7 @@ def dimensions_of(
         case Spaced() as spaced:
             yield Dimension(varied.path, unit, _spaced(spaced, unit))
         case Ranged(least=least, largest=largest):
-            low, high = (_number(text, unit) for text in (least, largest))
+            low, high = (_dimension_number(text, unit) for text in (least, largest))
             if not low < high:
                 raise InputError.one(f"expected uniform: [least, largest], found {least} and {largest}")
             size = (high - low) / 2
@@ -151,7 +151,7 @@ def dimensions_of(
                 hint = did_you_mean(path, [each.path for each in before if not each.linked])
                 raise InputError.one(f"linked: no path above it that varies independently is {path!r}{hint}")
             yield Dimension(
-                varied.path, unit, linked=path, factor=_number(factor, "1"), numeric=origin.numeric
+                varied.path, unit, linked=path, factor=_dimension_number(factor, "1"), numeric=origin.numeric
             )
 
 
@@ -179,7 +179,11 @@ def _distributed(
 
 
 def _spaced(spaced: Spaced, unit: str) -> tuple[float, ...]:
-    first, last, count = _number(spaced.first, unit), _number(spaced.last, unit), _number(spaced.steps, "1")
+    first, last, count = (
+        _dimension_number(spaced.first, unit),
+        _dimension_number(spaced.last, unit),
+        _dimension_number(spaced.steps, "1"),
+    )
     if not (count.is_integer() and 1 <= count <= MOST_VALUES):
         raise InputError.one(
             f"{spaced.shape}: expected a count from 1 to {MOST_VALUES:,}, found {spaced.steps}"
@@ -193,7 +197,7 @@ def _spaced(spaced: Spaced, unit: str) -> tuple[float, ...]:
     return tuple(np.geomspace(first, last, int(count)).tolist())
 
 
-def _number(text: str, unit: str) -> float:
+def _dimension_number(text: str, unit: str) -> float:
     try:
         number = float(evaluate(text, unit or str(ANY_SI_UNIT)))
     except ExpressionError as error:
@@ -314,7 +318,7 @@ class Design:
             if file.method == GRID:
                 total += f" ({' x '.join(f'{size:,}' for size in (trajectories, *self._sizes))})"
             raise InputError.one(f"{total} are more than {MOST_RUNS:,}; {advice}")
-        self._shares = None if file.method == GRID else _shares(file, self.points, len(self._own))
+        self._shares = None if file.method == GRID else _quantile_shares(file, self.points, len(self._own))
 
     def different(self, dimensions: Sequence[Dimension]) -> int:
         """Return the number of different combinations of values of some dimensions."""
@@ -343,7 +347,7 @@ class Design:
         return value if number is None else number * dimension.factor
 
 
-def _shares(file: StudyFile, points: int, dimensions: int) -> FloatArray:
+def _quantile_shares(file: StudyFile, points: int, dimensions: int) -> FloatArray:
     """Return shares from 0 to 1, (points, dimensions), whose quantiles are the values of the points.
 
     A Latin hypercube divides each dimension into as many layers as there are points, with one point in each

@@ -170,7 +170,7 @@ class Journal:
         Raises:
             StorageError: the disk is full or fails; previous rows are kept.
         """
-        line = _line(row)
+        line = _journal_line(row)
         try:
             os.lseek(self._file, self._end, os.SEEK_SET)
             rest = memoryview(line)
@@ -217,7 +217,7 @@ _CHECK = 8
 _BEGINNING = re.compile(rb'[0-9a-f]{8} \{"key": ')
 
 
-def _line(row: Row) -> bytes:
+def _journal_line(row: Row) -> bytes:
     arrays = {name: base64.b64encode(getattr(row, name).tobytes()).decode() for name in _ARRAYS}
     content = {"key": row.key, **{name: getattr(row, name) for name in _TEXTS}, **arrays}
     text = json.dumps(content).encode()

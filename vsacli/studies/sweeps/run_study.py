@@ -66,7 +66,7 @@ def run_study(
     study = load_study(path, engine)
     for warning in study.warnings:  # once, not for each run
         tell(f"warning: {warning}")
-    runs, suffix = _part(study, *shard)
+    runs, suffix = _study_part(study, *shard)
     target = Path(f"{Path(path).stem}{suffix}.h5" if table is None else table)
     with Outputs(overwrite=overwrite, inputs=[source.path for source in study.sources]) as outputs:
         outputs.check(target)
@@ -86,7 +86,7 @@ def run_study(
     return StoredStudy(target)
 
 
-def _part(study: Study, number: int, parts: int) -> tuple[range, str]:
+def _study_part(study: Study, number: int, parts: int) -> tuple[range, str]:
     """Return the runs of a part of a study, and the suffix for the name of its table."""
     if not 1 <= number <= parts:
         raise InputError.one(

@@ -28,7 +28,7 @@ from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.results.store.study_table import TEXTS
 from vsacli.robot.file import RobotFileWithSource, read_robot_file
 from vsacli.robot.model import Robot
-from vsacli.studies.sweeps.columns import KEPT, Column, over_time
+from vsacli.studies.sweeps.columns import KEPT, Column, curve_columns
 from vsacli.studies.sweeps.dimensions import Design, Dimension, Entries
 from vsacli.studies.sweeps.study_file import StudyFile
 from vsacli.trajectory.changes import ChangesByFile, divide_changes_by_file
@@ -51,11 +51,11 @@ def settled_engine(
         InputError: the engine is unknown, or its C compiler is missing.
     """
     # C code is compiled for each robot, so it pays if each robot has enough samples
-    samples = _samples(robot, trajectories, dimensions, design) if name == "auto" else 0
+    samples = _samples_of_robot(robot, trajectories, dimensions, design) if name == "auto" else 0
     return settle(name, InverseDynamics(robot), samples)
 
 
-def _samples(
+def _samples_of_robot(
     robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
 ) -> int:
     """Return the samples in all runs of one robot, assuming those of the first run of each trajectory."""
@@ -63,10 +63,10 @@ def _samples(
     robots = design.different(
         [each for each in dimensions if divide_changes_by_file({each.path: None}).robot]
     )
-    return sum(_steps(path, robot, changes) for path in trajectories) * design.points // robots
+    return sum(_samples_of_run(path, robot, changes) for path in trajectories) * design.points // robots
 
 
-def _steps(path: str, robot: Robot, changes: Changes) -> int:
+def _samples_of_run(path: str, robot: Robot, changes: Changes) -> int:
     """Return the samples of the first run, or of the file if the changes do not fit."""
     try:
         return load_trajectory(path, robot, changes).samples
@@ -138,7 +138,7 @@ class Study:
     @property
     def over_time(self) -> tuple[Column, ...]:
         """Columns stored for each run over time."""
-        return over_time(self.file.variables or ())
+        return curve_columns(self.file.variables or ())
 
     @property
     def sources(self) -> list[Source]:
@@ -201,7 +201,7 @@ class Study:
         """
         for source in sources:
             if self._known.get(source.path, source.sha256) != source.sha256:
-                raise _changed(source.path)
+                raise _changed_error(source.path)
 
     def check_files(self) -> None:
         """Check that no file of the study has changed.
@@ -215,7 +215,7 @@ class Study:
             except OSError:
                 content = b""
             if hashlib.sha256(content).hexdigest() != sha256:
-                raise _changed(path)
+                raise _changed_error(path)
 
     def as_named(self, error: InputError) -> InputError:
         """Return the error with file names relative to the study, so that it is equal on every machine."""
@@ -233,7 +233,7 @@ class Study:
         return _digest([self.digest, trajectory, point.values])
 
 
-def _changed(path: str) -> ChangedError:
+def _changed_error(path: str) -> ChangedError:
     return ChangedError.one("was changed while the study was computed; run it again", path)
 
 
@@ -263,7 +263,7 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     _check_named(source, "robot", file.robot)
     read = read_robot_file(folder / file.robot)
     robot = read.robot()
-    for each in over_time(file.variables or ()):
+    for each in curve_columns(file.variables or ()):
         if not robot.has_variable(VARIABLES[each.name]):
             raise InputError.one(f"variables: no joint of {robot.name} has a {each.name}", source.path)
     trajectories = _trajectories(file, folder, source)

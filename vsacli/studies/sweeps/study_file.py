@@ -111,7 +111,7 @@ class Ways(OwnKind):
         for path, entry in node.entries.items():
             try:
                 check_path_of_change(path)
-                found.append(Varied(path, node.key_lines[path], _way(entry)))
+                found.append(Varied(path, node.key_lines[path], _variation(entry)))
             except InputError as error:
                 message = error.problems[0].message
                 scope.problems.add(entry.line, message if message.startswith(path) else f"{path}: {message}")
@@ -128,7 +128,7 @@ class Ways(OwnKind):
         return {varied.path: str(varied.way) for varied in content}
 
 
-def _way(node: Node) -> Way:
+def _variation(node: Node) -> Way:
     match node:
         case tree.ListNode(items=items) if items:
             return Listed(tuple(map(tree.plain, items)))
@@ -140,26 +140,28 @@ def _way(node: Node) -> Way:
 def _mapped(node: tree.MapNode, entries: Mapping[str, Node]) -> Way:
     key = next(iter(entries))
     if LINKED in entries:
-        texts = {word: _text(entry, word) for word, entry in entries.items() if word in (LINKED, FACTOR)}
+        texts = {
+            word: _scalar_text(entry, word) for word, entry in entries.items() if word in (LINKED, FACTOR)
+        }
         if len(texts) == len(entries):
             return Linked(texts[LINKED], texts.get(FACTOR, "1"))
     elif len(entries) == 1 and key in SPACED:
-        return Spaced(key, *_texts(entries[key], 3, f"{key}: [first, last, count]"))
+        return Spaced(key, *_scalar_texts(entries[key], 3, f"{key}: [first, last, count]"))
     elif len(entries) == 1 and key in SHAPES:
         if key == "uniform" and isinstance(entries[key], tree.ListNode):
-            return Ranged(*_texts(entries[key], 2, "uniform: [least, largest]"))
+            return Ranged(*_scalar_texts(entries[key], 2, "uniform: [least, largest]"))
         return Drawn(node)
     hint = did_you_mean(key, [*SPACED, *SHAPES, LINKED]) if len(entries) == 1 else ""
     raise InputError.one(f"expected {FORMS}, found a mapping with {', '.join(entries)}{hint}")
 
 
-def _texts(node: Node, count: int, form: str) -> list[str]:
+def _scalar_texts(node: Node, count: int, form: str) -> list[str]:
     if not isinstance(node, tree.ListNode) or len(node.items) != count:
         raise InputError.one(f"expected {form}, found {node}")
-    return [_text(item, form) for item in node.items]
+    return [_scalar_text(item, form) for item in node.items]
 
 
-def _text(node: Node, form: str) -> str:
+def _scalar_text(node: Node, form: str) -> str:
     if not isinstance(node, tree.TextNode):
         raise InputError.one(f"expected a single value in {form}, found {node}")
     return node.text

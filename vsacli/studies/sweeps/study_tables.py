@@ -25,7 +25,7 @@ from vsacli.results.store.study_table import (
     StudyWriter,
     rows_at_once,
 )
-from vsacli.studies.sweeps.columns import arrays_of, filled, steps_of, width
+from vsacli.studies.sweeps.columns import arrays_of, pad_curves, steps_of, width
 from vsacli.studies.sweeps.journal import Journal
 from vsacli.studies.sweeps.rows import FAILED, Row
 from vsacli.studies.sweeps.study import Study
@@ -63,7 +63,7 @@ def write(
     at_once = rows_at_once(steps)
     with StudyWriter(file, _head_of_study(study, steps, provenance), len(runs)) as writer:
         for start in range(0, len(runs), at_once):
-            writer.write(_rows(study, [row(run) for run in runs[start : start + at_once]], steps))
+            writer.write(_table_rows(study, [row(run) for run in runs[start : start + at_once]], steps))
         writer.finish()
 
 
@@ -95,7 +95,7 @@ def _head_of_study(study: Study, steps: int, provenance: dict[str, str]) -> Head
     )
 
 
-def _rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
+def _table_rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
     points = [study.point(row.run) for row in rows]
     arrays: dict[str, Any] = {
         "trajectory": [study.trajectories[point.trajectory] for point in points],
@@ -117,7 +117,7 @@ def _rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
             table[place] = row.values
     arrays |= arrays_of(columns, table, joints)
     if study.over_time:
-        arrays |= filled([row.curves for row in rows], study.over_time, steps, joints)
+        arrays |= pad_curves([row.curves for row in rows], study.over_time, steps, joints)
     return Rows([row.run for row in rows], arrays)
 
 
@@ -143,12 +143,12 @@ def merge(paths: Sequence[str | Path], file: Staged, **provenance: str) -> None:
     with ExitStack() as stack:
         parts = [stack.enter_context(StoredStudy(path)) for path in paths]
         _check_alike(parts)
-        order = _order(parts)
+        order = _row_order(parts)
         steps = max(part.steps for part in parts)
         with StudyWriter(file, _head_of_parts(parts[0], steps, provenance), len(order)) as writer:
             for start in range(0, len(order), rows_at_once(steps)):
                 rows = order[start : start + rows_at_once(steps)]
-                writer.write(Rows(range(start, start + len(rows)), _arrays(parts, rows, steps)))
+                writer.write(Rows(range(start, start + len(rows)), _concatenated_columns(parts, rows, steps)))
             writer.finish()
 
 
@@ -170,7 +170,7 @@ def _check_alike(parts: Sequence[StoredStudy]) -> None:
             )
 
 
-def _order(parts: Sequence[StoredStudy]) -> IndexArray:
+def _row_order(parts: Sequence[StoredStudy]) -> IndexArray:
     """Return the index of each run's row in the concatenated parts."""
     runs = np.concatenate([part.read("run") for part in parts])
     lost = np.concatenate([np.array(part.texts("verdict")) == FAILED for part in parts])
@@ -187,7 +187,7 @@ def _order(parts: Sequence[StoredStudy]) -> IndexArray:
     return order
 
 
-def _arrays(parts: Sequence[StoredStudy], rows: IndexArray, steps: int) -> dict[str, Any]:
+def _concatenated_columns(parts: Sequence[StoredStudy], rows: IndexArray, steps: int) -> dict[str, Any]:
     """Return all columns of some runs; `rows` are indices into the concatenated parts."""
     first = parts[0]
     texts = {name for name in (*TEXTS, *first.parameters) if name in TEXTS or first.parameter_is_text(name)}

@@ -187,11 +187,13 @@ def _worst(table: StoredStudy) -> list[Extreme]:
     for index, joint in enumerate(table.joint_names):
         if np.isfinite(margins[:, index]).any():
             row = int(np.nanargmin(margins[:, index]))
-            found.append(Extreme(joint, float(margins[row, index]), int(runs[row]), _shown(table, row)))
+            found.append(
+                Extreme(joint, float(margins[row, index]), int(runs[row]), _differing_values(table, row))
+            )
     return found
 
 
-def _shown(table: StoredStudy, row: int) -> dict[str, str]:
+def _differing_values(table: StoredStudy, row: int) -> dict[str, str]:
     """Return the values of a row that differ between rows."""
     shown = {}
     for path in (*table.parameters, "trajectory"):

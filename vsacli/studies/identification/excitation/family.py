@@ -1,8 +1,8 @@
 """Excitation trajectories of a family: sums of sinusoids for position and stiffness, from rest to rest.
 
-`allowed` gives the range of each joint: the limits of the robot, or cautious ones if it has none. A `Design`
-makes members of its family from parameters, and `feasible` scales each down as the limits of torques,
-currents and other variables require.
+`allowed` gives the range of each joint: the limits of the robot, or cautious ones if it has none. An
+`ExcitationFamily` makes members of its family from parameters, and `feasible` scales each down as the limits
+of torques, currents and other variables require.
 """
 
 from __future__ import annotations
@@ -74,7 +74,9 @@ def allowed(robot: Robot, middle: FloatArray | None = None) -> Allowed:
     """
     about = np.zeros(len(robot.joints)) if middle is None else middle
     words = "zero" if middle is None else "its middle in the motion given"
-    ranges = np.array([_range(joint, float(each)) for joint, each in zip(robot.joints, about, strict=True)])
+    ranges = np.array(
+        [_position_range(joint, float(each)) for joint, each in zip(robot.joints, about, strict=True)]
+    )
     limits = np.array([min(map(abs, joint.limits.velocity)) for joint in robot.joints])
     usual = [USUAL_SPEED[joint.type] for joint in robot.joints]
     speeds = np.where(np.isfinite(limits), limits, usual)
@@ -82,7 +84,7 @@ def allowed(robot: Robot, middle: FloatArray | None = None) -> Allowed:
     return Allowed(lowest, highest, (1 - MARGIN) * speeds, tuple(_assumptions(robot, words)))
 
 
-def _range(joint: Joint, middle: float) -> tuple[float, float]:
+def _position_range(joint: Joint, middle: float) -> tuple[float, float]:
     """Return the position range of a joint; a missing limit is `USUAL_REACH` from the middle or further."""
     lower, upper = joint.limits.position
     reach = USUAL_REACH[joint.type]
@@ -98,13 +100,13 @@ def _assumptions(robot: Robot, middle: str) -> Iterator[str]:
     """Yield a clause for each kind of missing limit, with all joints that lack it."""
     places: dict[str, list[str]] = {}
     for joint in robot.joints:
-        for lacking in _lacking(joint, middle):
+        for lacking in _missing_limits(joint, middle):
             places.setdefault(lacking, []).append(joint.name)
     for lacking, names in places.items():
         yield f"no {lacking}: {', '.join(names)}"
 
 
-def _lacking(joint: Joint, middle: str) -> Iterator[str]:
+def _missing_limits(joint: Joint, middle: str) -> Iterator[str]:
     """Yield the missing limits of a joint, each with its assumption."""
     position, velocity = units.POSITION.unit(joint.type), units.VELOCITY.unit(joint.type)
     if not np.isfinite(joint.limits.position).all():
@@ -140,7 +142,7 @@ DIGITS = 4
 
 
 @dataclass(frozen=True)
-class Design:
+class ExcitationFamily:
     """A family of excitations of a robot, whose members have parameters of about unit size around zero.
 
     For each signal and joint these are the sine and cosine amplitude of each harmonic, to be divided by the
@@ -204,7 +206,7 @@ class Design:
         low, high = rows[0].min(axis=1), rows[0].max(axis=1)
         speed = np.abs(rows[1]).max(axis=1)
         room = self.allowed.highest - self.allowed.lowest
-        scale = share * _reach(numbers) * np.minimum(room / (high - low), self.allowed.speed / speed)
+        scale = share * _range_share(numbers) * np.minimum(room / (high - low), self.allowed.speed / speed)
         return _placed(raw, numbers, scale, (self.allowed.lowest, self.allowed.highest), (low, high))
 
     def _stiffness(self, numbers: FloatArray, position: Sinusoids, share: float) -> Sinusoids:
@@ -214,7 +216,7 @@ class Design:
         rows = raw.at(self.grid)
         low, high = rows[0].min(axis=1), rows[0].max(axis=1)
         highest = lowest + share * (highest - lowest)  # softer for smaller shares: preload requires torque
-        scale = _reach(numbers) * (highest - lowest) / (high - low)
+        scale = _range_share(numbers) * (highest - lowest) / (high - low)
         return _placed(raw, numbers, scale, (lowest, highest), (low, high))
 
     def _corridors(self, position: Sinusoids) -> tuple[FloatArray, FloatArray]:
@@ -259,7 +261,7 @@ class Design:
         )
 
 
-def _reach(numbers: FloatArray) -> FloatArray:
+def _range_share(numbers: FloatArray) -> FloatArray:
     """Return the used share of the allowed range, (joints,), which is 1 for a parameter of zero."""
     share: FloatArray = np.exp(-np.abs(numbers[:, -2]) / 2)
     return share
@@ -276,12 +278,13 @@ def _placed(
     lowest, highest = room[0] - scale * extent[0], room[1] - scale * extent[1]
     offset = (lowest + highest + np.tanh(numbers[:, -1]) * (highest - lowest)) / 2
     sine, cosine = (
-        tuple(tuple(map(_digits, row)) for row in scale * np.array(rows)) for rows in (raw.sine, raw.cosine)
+        tuple(tuple(map(_short_value, row)) for row in scale * np.array(rows))
+        for rows in (raw.sine, raw.cosine)
     )
-    return replace(raw, offset=tuple(map(_digits, offset)), sine=sine, cosine=cosine)
+    return replace(raw, offset=tuple(map(_short_value, offset)), sine=sine, cosine=cosine)
 
 
-def _digits(value: float) -> float:
+def _short_value(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
 
 
@@ -303,25 +306,25 @@ class Member(NamedTuple):
         value: merit, the larger the better; NaN until it is computed.
     """
 
-    design: Design
+    design: ExcitationFamily
     numbers: FloatArray
     trajectory: Trajectory
     block: Block
     value: float = math.nan
 
 
-def feasible(design: Design, numbers: FloatArray) -> Member | None:
+def feasible(design: ExcitationFamily, numbers: FloatArray) -> Member | None:
     """Return the member of a family, scaled down as far as the limits require.
 
     Return None if it violates a limit even nearly at rest.
     """
-    found = _tried(design, numbers, 1.0)
+    found = _feasible_member(design, numbers, 1.0)
     if found is not None:
         return found
     kept, broken = 0.0, 1.0
     for _ in range(BISECTIONS):
         share = (kept + broken) / 2
-        smaller = _tried(design, numbers, share)
+        smaller = _feasible_member(design, numbers, share)
         if smaller is None:
             broken = share
         else:
@@ -329,19 +332,19 @@ def feasible(design: Design, numbers: FloatArray) -> Member | None:
     return found
 
 
-def least_clearances(design: Design, block: Block) -> FloatArray:
+def least_clearances(design: ExcitationFamily, block: Block) -> FloatArray:
     """Return the smallest relative distance of each `watched` quantity from its bounds."""
     least: FloatArray = clearances(watched(design), block).min(axis=1, initial=np.inf)
     return least
 
 
-def watched(design: Design) -> list[Bounded]:
+def watched(design: ExcitationFamily) -> list[Bounded]:
     """Return the bounded quantities of a robot, without dampers, which stay at their minimum."""
     quantities = bounded_quantities(design.robot)
     return [each for each in quantities if Flag.DAMPING_LIMIT not in each.bits]
 
 
-def _tried(design: Design, numbers: FloatArray, share: float) -> Member | None:
+def _feasible_member(design: ExcitationFamily, numbers: FloatArray, share: float) -> Member | None:
     try:
         trajectory = design.member(numbers, share)
     except ImpossibleError:
@@ -352,7 +355,7 @@ def _tried(design: Design, numbers: FloatArray, share: float) -> Member | None:
     return Member(design, numbers, trajectory, block)
 
 
-def obstacle(design: Design, numbers: FloatArray) -> str:
+def obstacle(design: ExcitationFamily, numbers: FloatArray) -> str:
     """Return the reason why a member is infeasible even nearly at rest, as a clause."""
     try:
         trajectory = design.member(numbers, 0.0)

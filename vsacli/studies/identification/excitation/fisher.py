@@ -27,7 +27,7 @@ from vsacli.studies.identification.identified_values import Number
 from vsacli.studies.identification.independence import Independence, in_words, independence
 from vsacli.studies.identification.link_equations import link_system
 from vsacli.studies.identification.motor_equations import GROUPS, MotorSystem, unknowns, with_friction
-from vsacli.studies.identification.regressor import names
+from vsacli.studies.identification.regressor import link_parameter_names
 from vsacli.trajectory.trajectory import Trajectory
 
 ALL_PASS = Filter(bandwidth=np.inf, sections=np.array([[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]]), stride=1, reach=0)
@@ -89,7 +89,7 @@ class Information:
                 if others.size:
                     terms = [(int(split.dropped[at]), float(split.shares[place, at])) for at in others]
                     yield f"more than {in_words([(int(kept), 1.0), *terms], own)}"
-        of_links = names(self._robot)
+        of_links = link_parameter_names(self._robot)
         silent = np.flatnonzero(~self._links.base.shares.any(axis=0))
         if silent.size:
             yield ", ".join(of_links[at] for at in silent)

@@ -20,7 +20,7 @@ from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.family import (
     MARGIN,
     Allowed,
-    Design,
+    ExcitationFamily,
     Member,
     allowed,
     feasible,
@@ -58,8 +58,8 @@ LEAST_STEP = 0.02
 """Step size below which changes have no effect and the strategy restarts with `FIRST_STEP`."""
 
 
-def search(
-    designs: Sequence[Design],
+def search_families(
+    designs: Sequence[ExcitationFamily],
     value: Callable[[Member], float],
     seed: int,
     progress: Callable[[int], object] = lambda _: None,
@@ -82,7 +82,7 @@ def search(
     best: Member | None = None
     for start in range(STARTS):
         design = designs[start % len(designs)]
-        best = _better(best, design, random.standard_normal(design.shape), value) or best
+        best = _better_member(best, design, random.standard_normal(design.shape), value) or best
         progress(1)
     if best is None:
         return None
@@ -91,7 +91,7 @@ def search(
         numbers = best.numbers.copy()
         signal, joint = random.choice(places)
         numbers[signal, joint] += step * random.standard_normal(numbers.shape[-1])
-        better = _better(best, best.design, numbers, value)
+        better = _better_member(best, best.design, numbers, value)
         step *= GROWTH if better else GROWTH**-0.25
         step = step if step > LEAST_STEP else FIRST_STEP
         best = better or best
@@ -99,8 +99,8 @@ def search(
     return best
 
 
-def _better(
-    best: Member | None, design: Design, numbers: FloatArray, value: Callable[[Member], float]
+def _better_member(
+    best: Member | None, design: ExcitationFamily, numbers: FloatArray, value: Callable[[Member], float]
 ) -> Member | None:
     """Return the member with given parameters; None if it is infeasible or no better than `best`."""
     member = feasible(design, numbers)
@@ -168,9 +168,11 @@ def plan_excitation(
         q = executed(robot, own).q
         middle = np.asarray((q.min(axis=0) + q.max(axis=0)) / 2)
     bounds = allowed(robot, middle)
-    designs = [Design(robot, bounds, duration, each) for each in FREQUENCIES if each * duration >= 1]
-    information = Information(robot, [each.block for each in _examples(designs, seed)])
-    found = search(designs, lambda member: information.worth(member.block), seed, progress)
+    designs = [
+        ExcitationFamily(robot, bounds, duration, each) for each in FREQUENCIES if each * duration >= 1
+    ]
+    information = Information(robot, [each.block for each in _random_members(designs, seed)])
+    found = search_families(designs, lambda member: information.worth(member.block), seed, progress)
     assert found is not None, "its first starts are the examples"
     return _excitation(found, information, own, bounds, Noise(*noise), seed)
 
@@ -179,7 +181,7 @@ TRIALS = STARTS + STEPS
 """Number of motions that a plan tries."""
 
 
-def _examples(designs: list[Design], seed: int) -> list[Member]:
+def _random_members(designs: list[ExcitationFamily], seed: int) -> list[Member]:
     """Return random feasible members of the families.
 
     Raises:
@@ -240,7 +242,7 @@ def _usefulness(
         return Usefulness(conditions, reason=str(error))
 
 
-def _active(design: Design, block: Block) -> tuple[Finding, ...]:
+def _active(design: ExcitationFamily, block: Block) -> tuple[Finding, ...]:
     quantities = watched(design)
     gaps = clearances(quantities, block)
     return tuple(

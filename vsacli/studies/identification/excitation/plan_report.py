@@ -21,7 +21,7 @@ from vsacli.dynamics.limits import Finding
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.excitation.family import MARGIN, RATE
 from vsacli.studies.identification.excitation.fisher import PredictedError
-from vsacli.studies.identification.identification_text import by_joint
+from vsacli.studies.identification.identification_text import parameters_by_joint
 from vsacli.studies.search.fixed_text import formula
 from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.trajectory import Trajectory
@@ -115,7 +115,10 @@ class Excitation(Published):
         """Return the report in parts."""
         lines = [
             *self._legend(),
-            *(f"active limit, {100 * MARGIN:g} % from its bound: {_nearest(each)}" for each in self.active),
+            *(
+                f"active limit, {100 * MARGIN:g} % from its bound: {_nearest_bound_text(each)}"
+                for each in self.active
+            ),
             *([] if self.active else ["active limits: none"]),
             f"seed of the search: {self.seed}",
         ]
@@ -151,25 +154,34 @@ class Excitation(Published):
         given = () if own is None else ("+- of given\nmotion",)
         header = ("parameter", "unit", "file", "+-", "+-\n%", *given)
         rows: list[tuple[str, ...]] = [header]
-        for joint, names, numbers in by_joint(self.planned.numbers, self.robot.joint_names):
+        for joint, names, numbers in parameters_by_joint(self.planned.numbers, self.robot.joint_names):
             rows += [(joint, *[""] * (len(header) - 1))] if joint else []
             for name, each in zip(names, numbers, strict=True):
-                theirs = [] if own is None else [_error(own.get(each.path))]
-                rows.append((name, each.unit, f"{each.value:.4g}", _error(each), _share(each), *theirs))
+                theirs = [] if own is None else [_standard_error_text(own.get(each.path))]
+                rows.append(
+                    (
+                        name,
+                        each.unit,
+                        f"{each.value:.4g}",
+                        _standard_error_text(each),
+                        _standard_error_share(each),
+                        *theirs,
+                    )
+                )
         return rows
 
 
-def _nearest(finding: Finding) -> str:
+def _nearest_bound_text(finding: Finding) -> str:
     value, bound = finding.numbers
     reason = " that its load allows" if finding.kind == CORRIDOR else ""
     return f"{finding.joint}: {finding.quantity} {value} of {bound} {finding.unit}{reason}"
 
 
-def _error(number: PredictedError | None) -> str:
+def _standard_error_text(number: PredictedError | None) -> str:
     return "-" if number is None or math.isnan(number.standard_error) else f"{number.standard_error:.2g}"
 
 
-def _share(number: PredictedError) -> str:
+def _standard_error_share(number: PredictedError) -> str:
     """Return the standard error as a percentage of the value, or "-" if the value is zero."""
     if number.value == 0 or math.isnan(number.standard_error):
         return "-"
