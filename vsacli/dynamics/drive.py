@@ -145,7 +145,8 @@ def _motors_not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
     )
     infeasible, singular = (has_flag(of_joint.flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
     explained = infeasible | (theta & tau_transmission & (singular | power))
-    demand = finite([of_joint.tau_e, *(getattr(of_joint, key) for key in joint.commanded)])
+    arrays = of_joint.by_name()
+    demand = finite([of_joint.tau_e, *(arrays[key] for key in joint.commanded)])
     return ~(demand & explained)
 
 

@@ -164,7 +164,7 @@ class InverseDynamics(BlockKernel):
 def _check_limits(joint: Joint, of_joint: JointVariables) -> None:
     """Raise NotImplementedError for a limit on a variable that the joint lacks; it would go unchecked."""
     for check in limit_checks(joint):
-        if getattr(of_joint, check.variable, None) is None:
+        if check.variable not in of_joint.by_name():
             raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
 
 
