@@ -116,8 +116,8 @@ class JointVariables(NamedTuple):
     voltage: AnyArray = ABSENT
     copper_loss: AnyArray = ABSENT
     dissipated_power: AnyArray = ABSENT
-    further: Mapping[str, AnyArray] = MappingProxyType({})
-    """Commanded signals without a field here, by name."""
+    further: Any = MappingProxyType({})
+    """Arrays of commanded signals without a field here, by name."""
 
     @classmethod
     def of(cls, arrays: Mapping[str, AnyArray]) -> JointVariables:

@@ -12,6 +12,7 @@ from vsacli.analysis.report_text import joint_rows
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError, check_path
 from vsacli.base.renamed import now_called
+from vsacli.base.storage import temporary_folder
 from vsacli.base.tables import aligned, html_table
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.results.store.reader import StoredResult, open_one_of
@@ -107,9 +108,7 @@ class Result(Shown, Block):
         Raises:
             StorageError: A file exists and must not be replaced, or the folder cannot be written.
         """
-        from vsacli.base.storage import temporary_folder
         from vsacli.results.plots import plot_stored, save_figures
-        from vsacli.results.store.reader import StoredResult
 
         with temporary_folder() as place:
             path = place / f"{stem}.h5"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
@@ -179,9 +180,7 @@ class Integration:
 
     def solution(self) -> OdeSolution:
         """Return the deflections as a function of time, (2 joints, samples)."""
-        from scipy.integrate import OdeSolution
-
-        return OdeSolution(self.times, self._steps)
+        return scipy.integrate.OdeSolution(self.times, self._steps)
 
     def _rates(self, time: float, state: Any) -> Any:
         return self._equation.rates(
@@ -189,11 +188,9 @@ class Integration:
         ).ravel()
 
     def _run(self, ends: list[float], state: FloatArray) -> None:
-        from scipy.integrate import DOP853
-
         for end in ends:
             start = self.times[-1]
-            integrator = DOP853(
+            integrator = scipy.integrate.DOP853(
                 self._rates,
                 start,
                 state,

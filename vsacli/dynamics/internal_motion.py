@@ -15,6 +15,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import scipy
+from numpy.polynomial import chebyshev
 
 from vsacli.actuators.damped_springs import DampedSprings
 from vsacli.actuators.transmission import Command, InternalMotion
@@ -35,10 +37,7 @@ class Collocation:
     """Collocation at the Radau points of the cell [-1, 1], scaled to cells of time."""
 
     def __init__(self, stages: int = STAGES) -> None:
-        from numpy.polynomial import chebyshev
-        from scipy.special import roots_jacobi
-
-        self._nodes = np.append(roots_jacobi(stages - 1, 1, 0)[0], 1.0)
+        self._nodes = np.append(scipy.special.roots_jacobi(stages - 1, 1, 0)[0], 1.0)
         # From values at -1 and the nodes to coefficients of Chebyshev polynomials, and from the nodes alone.
         self._to_coefficients = np.linalg.inv(chebyshev.chebvander(np.append(-1.0, self._nodes), stages))
         self._through_nodes = np.linalg.inv(chebyshev.chebvander(self._nodes, stages - 1))
@@ -75,8 +74,6 @@ class Piecewise:
 
     def at(self, time: FloatArray) -> FloatArray:
         """Return the values, (rows, samples); beyond the ends those of the nearest cell."""
-        from numpy.polynomial import chebyshev
-
         cell = np.clip(np.searchsorted(self.ends, time, side="right") - 1, 0, len(self.ends) - 2)
         left, right = self.ends[cell], self.ends[cell + 1]
         place = np.clip(2 * (time - left) / (right - left) - 1, -1.0, 1.0)
@@ -233,8 +230,6 @@ class March:
 
     def _fit_cell(self, cell: _Cell, solution: _CellSolution) -> tuple[FloatArray, FloatArray]:
         """Return coefficients of deflections and rates; in fast cells, rates are derivatives of the fit."""
-        from numpy.polynomial import chebyshev
-
         phi = self._rule.coefficients(solution.phi)
         if solution.constants <= FAST:
             return phi, self._rule.coefficients_of_rates(solution.rates)

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.control_flow import Values, cell_of, look_up
@@ -116,18 +117,14 @@ def _potential_above_zero(
 
 def _spline_above_zero(knots: FloatArray, weights: FloatArray, degree: int) -> PPoly:
     """Return the spline from its knot at zero to the last; the other knots there enclose nothing."""
-    from scipy.interpolate import PPoly
-
-    whole = PPoly.from_spline((knots, weights, degree))
+    whole = scipy.interpolate.PPoly.from_spline((knots, weights, degree))
     first = int(np.searchsorted(whole.x, 0.0, side="right")) - 1
-    return PPoly(whole.c[:, first:-degree], whole.x[first:-degree])
+    return scipy.interpolate.PPoly(whole.c[:, first:-degree], whole.x[first:-degree])
 
 
 def times_deflection(curve: PPoly) -> PPoly:
     """Return the product phi curve(phi); each piece has its own origin."""
-    from scipy.interpolate import PPoly
-
     coefficients = np.zeros((curve.c.shape[0] + 1, curve.c.shape[1]))
     coefficients[:-1] += curve.c
     coefficients[1:] += curve.c * curve.x[:-1]
-    return PPoly(coefficients, curve.x)
+    return scipy.interpolate.PPoly(coefficients, curve.x)

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+import scipy
 
 from vsacli.actuators.laws.inversion import FirstGuess, deflection_at_torque
 from vsacli.actuators.laws.law import SpringLaw, SpringState
@@ -38,15 +39,13 @@ LEAST_SHAPE_SIZE = float(np.finfo(float).tiny)
 
 def fit_curve(deflection: FloatArray, torque: FloatArray) -> SplineCurve:
     """Fit torques (samples,) measured at ascending deflections (samples,), which begin at or below zero."""
-    from scipy.optimize import nnls
-
     pieces = int(np.clip(len(deflection) // 2, 1, MAX_PIECES))
     knots = spline_knots(float(deflection[0]), float(deflection[-1]), pieces, DEGREE)
     shapes = [_energy_curve(knots, weights, 0.0) for weights in np.eye(len(knots) - DEGREE - 1)]
     columns = np.column_stack([deflection, *(shape(deflection, 1, 1)[0] for shape in shapes)])
     sizes = np.maximum(np.abs(columns).max(axis=0), LEAST_SHAPE_SIZE)
     least = REST_STIFFNESS_SHARE * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
-    excess, *weights = nnls(columns / sizes, torque - least * deflection)[0] / sizes
+    excess, *weights = scipy.optimize.nnls(columns / sizes, torque - least * deflection)[0] / sizes
     return _energy_curve(knots, np.array(weights), least + excess)
 
 

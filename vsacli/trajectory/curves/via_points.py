@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -90,8 +91,6 @@ class ViaPoints(ClosedForm):
 
         The highest derivative is constant between two points, and stored for the first of them.
         """
-        from scipy.interpolate import make_interp_spline
-
         points, shares = np.array(self.points)[:, self._specified], np.array(self.shares)
         vanishing = (self.degree - 1) // 2
         rest = [(order, np.zeros(points.shape[1])) for order in range(1, vanishing + 1)]
@@ -99,7 +98,7 @@ class ViaPoints(ClosedForm):
             try:
                 ends: Any = (rest, rest)
                 away = points - points[0]  # zero, and so exact, for a component at rest
-                spline = make_interp_spline(shares, away, k=self.degree, bc_type=ends)
+                spline = scipy.interpolate.make_interp_spline(shares, away, k=self.degree, bc_type=ends)
             except (np.linalg.LinAlgError, ValueError):
                 raise _degree_error(self.degree) from None
             rows = np.stack([spline(shares, nu=order).T for order in range(self.degree + 1)])
@@ -149,13 +148,11 @@ class ViaPoints(ClosedForm):
 
     def _zeros(self) -> Sequence[FloatArray]:
         """Return the times, s, at which the first derivative of each given component vanishes."""
-        from scipy.interpolate import PPoly
-
         first, last = self.span
         orders = np.arange(self.degree, 0, -1)
         factorials = np.cumprod(np.arange(1.0, self.degree + 1))[::-1]
         powers = self._derivatives[orders, :, :-1] * (orders / factorials)[:, None, None]
-        slope = PPoly(np.moveaxis(powers, 1, 2), np.array(self.shares))
+        slope = scipy.interpolate.PPoly(np.moveaxis(powers, 1, 2), np.array(self.shares))
         roots = slope.roots(discontinuity=False, extrapolate=False)
         return [first + (last - first) * root[np.isfinite(root)] for root in roots]
 
@@ -171,13 +168,11 @@ def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
         points: points, (points, components); components that are NaN are ignored.
         degree: degree of the spline.
     """
-    from scipy.special import betaincinv
-
     corners = np.nan_to_num(np.asarray(points, dtype=np.float64))
     steps = np.diff(corners / (np.abs(corners).max() or 1.0), axis=0)
     lengths = np.concatenate(([0.0], np.cumsum(np.sqrt(np.linalg.norm(steps, axis=1)))))
     half = (degree + 1) // 2
-    shares: FloatArray = betaincinv(half, half, lengths / (lengths[-1] or 1.0))
+    shares: FloatArray = scipy.special.betaincinv(half, half, lengths / (lengths[-1] or 1.0))
     return shares
 
 

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.actuators.laws.spline_curve import SplineCurve, spline_curve, spline_knots, times_deflection
 from vsacli.actuators.laws.table import SHAPE_TOLERANCE, misfit_warnings, worst_misfit, wrong_rows
@@ -116,26 +117,24 @@ def _smallest_curvature(phi: FloatArray, lift: FloatArray) -> float:
 
 def _weights(columns: FloatArray, lift: FloatArray, least: float) -> tuple[FloatArray, float]:
     """Fit weights of columns, at least `least`, and a constant to a lift; return also the misfit."""
-    from scipy.optimize import nnls
-
     level = np.ones((len(lift), 1))
     both = np.hstack((level, -level, columns))
     sizes = np.maximum(np.abs(both).max(axis=0), np.finfo(float).tiny)
-    excess, distance = nnls(both / sizes, lift - least * columns.sum(axis=1) - lift.min())
+    excess, distance = scipy.optimize.nnls(both / sizes, lift - least * columns.sum(axis=1) - lift.min())
     return least + (excess / sizes)[2:], distance
 
 
 def _rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
     """Return the deflection of rest with the best fit, between the neighbors of the lowest point."""
-    from scipy.interpolate import PPoly
-    from scipy.optimize import minimize_scalar
-
     knots = spline_knots(float(phi[0]), float(phi[-1]), pieces, DEGREE)
-    bases = [PPoly.from_spline((knots, weights, DEGREE)) for weights in np.eye(len(knots) - DEGREE - 1)]
+    bases = [
+        scipy.interpolate.PPoly.from_spline((knots, weights, DEGREE))
+        for weights in np.eye(len(knots) - DEGREE - 1)
+    ]
     of_first = np.column_stack([times_deflection(basis).antiderivative()(phi) for basis in bases])
     of_rest = np.column_stack([basis.antiderivative()(phi) for basis in bases])
     least, lowest = _smallest_curvature(phi, lift), int(np.argmin(lift))
-    best = minimize_scalar(
+    best = scipy.optimize.minimize_scalar(
         lambda rest: _weights(of_first - rest * of_rest, lift, least)[1],
         bounds=(phi[lowest - 1], phi[lowest + 1]),
         method="bounded",

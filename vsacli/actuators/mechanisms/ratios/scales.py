@@ -10,6 +10,7 @@ from functools import cached_property, reduce
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
@@ -196,10 +197,8 @@ class MeasuredScale(ScaleLaw):
     @cached_property
     def _pieces(self) -> tuple[FloatArray, ...]:
         """Start of each cubic, and its coefficients from the constant on, arrays (pieces,)."""
-        from scipy.interpolate import CubicSpline
-
         settings, scales = self.file.values.T
-        return (settings[:-1], *CubicSpline(settings, scales).c[::-1])
+        return (settings[:-1], *scipy.interpolate.CubicSpline(settings, scales).c[::-1])
 
     def at(self, s: FloatArray) -> ScaleDerivatives:
         """Return the spline with its derivatives."""
