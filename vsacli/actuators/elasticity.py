@@ -56,10 +56,11 @@ class Elasticity(ABC):
 class MotorMatrix:
     """A 2x2 matrix over two motors: a row of the torque and one of the stiffness; arrays of one shape.
 
-    The decoupling matrix A = d(tau_e, sigma)/d(theta_1, theta_2) is one.
+    The decoupling matrix A = d(tau_e, sigma)/d(theta_1, theta_2) of (67) is one.
 
     Attributes:
-        torque_1, torque_2, stiffness_1, stiffness_2: Entries of the matrix.
+        torque_1, torque_2: Derivatives of the torque by each motor; of a pair of springs sigma_1, sigma_2.
+        stiffness_1, stiffness_2: Derivatives of the stiffness; of a pair of springs zeta_1, zeta_2.
         determinant: Determinant (67); zero where the matrix is singular.
     """
 
@@ -141,7 +142,10 @@ class ElasticState(ABC):
 
     @abstractmethod
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> tuple[FloatArray, ...]:
-        """Return the rates of the coordinates for rates of torque and stiffness, (68); NaN as below."""
+        """Return the rates of the coordinates for rates of torque and stiffness, (68); NaN as below.
+
+        The velocity dq of the joint counts for springs that depend on q, which those of pairs do not.
+        """
 
     @abstractmethod
     def motor_accelerations(

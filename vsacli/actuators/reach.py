@@ -132,7 +132,8 @@ def classify_stiffness(
     stiffness: FloatArray, solution: PairSolution, min_margin: float = MIN_MARGIN
 ) -> Reach:
     """Compare a stiffness with its attainable range; margins below `min_margin` count as near-singular."""
-    # At a critical end A is singular. The other ends, of a law's domain, are feasible and regular.
+    # At a critical end A is singular. The other ends, of a law's domain, are feasible and regular. Singular
+    # samples are found by their margin, since det A has no scale; it is zero exactly only at the end.
     gap = margin(stiffness, solution.lower, solution.upper)
     at_lower = stiffness - solution.lower <= solution.upper - stiffness
     critical = np.where(at_lower, solution.lower_critical, solution.upper_critical)

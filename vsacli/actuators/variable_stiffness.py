@@ -33,7 +33,7 @@ class VariableStiffness(Actuator):
 
     @cached_property
     def motors(self) -> tuple[JointMotor, ...]:
-        """Motors 1 and 2."""
+        """Motors 1 and 2, on the joint side of their gears."""
         return tuple(motor.at_joint for motor in self.motor)
 
     @abstractmethod
@@ -53,7 +53,8 @@ class VariableStiffness(Actuator):
         stiffness, dstiffness, ddstiffness = (command.commanded[name] for name in STIFFNESS.names)
         solution = self.solve(command.tau_e, stiffness, command.q)  # (14)
         unknowns, reached = deflections_within_reach(stiffness, solution, min_margin, integrated)  # (61)
-        springs = self.springs(unknowns, command.q)  # (62)-(67)
+        # (62)-(64), (66); `springs.matrix` is A with its determinant (67). Unknowns of a pair: phi_1, phi_2.
+        springs = self.springs(unknowns, command.q)
         rates = np.stack(springs.rates(command.dtau_e, dstiffness, command.dq))  # (68)
         rates = np.where(reached.singular, np.nan, rates)
         ddtheta = springs.motor_accelerations(rates, command.ddq, command.ddtau_e, ddstiffness)  # (70)-(72)

@@ -24,7 +24,8 @@ MOTOR_CONSTANTS = ("torque_constant", "resistance")
 """Motor constants that variables may require."""
 
 LOSSES = "friction"
-"""Requirement of the variables of losses: friction or damping anywhere in the robot."""
+"""Requirement of the variables of losses: dry friction or a damper at any joint; viscous damping does not
+count."""
 
 OF_ANY_ROBOT = (None, SPRINGS, STIFFNESS.key)
 """Requirements of variables that every result has, NaN at joints that do not meet them. A result omits

@@ -139,15 +139,15 @@ def _motors_not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
     """
     # Three variables suffice: by (69) and (73)-(74) every variable of a motor enters its position or its
     # power. Singular samples have no power.
-    theta, tau_transmission, power = (
+    theta_finite, spring_torque_finite, power_finite = (
         finite(rows[: joint.actuator.motor_count])
         for rows in (of_joint.theta, of_joint.tau_transmission, of_joint.motor_power)
     )
     infeasible, singular = (has_flag(of_joint.flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
-    explained = infeasible | (theta & tau_transmission & (singular | power))
+    explained = infeasible | (theta_finite & spring_torque_finite & (singular | power_finite))
     arrays = of_joint.by_name()
-    demand = finite([of_joint.tau_e, *(arrays[key] for key in joint.commanded)])
-    return ~(demand & explained)
+    demand_finite = finite([of_joint.tau_e, *(arrays[key] for key in joint.commanded)])
+    return ~(demand_finite & explained)
 
 
 def _by_motor(values: list[float]) -> FloatArray:

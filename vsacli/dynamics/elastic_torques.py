@@ -117,11 +117,11 @@ class LinkTorques(RowKernel):
         """Return the inputs of the recursion from rows in the layout of `arguments`."""
         inputs, joints = self.arguments.unpack(rows), self.robot.joints
         zeros = [0] * len(joints)
-        dampings = zip(*(inputs.get(name, zeros) for name in DAMPING.names), strict=True)
+        damper_dampings = zip(*(inputs.get(name, zeros) for name in DAMPING.names), strict=True)
         states = [
-            call(q, _keyed_joint_state(joint), q, (dq, ddq, d3q, d4q), damping)
-            for joint, damping, q, dq, ddq, d3q, d4q in zip(
-                joints, dampings, *(inputs[name] for name in POSITION.names), strict=True
+            call(q, _keyed_joint_state(joint), q, (dq, ddq, d3q, d4q), damper_damping)
+            for joint, damper_damping, q, dq, ddq, d3q, d4q in zip(
+                joints, damper_dampings, *(inputs[name] for name in POSITION.names), strict=True
             )
         ]
         wrench = [inputs[name] for name in WRENCH_NAMES if name in inputs]

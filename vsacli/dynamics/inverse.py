@@ -81,7 +81,8 @@ class InverseDynamics(BlockKernel):
         robot: Robot whose motion is computed.
         frame: Frame of the wrench; None without a wrench.
         min_margin: Margin below which a sample is near-singular.
-        deflections: Deflections that are inputs; where a joint has several, the last counts.
+        deflections: Deflections that are inputs, none in a usual run; where a joint has several, the last
+            counts.
     """
 
     robot: Robot
@@ -132,7 +133,9 @@ class InverseDynamics(BlockKernel):
         deflections = (self._deflections(index, inputs) for index in range(len(joints)))
         demands = zip(commands, repeat(self.min_margin), deflections, strict=False)
         limits = [joint.limits for joint in joints]
-        of_joints: list[JointVariables] = call_at_joints(rows[0], drive, joints, demands, limits)  # (61)-(74)
+        of_joints: list[JointVariables] = call_at_joints(  # (61)-(74)
+            rows[0], drive, joints, demands, keys=limits
+        )
         for joint, of_joint in zip(joints, of_joints, strict=True):
             _check_limits(joint, of_joint)
         if "dissipated_power" in self.results.shapes:

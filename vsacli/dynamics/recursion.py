@@ -62,7 +62,7 @@ class MovingBody(NamedTuple):
     """Quantities of link k for the backward pass.
 
     Attributes:
-        rotation: Rotation between frames k-1 and k.
+        rotation: Rotation R from frame k to frame k-1: `apply` is R, `undo` its transpose.
         z: Axis z of frame k-1, in frame k.
         frame: Motion of frame k.
         p: Vector from origin k-1 to origin k, p', p''.
@@ -154,22 +154,26 @@ def _forward(link: LinkConstants, state: JointState, previous: FrameMotion) -> M
     p = Vector(link.a, mul(state.d, link.sin_alpha), mul(state.d, link.cos_alpha))
 
     angular = _angular_motion(rotation, turning, previous.angular)
-    v_p = _point_rates(angular, p)
+    p_rates = _point_rates(angular, p)  # of the origin of frame k, in (40), (42), (44)
     slide = _slide(angular, sliding, z) if not link.revolute else _NO_SLIDE
     frame = FrameMotion(
         angular,
-        a=rotation.undo(previous.a) + v_p.second + slide.a,  # (40)
-        j=rotation.undo(previous.j) + v_p.third + slide.j,  # (42)
-        s=rotation.undo(previous.s) + v_p.fourth + slide.s,  # (44)
+        a=rotation.undo(previous.a) + p_rates.second + slide.a,  # (40)
+        j=rotation.undo(previous.j) + p_rates.third + slide.j,  # (42)
+        s=rotation.undo(previous.s) + p_rates.fourth + slide.s,  # (44)
     )
-    v_c = _point_rates(angular, link.com)
-    a_c, j_c, s_c = frame.a + v_c.second, frame.j + v_c.third, frame.s + v_c.fourth  # (41) (43) (45)
+    c_rates = _point_rates(angular, link.com)  # of the center of mass, in (41), (43), (45)
+    a_c, j_c, s_c = (
+        frame.a + c_rates.second,
+        frame.j + c_rates.third,
+        frame.s + c_rates.fourth,
+    )  # (41) (43) (45)
     return MovingBody(
         rotation=rotation,
         z=z,
         frame=frame,
-        p=(p, v_p.first + slide.dp, v_p.second + slide.a),
-        c=(link.com, v_c.first, v_c.second),
+        p=(p, p_rates.first + slide.dp, p_rates.second + slide.a),
+        c=(link.com, c_rates.first, c_rates.second),
         # (46)-(51) belong to the paper's backward pass, but do not depend on other links.
         force=(a_c * link.mass, j_c * link.mass, s_c * link.mass),  # (46)-(48)
         moment=_euler(link.inertia, angular),
@@ -178,52 +182,52 @@ def _forward(link: LinkConstants, state: JointState, previous: FrameMotion) -> M
 
 def _angular_motion(rotation: Rotation, turning: Sequence[Scalar], previous: _Angular) -> _Angular:
     # omega to varsigma of frame k-1, theta' z0 to theta'''' z0. `undo` is R^T, from frame k-1 to k.
-    w, g, i, s = previous
+    w, g, iota, varsigma = previous
     t1z, t2z, t3z, t4z = (Z0 * rate for rate in turning)
     w_t1z, g_t1z = cross(w, t1z), cross(g, t1z)
     ww_t1z = cross(w, w_t1z)
     return _Angular(
         omega=rotation.undo(w + t1z),  # (36)
         gamma=rotation.undo(g + t2z + w_t1z),  # (37)
-        iota=rotation.undo(i + t3z + g_t1z + cross(w, t2z * 2 + w_t1z)),  # (38)
+        iota=rotation.undo(iota + t3z + g_t1z + cross(w, t2z * 2 + w_t1z)),  # (38)
         varsigma=rotation.undo(  # (39)
-            s + t4z + cross(g, t2z) * 3 + cross(w, t3z + cross(w, t2z)) * 3
-            + cross(g, w_t1z) * 2 + cross(w, ww_t1z + g_t1z) + cross(i, t1z)
+            varsigma + t4z + cross(g, t2z) * 3 + cross(w, t3z + cross(w, t2z)) * 3
+            + cross(g, w_t1z) * 2 + cross(w, ww_t1z + g_t1z) + cross(iota, t1z)
         ),
     )  # fmt: skip
 
 
 def _point_rates(angular: _Angular, r: Vector) -> _PointRates:
-    # Derivatives of r' = omega x r, each from those before; expanded, the terms of (41), (43), (45).
-    w, g, i, s = angular
+    # Derivatives of r' = omega x r, each from those before; expanded, the terms of (40)-(45).
+    w, g, iota, varsigma = angular
     first = cross(w, r)
     second = cross(g, r) + cross(w, first)
-    third = cross(i, r) + cross(g, first) * 2 + cross(w, second)
-    fourth = cross(s, r) + cross(i, first) * 3 + cross(g, second) * 3 + cross(w, third)
+    third = cross(iota, r) + cross(g, first) * 2 + cross(w, second)
+    fourth = cross(varsigma, r) + cross(iota, first) * 3 + cross(g, second) * 3 + cross(w, third)
     return _PointRates(first, second, third, fourth)
 
 
 def _slide(angular: _Angular, sliding: Sequence[Scalar], z: Vector) -> _Slide:
     d1, d2, d3, d4 = sliding
-    v_z = _point_rates(angular, z)
+    z_rates = _point_rates(angular, z)
     return _Slide(
         dp=z * d1,
-        a=z * d2 + v_z.first * (2 * d1),  # of (40)
-        j=z * d3 + v_z.first * (3 * d2) + v_z.second * (3 * d1),  # of (42)
-        s=z * d4 + v_z.first * (4 * d3) + v_z.second * (6 * d2) + v_z.third * (4 * d1),  # of (44)
+        a=z * d2 + z_rates.first * (2 * d1),  # of (40)
+        j=z * d3 + z_rates.first * (3 * d2) + z_rates.second * (3 * d1),  # of (42)
+        s=z * d4 + z_rates.first * (4 * d3) + z_rates.second * (6 * d2) + z_rates.third * (4 * d1),  # of (44)
     )
 
 
 def _euler(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector, Vector]:
-    w, g, i, s = angular
-    i_w, i_g = inertia.times(w), inertia.times(g)
-    g_w = cross(g, w)
-    moment = i_g + cross(w, i_w)  # (49)
-    dmoment = cross(w, i_g + moment) + inertia.times(g_w + i) + cross(g, i_w)  # (50)
+    w, g, iota, varsigma = angular
+    inertia_w, inertia_g = inertia.times(w), inertia.times(g)
+    g_x_w = cross(g, w)
+    moment = inertia_g + cross(w, inertia_w)  # (49)
+    dmoment = cross(w, inertia_g + moment) + inertia.times(g_x_w + iota) + cross(g, inertia_w)  # (50)
     ddmoment = (  # (51)
-        cross(g, i_g + moment * 2) + cross(i, i_w)
-        + inertia.times(cross(i, w) * 2 - cross(w, g_w) + s)
-        + cross(w, cross(w, i_g) + inertia.times(i + g_w) * 2 + dmoment)
+        cross(g, inertia_g + moment * 2) + cross(iota, inertia_w)
+        + inertia.times(cross(iota, w) * 2 - cross(w, g_x_w) + varsigma)
+        + cross(w, cross(w, inertia_g) + inertia.times(iota + g_x_w) * 2 + dmoment)
     )  # fmt: skip
     return moment, dmoment, ddmoment
 
@@ -295,12 +299,13 @@ def _project(
     w, g, z = body.frame.angular.omega, body.frame.angular.gamma, body.z
     x, dx, ddx = reaction.n if link.revolute else reaction.f
     x_w = cross(x, w)
-    q1, q2, q3, _ = state.rates
-    tau = add(x.dot(z), mul(link.viscous_damping, q1))  # (58)
-    dtau = add((dx + x_w).dot(z), mul(link.viscous_damping, q2))  # (59)
+    dq, ddq, d3q, _ = state.rates
+    tau = add(x.dot(z), mul(link.viscous_damping, dq))  # (58)
+    dtau = add((dx + x_w).dot(z), mul(link.viscous_damping, ddq))  # (59)
     # `along=z` drops the components of the products that the inner product with z does not need.
     ddx_turned = ddx + cross(dx, w, along=z) * 2 + cross(x, g, along=z) + cross(x_w, w, along=z)
-    ddtau = add(ddx_turned.dot(z), mul(link.viscous_damping, q3))  # (60)
+    ddtau = add(ddx_turned.dot(z), mul(link.viscous_damping, d3q))  # (60)
+    # Beyond the paper: torque against dry friction and dampers between the links, 0 without them.
     return TorqueDerivatives(*map(add, (tau, dtau, ddtau), state.resistance))
 
 

@@ -63,8 +63,9 @@ class Cubic(SpringLaw):
 class CubicTwins(Pair):
     """Two equal cubic springs, (28)-(31) without the angle xi.
 
-    With G the stiffness and u = phi_1 + phi_2, w = phi_1 - phi_2, (29) gives w^2 = 2 (G - 2 K)/(3 Kc) - u^2.
-    Inserted into (28), u solves the cubic equation G u/2 - Kc u^3/2 = tau_e.
+    With the stiffness sigma, u = phi_1 + phi_2 and the spread phi_1 - phi_2, (29) gives
+    spread^2 = 2 (sigma - 2 K)/(3 Kc) - u^2. Inserted into (28), u solves the cubic equation
+    sigma u/2 - Kc u^3/2 = tau_e.
     """
 
     spring: Cubic
@@ -73,20 +74,22 @@ class CubicTwins(Pair):
         """Solve (14) for each sample; see `Pair.solve`."""
         k, k_c = self.spring.k, self.spring.k_c
         lower = self._lowest_stiffness(np.abs(tau_e))
-        demand = np.maximum(stiffness, lower)
+        sigma = np.maximum(stiffness, lower)
         # The root of the cubic in u with the largest phi_1 - phi_2, by the trigonometric formula.
-        load = np.clip(3 * np.sqrt(3 * k_c) * tau_e / (demand * np.sqrt(demand)), -1, 1)
-        u = 2 * np.sqrt(demand / (3 * k_c)) * np.sin(np.arcsin(load) / 3)
-        spread_squared = 2 * (demand - 2 * k) / (3 * k_c) - u * u
+        sine = np.clip(3 * np.sqrt(3 * k_c) * tau_e / (sigma * np.sqrt(sigma)), -1, 1)
+        u = 2 * np.sqrt(sigma / (3 * k_c)) * np.sin(np.arcsin(sine) / 3)
+        spread_squared = 2 * (sigma - 2 * k) / (3 * k_c) - u * u
         spread = np.sqrt(np.maximum(spread_squared, 0))
         return PairSolution.unbounded(lower, (u + spread) / 2, (u - spread) / 2, lower_critical=True)
 
     def _lowest_stiffness(self, load: FloatArray) -> FloatArray:
         """Return the stiffness at the outermost critical point (det A = 0) under a load |tau_e|.
 
-        It is phi_1 = phi_2; beyond the load where that meets phi_1 phi_2 = K/(3 Kc), it is the latter.
+        It is phi_1 = phi_2, the bound on tau_e after (31) solved for sigma; beyond the load where that meets
+        phi_1 phi_2 = K/(3 Kc), it is the latter.
         """
         k, k_c = self.spring.k, self.spring.k_c
-        alike = 2 * self.spring.stiffness(self.spring.deflection(load / 2))
-        unlike = np.cbrt((3 * np.sqrt(3 * k_c) * load) ** 2)
-        return np.where(load <= 8 / 3 * k * np.sqrt(k / (3 * k_c)), alike, unlike)
+        at_equal_deflections = 2 * self.spring.stiffness(self.spring.deflection(load / 2))
+        at_unequal_deflections = np.cbrt((3 * np.sqrt(3 * k_c) * load) ** 2)
+        meet = 8 / 3 * k * np.sqrt(k / (3 * k_c))
+        return np.where(load <= meet, at_equal_deflections, at_unequal_deflections)
