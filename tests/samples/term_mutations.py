@@ -194,14 +194,14 @@ MUTATIONS = (
         "pair",
         LOSS,
         "_lost_power(joint.damping",
-        "_taken(1.01 * joint.damping",
+        "_lost_power(1.01 * joint.damping",
     ),
     Mutation(
         "dissipated power, motors",
         "pair",
         LOSS,
         "_lost_power(motor.damping",
-        "_taken(1.01 * motor.damping",
+        "_lost_power(1.01 * motor.damping",
     ),
     Mutation(
         "friction between links",
