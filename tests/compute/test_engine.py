@@ -129,7 +129,7 @@ def test_other_branch_and_followed_deflections_agree():
     expected = compute_block(turned, motion)
     assert_agree(compute_block(turned, motion, engine=compiled(turned)), expected)
     integrated = {"phi": np.moveaxis(expected.phi, 0, -1).reshape(2, -1) * 1.001}
-    kernel = InverseDynamics(turned, deflections=(IntegratedRows(),))
+    kernel = InverseDynamics(turned, prescribed=(IntegratedRows(),))
     engine = choose("c", kernel, 1, 1).engine
     found = block_of(kernel, motion, engine, integrated)
     assert_agree(found, block_of(kernel, motion, deflections=integrated))

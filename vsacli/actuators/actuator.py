@@ -179,13 +179,13 @@ class Actuator(DeclaredRecord, ABC):
         )
 
     @abstractmethod
-    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> JointVariables:
+    def transmit(self, command: Command, min_margin: float, prescribed: FloatArray | None) -> JointVariables:
         """Compute the springs and the motion of the motors for a command.
 
         Args:
             command: Motion and elastic torque of the joint; arrays (samples,).
             min_margin: Margin below which a sample is near-singular.
-            integrated: Unknowns to use instead of those that `solve` finds, (2, samples), NaN where there are
+            prescribed: Unknowns to use instead of those that `solve` finds, (2, samples), NaN where there are
                 none; only for kinds with a commanded stiffness.
 
         Returns:

@@ -117,7 +117,7 @@ class Elastic(Actuator):
         return LimitCheck(Flag.INFEASIBLE, "tau_e", None, torques)
 
     def transmit(
-        self, command: Command, _min_margin: float, _integrated: FloatArray | None
+        self, command: Command, _min_margin: float, _prescribed: FloatArray | None
     ) -> JointVariables:
         """Compute the deflection at which the spring carries tau_e, and its derivatives.
 

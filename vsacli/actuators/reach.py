@@ -147,16 +147,16 @@ def classify_stiffness(
 
 
 def deflections_within_reach(
-    stiffness: FloatArray, solution: PairSolution, min_margin: float, integrated: FloatArray | None
+    stiffness: FloatArray, solution: PairSolution, min_margin: float, prescribed: FloatArray | None
 ) -> tuple[FloatArray, Reach]:
     """Return the deflections (61), (2, samples), NaN at infeasible samples, and the reach.
 
-    Integrated deflections replace those of the solution; samples where they are NaN are infeasible.
+    Prescribed deflections replace those of the solution; samples where they are NaN are infeasible.
     """
     reached = classify_stiffness(stiffness, solution, min_margin)
-    if integrated is not None:
-        reached = reached._replace(infeasible=reached.infeasible | np.isnan(integrated[0]))
-    phi = solution.deflections if integrated is None else integrated
+    if prescribed is not None:
+        reached = reached._replace(infeasible=reached.infeasible | np.isnan(prescribed[0]))
+    phi = solution.deflections if prescribed is None else prescribed
     return np.where(reached.infeasible, np.nan, phi), reached
 
 

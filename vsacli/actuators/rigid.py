@@ -41,7 +41,7 @@ class Rigid(Actuator):
         return (self.motor.at_joint,)
 
     def transmit(
-        self, command: Command, _min_margin: float, _integrated: FloatArray | None
+        self, command: Command, _min_margin: float, _prescribed: FloatArray | None
     ) -> JointVariables:
         """Return zero deflection; stiffness and its derivatives are NaN."""
         still, none = np.zeros_like(command.q), np.full_like(command.q, np.nan)

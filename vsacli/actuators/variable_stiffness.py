@@ -44,7 +44,7 @@ class VariableStiffness(Actuator):
         """Return phi, (2, samples), from the unknowns, or its rates; NaN for a motor without a deflection."""
         return unknowns
 
-    def transmit(self, command: Command, min_margin: float, integrated: FloatArray | None) -> JointVariables:
+    def transmit(self, command: Command, min_margin: float, prescribed: FloatArray | None) -> JointVariables:
         """Compute deflections on the actuator's branch, motion of the motors, and torques of the springs.
 
         NaN at infeasible samples; rates and accelerations, which need A^-1, also at singular ones. See
@@ -52,7 +52,7 @@ class VariableStiffness(Actuator):
         """
         stiffness, dstiffness, ddstiffness = (command.commanded[name] for name in STIFFNESS.names)
         solution = self.solve(command.tau_e, stiffness, command.q)  # (14)
-        unknowns, reached = deflections_within_reach(stiffness, solution, min_margin, integrated)  # (61)
+        unknowns, reached = deflections_within_reach(stiffness, solution, min_margin, prescribed)  # (61)
         # (62)-(64), (66); `springs.matrix` is A with its determinant (67). Unknowns of a pair: phi_1, phi_2.
         springs = self.springs(unknowns, command.q)
         rates = np.stack(springs.rates(command.dtau_e, dstiffness, command.dq))  # (68)
@@ -61,8 +61,8 @@ class VariableStiffness(Actuator):
         return command.variables()._replace(
             phi=self.deflections(unknowns),
             dphi=self.deflections(rates),
-            theta=self.motor_positions(unknowns, command.q),  # (69)
-            dtheta=self.motor_positions(rates, command.dq),  # (69)
+            theta=self.motor_positions(unknowns, command.q),  # theta = phi + q
+            dtheta=self.motor_positions(rates, command.dq),  # its rate, (69)
             ddtheta=np.stack(ddtheta),
             tau_transmission=np.stack(springs.tau_transmission),  # (62)
             elastic_energy=springs.energy,

@@ -44,7 +44,7 @@ def drive(
     joint: Joint,
     command: Command,
     min_margin: float = MIN_MARGIN,
-    deflections: FloatArray | InternalMotion | None = None,
+    prescribed: FloatArray | InternalMotion | None = None,
 ) -> JointVariables:
     """Compute motor motion and motor torques of a joint, (61)-(74).
 
@@ -52,7 +52,7 @@ def drive(
         joint: Joint with its actuator.
         command: Commanded motion and stiffness, and the elastic torque with its two derivatives.
         min_margin: Margin below which a sample is near-singular.
-        deflections: Deflections to use instead of the root of (14), (2, samples); a sample where they are
+        prescribed: Deflections to use instead of the root of (14), (2, samples); a sample where they are
             NaN is infeasible. Of a damped transmission, its internal motion.
 
     Returns:
@@ -60,7 +60,7 @@ def drive(
         samples all motor variables are NaN; at singular samples those that need the inverse of the decoupling
         matrix. A motor that the actuator does not have is NaN throughout.
     """
-    driven = driven_by(joint, command, min_margin, deflections)  # (61)-(74)
+    driven = driven_by(joint, command, min_margin, prescribed)  # (61)-(74)
     exceeded = limit_flags(joint, driven.by_name(), np.zeros_like(driven.flags))
     unexplained = not_finite_flags(_motors_not_finite(joint, driven))
     return driven._replace(flags=driven.flags | exceeded | unexplained)
@@ -70,16 +70,16 @@ def driven_by(
     joint: Joint,
     command: Command,
     min_margin: float,
-    deflections: FloatArray | InternalMotion | None = None,
+    prescribed: FloatArray | InternalMotion | None = None,
 ) -> JointVariables:
     """Compute as `drive`, but only the flags of feasibility; scalars may also be dual numbers."""
     actuator = joint.actuator
-    if isinstance(deflections, InternalMotion):
+    if isinstance(prescribed, InternalMotion):
         from vsacli.actuators.damped_springs import DampedSprings
 
-        transmitted = DampedSprings(actuator).transmit(command, deflections, min_margin)
+        transmitted = DampedSprings(actuator).transmit(command, prescribed, min_margin)
     else:
-        transmitted = actuator.transmit(command, min_margin, deflections)  # (61)-(72)
+        transmitted = actuator.transmit(command, min_margin, prescribed)  # (61)-(72)
     tau_motor = shaft_torques(actuator, transmitted.dtheta, transmitted.ddtheta, transmitted.tau_transmission)
     tau_damper, on_motors = _damper_torques(joint, command, transmitted.dphi)
     if on_motors is not None:

@@ -81,14 +81,14 @@ class InverseDynamics(BlockKernel):
         robot: Robot whose motion is computed.
         frame: Frame of the wrench; None without a wrench.
         min_margin: Margin below which a sample is near-singular.
-        deflections: Deflections that are inputs, none in a usual run; where a joint has several, the last
-            counts.
+        prescribed: Deflections that are inputs instead of roots of (14), none in a usual run; where a joint
+            has several, the last counts.
     """
 
     robot: Robot
     frame: str | None = None
     min_margin: float = MIN_MARGIN
-    deflections: tuple[IntegratedRows | InternalRows, ...] = ()
+    prescribed: tuple[IntegratedRows | InternalRows, ...] = ()
 
     @cached_property
     def links(self) -> LinkTorques:
@@ -101,7 +101,7 @@ class InverseDynamics(BlockKernel):
         joints = len(self.robot.joints)
         shapes = dict(self.links.arguments.shapes)
         shapes |= {name: (joints,) for signal in self.robot.signals for name in signal.names}
-        for rows in self.deflections:
+        for rows in self.prescribed:
             shapes |= rows.shapes(joints)
         return RowLayout(shapes)
 
@@ -130,8 +130,8 @@ class InverseDynamics(BlockKernel):
         of_all = {**inputs, **self.links.results.unpack(rows_of_links)}
         names, joints = Command.names(signal.key for signal in self.robot.signals), self.robot.joints
         commands = (Command.of({name: of_all[name][index] for name in names}) for index in range(len(joints)))
-        deflections = (self._deflections(index, inputs) for index in range(len(joints)))
-        demands = zip(commands, repeat(self.min_margin), deflections, strict=False)
+        prescribed = (self._prescribed_deflections(index, inputs) for index in range(len(joints)))
+        demands = zip(commands, repeat(self.min_margin), prescribed, strict=False)
         limits = [joint.limits for joint in joints]
         of_joints: list[JointVariables] = call_at_joints(  # (61)-(74)
             rows[0], drive, joints, demands, keys=limits
@@ -146,10 +146,10 @@ class InverseDynamics(BlockKernel):
             ]
         return of_joints
 
-    def _deflections(
+    def _prescribed_deflections(
         self, index: int, inputs: Mapping[str, Sequence[Scalar]]
     ) -> FloatArray | InternalMotion | None:
-        states = (rows.of_joint(index, inputs) for rows in reversed(self.deflections))
+        states = (rows.of_joint(index, inputs) for rows in reversed(self.prescribed))
         return next((state for state in states if state is not None), None)
 
     def rows_of(
@@ -224,8 +224,8 @@ def compute_block(
 def _inverse_dynamics_kernel(
     robot: Robot, frame: str | None, min_margin: float, damped: tuple[int, ...]
 ) -> InverseDynamics:
-    deflections = (InternalRows(damped),) if damped else ()
-    return InverseDynamics(robot, frame, min_margin, deflections)
+    prescribed = (InternalRows(damped),) if damped else ()
+    return InverseDynamics(robot, frame, min_margin, prescribed)
 
 
 def motor_torques(

@@ -91,7 +91,7 @@ def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Functio
         frame: frame of `WRENCH_FRAMES` along whose axes a wrench is given; None without one.
     """
     damped = tuple(index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission"))
-    kernel = InverseDynamics(robot, frame, deflections=(InternalRows(damped, INTERNAL[:1]),))
+    kernel = InverseDynamics(robot, frame, prescribed=(InternalRows(damped, INTERNAL[:1]),))
     inside = internal_structure(robot) if damped else None
     arguments = (
         ("command", command_structure(robot)),
