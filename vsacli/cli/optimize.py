@@ -95,17 +95,20 @@ def optimize(
     with naming_option("--min-margin"):
         check_min_margin(min_margin)
     inputs = load_inputs(robot, trajectory, talk, changes)
-    from vsacli.cli.optimize_plots import CHANGE, PACE, optimum_sheets
     from vsacli.studies.search import Fix, check_fixed_target, searches, write_fixed
     from vsacli.studies.search import optimize as optimized
 
     vary = vary or ("timing" if minimize == "time" else "stiffness")
     _check_objective(inputs.robot, minimize, vary)
-    names, stem = (CHANGE,) if vary == "stiffness" else (CHANGE, PACE), run_stem(robot, trajectory)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         if output is not None:
             check_fixed_target(output, outputs)
-        paths = figures.paths(names, stem) if figures is not None else {}
+        paths = {}
+        if figures is not None:
+            from vsacli.cli.optimize_plots import CHANGE, PACE
+
+            names = (CHANGE,) if vary == "stiffness" else (CHANGE, PACE)
+            paths = figures.paths(names, run_stem(robot, trajectory))
         for path in paths.values():
             outputs.folder(path.parent)
             outputs.check(path)
@@ -124,6 +127,7 @@ def optimize(
         elif output is not None:
             talk.note(f"{output} is not written: nothing feasible was found")
         if paths and found.trajectory is not None:
+            from vsacli.cli.optimize_plots import optimum_sheets
             from vsacli.results.plots import FigureFiles
 
             sheets = optimum_sheets(found, found.trajectory, inputs.trajectory)
