@@ -224,6 +224,7 @@ def _euler(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector,
     g_x_w = cross(g, w)
     moment = inertia_g + cross(w, inertia_w)  # (49)
     dmoment = cross(w, inertia_g + moment) + inertia.times(g_x_w + iota) + cross(g, inertia_w)  # (50)
+    # omega x (omega x gamma) = -omega x (gamma x omega)
     ddmoment = (  # (51)
         cross(g, inertia_g + moment * 2) + cross(iota, inertia_w)
         + inertia.times(cross(iota, w) * 2 - cross(w, g_x_w) + varsigma)

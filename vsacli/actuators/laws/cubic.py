@@ -86,7 +86,8 @@ class CubicTwins(Pair):
         """Return the stiffness at the outermost critical point (det A = 0) under a load |tau_e|.
 
         It is phi_1 = phi_2, the bound on tau_e after (31) solved for sigma; beyond the load where that meets
-        phi_1 phi_2 = K/(3 Kc), it is the latter.
+        phi_1 phi_2 = K/(3 Kc), it is the latter: there sigma = 3 Kc u^2 and tau_e = Kc u^3, where the sine in
+        `solve` is 1 (the paper's remark on sigma > 4 K).
         """
         k, k_c = self.spring.k, self.spring.k_c
         at_equal_deflections = 2 * self.spring.stiffness(self.spring.deflection(load / 2))
