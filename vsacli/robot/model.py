@@ -118,7 +118,7 @@ class Robot(DeclaredRecord):
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
-        """Commanded signals in results, in addition to the motion: stiffness, others where a joint has them."""
+        """Commanded signals in results besides the motion: stiffness, others where a joint has them."""
         return tuple(each for each in COMMANDED.values() if self.has_variable(VARIABLES[each.key]))
 
     @property
