@@ -12,7 +12,7 @@ from samples.call_paths import returns, visited
 from samples.command_line import REST_TO_REST, ROBOT
 from samples.defined_names import defined_twice, share_of_empty_words
 from samples.python_processes import run_python
-from samples.sources import PACKAGE, SOURCES, contents
+from samples.sources import PACKAGE, SOURCES, contents, parsed
 
 from vsacli import load_robot, load_trajectory
 from vsacli.dynamics.inverse import motor_torques
@@ -32,7 +32,7 @@ HOMES = {
 
 HEAVY = ("numpy", "scipy", "matplotlib", "h5py", "hashlib")
 
-MOST_FILES, MOST_STATEMENTS, MOST_SHARED_NAMES, MOST_HEADLESS = 482, 51_437, 19, 1
+MOST_FILES, MOST_STATEMENTS, MOST_SHARED_NAMES, MOST_HEADLESS = 483, 51_452, 19, 1
 """How many files and statements of Python the package has at most, names of files that several folders
 have, and docstrings that begin without a verb or a noun. A change that needs more raises these, with its
 reason in its message; one that needs less lowers them."""
@@ -77,7 +77,7 @@ def dotted(source: Path) -> str:
 
 def lines_run_at_import(source: Path) -> set[int]:
     """Lines where the statements begin that run when a module is imported."""
-    waiting: list[ast.AST] = [ast.parse(source.read_text(encoding="utf-8"))]
+    waiting: list[ast.AST] = [parsed(source)]
     lines = set()
     while waiting:
         for child in ast.iter_child_nodes(waiting.pop()):
@@ -122,8 +122,8 @@ def test_modules_form_no_circle() -> None:
 def test_the_package_grows_only_on_purpose() -> None:
     names = Counter(source.name for source in SOURCES if not is_folder(source))
     assert len(SOURCES) <= MOST_FILES
-    trees = (ast.parse(source.read_text(encoding="utf-8")) for source in SOURCES)
-    assert sum(isinstance(node, ast.stmt) for tree in trees for node in ast.walk(tree)) <= MOST_STATEMENTS
+    statements = (isinstance(node, ast.stmt) for source in SOURCES for node in ast.walk(parsed(source)))
+    assert sum(statements) <= MOST_STATEMENTS
     assert sum(count > 1 for count in names.values()) <= MOST_SHARED_NAMES
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
-from samples.sources import PACKAGE, SOURCES
+from samples.sources import PACKAGE, SOURCES, parsed
 
 EMPTY_WORDS = frozenset(
     (
@@ -31,12 +30,6 @@ EMPTY_WORDS = frozenset(
 
 COUNTED = [source for source in SOURCES if source.relative_to(PACKAGE).parts[0] != "cli"]
 """Modules whose names count; a command and the function that it calls may share a name."""
-
-
-@cache
-def parsed(source: Path) -> ast.Module:
-    """Return the syntax tree of a module."""
-    return ast.parse(source.read_text(encoding="utf-8"))
 
 
 def _classes(node: ast.AST) -> Iterator[str]:

@@ -34,10 +34,16 @@ class Contents:
 
 
 @cache
+def parsed(source: Path) -> ast.Module:
+    """Return the syntax tree of a source file."""
+    return ast.parse(source.read_text(encoding="utf-8"))
+
+
+@cache
 def contents(source: Path) -> Contents:
     """Parse a source file and collect its imports and texts."""
     found = Contents()
-    tree = ast.parse(source.read_text(encoding="utf-8"))
+    tree = parsed(source)
     docstrings = set()
     for node in ast.walk(tree):  # a statement comes before its expression
         match node:
