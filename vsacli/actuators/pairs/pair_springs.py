@@ -93,10 +93,10 @@ class PairSprings(ElasticState):
     ) -> tuple[FloatArray, ...]:
         """Return A^-1 beta (72), with the sums (11) and (65)."""
         one, two = self._one, self._two
-        squared_1, squared_2 = rates[0] * rates[0], rates[1] * rates[1]
+        torque_curvature = one.zeta * (rates[0] * rates[0]) + two.zeta * (rates[1] * rates[1])
         return self.matrix.solve(
-            ddtau_e - (one.zeta * squared_1 + two.zeta * squared_2) + (one.sigma + two.sigma) * ddq,  # (70)
-            ddstiffness - (one.eta * squared_1 + two.eta * squared_2) + (one.zeta + two.zeta) * ddq,  # (71)
+            ddtau_e - torque_curvature + self.stiffness * ddq,  # (70)
+            ddstiffness - self.stiffness_curvature(rates) + (one.zeta + two.zeta) * ddq,  # (71)
         )
 
 
