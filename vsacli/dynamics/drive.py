@@ -13,6 +13,7 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import ELECTRICAL, Windings
+from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import MIN_MARGIN, Flag, finite, has_flag, not_finite_flags
@@ -61,8 +62,9 @@ def drive(
         matrix. A motor that the actuator does not have is NaN throughout.
     """
     driven = driven_by(joint, command, min_margin, prescribed)  # (61)-(74)
-    exceeded = limit_flags(joint, driven.by_name(), np.zeros_like(driven.flags))
-    unexplained = not_finite_flags(_motors_not_finite(joint, driven))
+    arrays = driven.by_name()
+    exceeded = limit_flags(joint, arrays, np.zeros_like(driven.flags))
+    unexplained = not_finite_flags(_motors_not_finite(joint, arrays))
     return driven._replace(flags=driven.flags | exceeded | unexplained)
 
 
@@ -132,7 +134,7 @@ def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
     return uncoupled + coupling * ddtheta[::-1] if coupling else uncoupled
 
 
-def _motors_not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
+def _motors_not_finite(joint: Joint, arrays: OfJoint) -> BoolArray:
     """Return where a motor variable is not finite although the sample is neither infeasible nor singular.
 
     Samples with a demand that is not finite count, too.
@@ -140,13 +142,12 @@ def _motors_not_finite(joint: Joint, of_joint: JointVariables) -> BoolArray:
     # Three variables suffice: by (69) and (73)-(74) every variable of a motor enters its position or its
     # power. Singular samples have no power.
     theta_finite, spring_torque_finite, power_finite = (
-        finite(rows[: joint.actuator.motor_count])
-        for rows in (of_joint.theta, of_joint.tau_transmission, of_joint.motor_power)
+        finite(arrays[name][: joint.actuator.motor_count])
+        for name in ("theta", "tau_transmission", "motor_power")
     )
-    infeasible, singular = (has_flag(of_joint.flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
+    infeasible, singular = (has_flag(arrays["flags"], flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR))
     explained = infeasible | (theta_finite & spring_torque_finite & (singular | power_finite))
-    arrays = of_joint.by_name()
-    demand_finite = finite([of_joint.tau_e, *(arrays[key] for key in joint.commanded)])
+    demand_finite = finite([arrays["tau_e"], *(arrays[key] for key in joint.commanded)])
     return ~(demand_finite & explained)
 
 

@@ -166,8 +166,9 @@ class InverseDynamics(BlockKernel):
 
 def _check_limits(joint: Joint, of_joint: JointVariables) -> None:
     """Raise NotImplementedError for a limit on a variable that the joint lacks; it would go unchecked."""
+    present = of_joint.by_name()
     for check in limit_checks(joint):
-        if check.variable not in of_joint.by_name():
+        if check.variable not in present:
             raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
 
 
