@@ -51,6 +51,11 @@ OF_A_ROBOT = ("studies", "control", "results", "analysis", "dynamics", "h5py", "
 
 TASKS = {
     "invdyn": Task(("invdyn", "-q", ROBOT, TRAJECTORY), NOT_FOR_THE_MAIN_JOB, 21_500),
+    "invdyn --plot": Task(
+        ("invdyn", "-q", ROBOT, TRAJECTORY, "--plot", "figures"),
+        ("studies", "control", "files", "trajectory.fits", "trajectory.recorded"),
+        28_100,
+    ),
     "check-feasibility": Task(
         ("check-feasibility", ROBOT, TRAJECTORY),
         ("studies", "control", "results.store", "h5py", "scipy"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from html import escape
 from itertools import zip_longest
 from typing import NamedTuple
 
@@ -62,6 +61,8 @@ def cell(value: float, form: str = ".3g") -> str:
 
 def html_table(title: str, rows: Sequence[tuple[str, ...]]) -> str:
     """Return a title and a table as HTML; the first row is the header, and all texts are escaped."""
+    from html import escape  # needed only in notebooks
+
     header, *body = ([escape(text.replace("\n", ", ")) for text in row] for row in rows)
     lines = "".join(_html_row(row, "td") for row in body)
     table = f"<table><thead>{_html_row(header, 'th')}</thead><tbody>{lines}</tbody></table>"

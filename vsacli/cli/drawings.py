@@ -1,142 +1,44 @@
-"""Figures of stored results, of studies and sensitivities, as `vsacli plot` and other commands draw them."""
+"""Figures of a stored result or simulation, for `vsacli plot` and for the command that has written it."""
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import click
-
-from vsacli.analysis.report import Report
-from vsacli.analysis.run import Run
-from vsacli.base import file_formats
 from vsacli.base.outputs import Outputs, Staged
 from vsacli.base.storage import temporary_folder
-from vsacli.base.variables import select_variables
-from vsacli.cli.command_parts import (
-    compute,
-    result_line,
-)
+from vsacli.base.version import __version__
+from vsacli.cli.command_parts import compute
 from vsacli.cli.console import Talk
-from vsacli.cli.figure_options import EVERYTHING, PAGE, DrawnPart, FigurePlace, FigureTarget
-from vsacli.cli.input_errors import naming_option
-from vsacli.cli.plot_recording import RECORDING, has_recording, recording_figure
-from vsacli.cli.sensitivity import RANKING
-from vsacli.files.repetition import rebuilt
-from vsacli.results.charts.comparison import COMPARISON, comparison_names
+from vsacli.cli.figure_options import FigureTarget
 from vsacli.results.charts.figures import (
     FEASIBILITY,
     FEASIBILITY_VARIABLES,
     check_drawable,
-    chosen_figures,
     drawings_of,
     feasibility,
     omitted_figures,
 )
-from vsacli.results.charts.ranking import Ranking
 from vsacli.results.charts.stored import StoredCharts
-from vsacli.results.plots import (
-    FigureFiles,
-    compare_files,
-    compared_studies,
-    draw_stored,
-    ranking_figure,
-    study_figures,
-)
-from vsacli.results.store.damage import reporting_damage
-from vsacli.results.store.excerpt import Excerpt
-from vsacli.results.store.reader import StoredResult, open_stored, stored_format
-from vsacli.results.store.sensitivity_file import StoredSensitivity
-from vsacli.results.store.study_table import StoredStudy
+from vsacli.results.plots import FigureFiles, draw_stored
+from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.results.store.writer import ResultWriter
 
+if TYPE_CHECKING:
+    from vsacli.analysis.report import Report
+    from vsacli.analysis.run import Run
 
-def draw_computed(paths: list[Path], shown: DrawnPart, target: FigurePlace, talk: Talk) -> None:
-    """Draw results, simulations, study tables or a sensitivity analysis."""
-    kind = _kind_of(paths)
-    if kind in (file_formats.STUDY_TABLE, file_formats.SENSITIVITY) and shown != EVERYTHING:
-        words = "study tables" if kind == file_formats.STUDY_TABLE else "sensitivity files"
-        raise click.UsageError(f"{shown.option} cannot be used with {words}; leave it out")
-    if kind == file_formats.SENSITIVITY:
-        _draw_ranking(paths, target, talk)
-    elif target.place.file_format == PAGE:
-        if (of_times := shown._replace(span=EVERYTHING.span)) != EVERYTHING:
-            raise click.UsageError(f"{of_times.option} cannot be used with --format html; leave it out")
-        from vsacli.cli.plot_page import write_page  # a page loads the searches, 0.1 s
-
-        write_page(paths, None if kind == file_formats.STUDY_TABLE else shown.span, *target, talk)
-    elif kind == file_formats.STUDY_TABLE:
-        _draw_studies(paths, target)
-    elif len(paths) == 1:
-        _draw_file(paths[0], shown, target, talk)
-    else:
-        _draw_comparison(paths, shown, target, talk)
-
-
-def _kind_of(paths: list[Path]) -> str | None:
-    """Return the format of the first file; study tables are only drawn among themselves.
-
-    Raises:
-        click.UsageError: some files are study tables, and others are not.
-    """
-    there = [path for path in paths if path.is_file()] or paths[:1]  # others are missed when they are read
-    formats = [stored_format(path) for path in there]
-    are = [each == file_formats.STUDY_TABLE for each in formats]
-    if any(are) and not all(are):
-        table, other = there[are.index(True)], there[are.index(False)]
-        raise click.UsageError(f"{table} is a study table, {other} is not; plot study tables by themselves")
-    return formats[0]
-
-
-def _draw_ranking(paths: list[Path], target: FigurePlace, talk: Talk) -> None:
-    """Draw the ranking of a sensitivity file."""
-    if len(paths) > 1:
-        raise click.UsageError("sensitivity analyses are drawn one at a time")
-    if target.place.file_format == PAGE:
-        raise click.UsageError("--format html is for results, simulations and studies; leave it out")
-    with StoredSensitivity.open(paths[0]) as stored, reporting_damage(paths[0]):
-        talk.detail(result_line(stored))
-        ranking = Ranking.of(stored.report_json, stored.joint_names)
-        if stored.report_json.get("band"):
-            talk.note(f"{paths[0]}: no figure of the tolerance bands: `vsacli sensitivity --plot` draws it")
-    target.figures([RANKING], paths[0].stem).save({RANKING: ranking_figure(ranking)})
-
-
-def _draw_studies(paths: list[Path], target: FigurePlace) -> None:
-    """Draw the figures of a study, or compare the distributions of margins of several studies."""
-    stem = "-".join(path.stem for path in paths)
-    with ExitStack() as stack:
-        tables = [stack.enter_context(StoredStudy(path)) for path in paths]
-        if len(tables) == 1:
-            figures = study_figures(tables[0])
-        else:
-            figures = {COMPARISON: compared_studies(tables, [path.stem for path in paths])}
-    target.figures(figures, stem).save(figures)
-
-
-def _draw_file(path: Path, shown: DrawnPart, target: FigurePlace, talk: Talk) -> None:
-    """Draw the figures of one file, and of the recording that it was computed from."""
-    with open_stored(path) as stored:
-        talk.detail(result_line(stored))
-        part = _part_of(stored, shown)
-        with naming_option("--variables"):
-            names = chosen_figures(part, shown.variables)
-        recorded = shown.variables is None and has_recording(stored, talk)
-        figures = target.figures([*names, RECORDING] if recorded else names, path.stem)
-        _draw(part, path, figures, talk, shown.variables)
-        if recorded:
-            robot, trajectory = rebuilt(stored)
-            profiles = trajectory.estimates.values()
-            figures.save(recording_figure(robot, profiles, path, shown.joints, shown.span))
+RECORDING = "recording"
+"""Name of the figure of recorded signals, with their splines and the noise found in them."""
 
 
 def draw_staged(file: Staged, figures: FigureFiles, talk: Talk) -> None:
     """Draw the figures of a file that this command has written."""
     with open_stored(file.temporary) as stored:
-        _draw(stored, file.path, figures, talk)
+        draw_stored_figures(stored, file.path, figures, talk)
 
 
-def _draw(
+def draw_stored_figures(
     stored: StoredResult,
     path: Path,
     figures: FigureFiles,
@@ -152,22 +54,19 @@ def _draw(
         del figure  # else it stays in memory while the next one is drawn
 
 
-def _draw_comparison(paths: list[Path], shown: DrawnPart, target: FigurePlace, talk: Talk) -> None:
-    stem = "-".join(path.stem for path in paths)
-    files = target.figures(comparison_names(shown.variables), stem)
-    with ExitStack() as stack:
-        opened = [stack.enter_context(open_stored(path)) for path in paths]
-        for each in opened:
-            talk.detail(result_line(each))
-        with naming_option("--variables"):
-            select_variables(shown.variables or (), opened[0].declared)
-        files.save(compare_files([_part_of(each, shown) for each in opened], shown.variables))
-
-
-def _part_of(stored: StoredResult, shown: DrawnPart) -> StoredResult:
-    """Return the part of an open file to draw; the file itself if that is all of it."""
-    everything = not shown.joints and shown.span == EVERYTHING.span
-    return stored if everything else Excerpt(stored, shown.joints, shown.span)
+def has_recording(stored: StoredResult, talk: Talk) -> bool:
+    """Return whether the recording behind a result can be drawn; print a note if it exists but cannot."""
+    if stored.kind != "result" or not stored.report_json.get("fits"):
+        return False
+    inputs, made_by = stored.inputs(), stored.provenance()["generated_by"]
+    if not inputs or any(each.content is None for each in inputs):
+        reason = "the result does not hold it"
+    elif made_by != (this := f"vsacli {__version__}"):
+        reason = f"the result was computed by {made_by}, and this is {this}"
+    else:
+        return True
+    talk.note(f"{stored.path}: no figure of its recording: {reason}")
+    return False
 
 
 def compute_and_draw(run: Run, target: FigureTarget, stem: str, outputs: Outputs, talk: Talk) -> Report:

@@ -9,11 +9,11 @@ from __future__ import annotations
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
-from click.shell_completion import CompletionItem
 from click.types import StringParamType
 
 if TYPE_CHECKING:
     import click
+    from click.shell_completion import CompletionItem
 
 
 class NameType(StringParamType):
@@ -27,6 +27,8 @@ class NameType(StringParamType):
         self, _context: click.Context, _parameter: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Delegate to the shell, which completes names of files and folders."""
+        from click.shell_completion import CompletionItem  # needed only by shells
+
         return [CompletionItem(incomplete, type=self.completion)]
 
 

@@ -126,10 +126,11 @@ def invdyn(
         report = compute(run, talk, writer)
         if drawn is not None:
             from vsacli.cli.drawings import draw_staged
-            from vsacli.cli.plot_recording import recording_figure
 
             draw_staged(file, drawn, talk)
             if inputs.trajectory.estimates:
+                from vsacli.cli.plot_recording import recording_figure
+
                 drawn.save(recording_figure(inputs.robot, inputs.trajectory.estimates.values(), path))
     code = show_report(report, as_json, (robot, trajectory), changes)
     talk.wrote(outputs)
@@ -152,7 +153,7 @@ def _figures(
 ) -> FigureFiles:
     """Stage the figures that the stored variables suffice for, and the figure of a recording."""
     from vsacli.base.variables import VARIABLES
-    from vsacli.cli.plot_recording import RECORDING
+    from vsacli.cli.drawings import RECORDING
     from vsacli.results.charts.figures import drawable_figures, result_drawings
 
     stored = VARIABLES if variables is None else variables

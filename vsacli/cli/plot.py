@@ -132,7 +132,7 @@ def plot(
                 "--robot is only for recordings; leave it out, results contain their robot"
             )
         else:
-            from vsacli.cli.drawings import draw_computed
+            from vsacli.cli.plot_computed import draw_computed
 
             draw_computed([Path(file) for file in files], shown, target, talk)
     talk.wrote(outputs)

@@ -14,14 +14,11 @@ from vsacli.base.version import __version__
 from vsacli.cli.command_parts import FIXABLE, result_line
 from vsacli.cli.console import Talk
 from vsacli.documents.reading import format_changes
-from vsacli.files.repetition import rebuilt
 from vsacli.files.stored_reports import stored_report
 from vsacli.results.pages import FixText, result_page, study_page
 from vsacli.results.store.excerpt import Excerpt
 from vsacli.results.store.reader import open_stored
 from vsacli.results.store.study_table import StoredStudy
-from vsacli.studies.search import fixes
-from vsacli.studies.sweeps import StudySummary
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
@@ -79,6 +76,9 @@ def _fixes(files: list[StoredResult], talk: Talk) -> list[FixText | None]:
 
 def _fix(result: StoredResult, talk: Talk) -> FixText | None:
     """Return the fixes of `check-feasibility --fixes` for a result's inputs, or print why not."""
+    from vsacli.files.repetition import rebuilt  # a page without fixes loads a third less
+    from vsacli.studies.search import fixes
+
     try:
         provenance = result.provenance()
         _check_version(provenance["generated_by"], result.path)
@@ -131,6 +131,8 @@ def _named(path: str) -> str:
 
 
 def _studies(paths: list[Path]) -> str:
+    from vsacli.studies.sweeps import StudySummary
+
     with ExitStack() as stack:
         tables = [stack.enter_context(StoredStudy(path)) for path in paths]
         return study_page(tables, [StudySummary.of(table).as_text() for table in tables])

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vsacli.base.errors import InputError
-from vsacli.base.version import __version__
 from vsacli.cli.command_parts import read_robot
 from vsacli.cli.console import Talk
+from vsacli.cli.drawings import RECORDING
 from vsacli.documents.source import is_table
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.files.recordings.fit_curves import recorded_curves, table_profiles
@@ -21,12 +21,8 @@ if TYPE_CHECKING:
     from vsacli.results.plots import FigureFiles
     from vsacli.results.plots.figures import Figures
     from vsacli.results.store.excerpt import Span
-    from vsacli.results.store.reader import StoredResult
     from vsacli.robot.model import Robot
     from vsacli.trajectory.recorded.samples import SampledProfile
-
-RECORDING = "recording"
-"""Name of the figure of recorded signals, with their splines and the noise found in them."""
 
 
 def draw_recording(
@@ -85,18 +81,3 @@ def recording_figure(
     """
     curves = recorded_curves(profiles, robot.joint_types, file, joints, span or WHOLE)
     return {RECORDING: recorded_figure(curves, f"{Path(file).stem}: recorded signals and their splines")}
-
-
-def has_recording(stored: StoredResult, talk: Talk) -> bool:
-    """Return whether the recording behind a result can be drawn; print a note if it exists but cannot."""
-    if stored.kind != "result" or not stored.report_json.get("fits"):
-        return False
-    inputs, made_by = stored.inputs(), stored.provenance()["generated_by"]
-    if not inputs or any(each.content is None for each in inputs):
-        reason = "the result does not hold it"
-    elif made_by != (this := f"vsacli {__version__}"):
-        reason = f"the result was computed by {made_by}, and this is {this}"
-    else:
-        return True
-    talk.note(f"{stored.path}: no figure of its recording: {reason}")
-    return False

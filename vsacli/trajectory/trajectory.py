@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import replace
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -98,6 +97,8 @@ class Trajectory:
         return f"Trajectory {self.name}: {size}{pushed}"
 
     def _repr_html_(self) -> str:
+        from html import escape  # needed only in notebooks
+
         return f"<p>{escape(repr(self))}</p>"
 
     def profiles(self) -> Iterator[tuple[Signal, Profile]]:
