@@ -73,6 +73,7 @@ def _users_of(name: str, function: Any) -> list[Any]:
 
 PAIR, MATRIX = "actuators.pairs.pair_springs:PairSprings", "actuators.elasticity:MotorMatrix"
 BETA = f"{PAIR}.motor_accelerations"
+CURVATURE = f"{PAIR}.stiffness_curvature"
 DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:shaft_torques"
 FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.motor:Windings.variables"
 RATIO, STATE = (
@@ -122,15 +123,17 @@ MUTATIONS = (
     *(
         Mutation(f"{term} in ({70 + row})", "pair", BETA, old, new)
         for row, term, old, new in (
-            (0, "tau_e''", "ddtau_e - (", "1.01 * ddtau_e - ("),
-            (0, "zeta_1 phi_1'^2", "(one.zeta * squared_1", "(1.01 * one.zeta * squared_1"),
-            (0, "zeta_2 phi_2'^2", "two.zeta * squared_2", "1.01 * two.zeta * squared_2"),
-            (0, "sigma q''", "(one.sigma + two.sigma) * ddq", "1.01 * (one.sigma + two.sigma) * ddq"),
-            (1, "sigma''", "ddstiffness - (", "1.01 * ddstiffness - ("),
-            (1, "eta_1 phi_1'^2", "(one.eta * squared_1", "(1.01 * one.eta * squared_1"),
-            (1, "eta_2 phi_2'^2", "two.eta * squared_2", "1.01 * two.eta * squared_2"),
+            (0, "tau_e''", "ddtau_e - ", "1.01 * ddtau_e - "),
+            (0, "zeta_1 phi_1'^2", "= one.zeta * (", "= 1.01 * one.zeta * ("),
+            (0, "zeta_2 phi_2'^2", "+ two.zeta * (", "+ 1.01 * two.zeta * ("),
+            (0, "sigma q''", "self.stiffness * ddq", "1.01 * self.stiffness * ddq"),
+            (1, "sigma''", "ddstiffness - ", "1.01 * ddstiffness - "),
             (1, "zeta q''", "(one.zeta + two.zeta) * ddq", "1.01 * (one.zeta + two.zeta) * ddq"),
         )
+    ),
+    *(
+        Mutation(f"eta_{side} phi_{side}'^2 in (71)", "pair", CURVATURE, term, f"1.01 * {term}")
+        for side, term in ((1, "self._one.eta"), (2, "self._two.eta"))
     ),
     Mutation(
         "B_k theta_k'' (73)-(74)",
