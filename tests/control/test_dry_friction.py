@@ -242,8 +242,8 @@ def test_a_held_joint_leaves_the_others_free():
     ddq = state_derivative(robot, state, torque).ddq
     assert ddq[0] == 0
     plant = Plant(robot)
-    matrix = plant.chain.mass_matrix(q) + np.diag([0.5, 0.3, 0.3])
-    left = torque[:, 0] - plant.chain.bias(q, dq, None)
+    matrix = plant.links.mass_matrix(q) + np.diag([0.5, 0.3, 0.3])
+    left = torque[:, 0] - plant.links.bias(q, dq, None)
     np.testing.assert_allclose(ddq[1:], np.linalg.solve(matrix[1:, 1:], left[1:]), rtol=1e-12)
     assert abs(left[0] - matrix[0] @ ddq) < 50  # what holds it is what friction can
 

@@ -100,7 +100,7 @@ def fall(robot, torque, duration, stiffness):
     """q after a time from rest at q = 0.4, an elastic drive stretched as its link will demand."""
     plant = Plant(robot)
     q, still = np.array([0.4]), np.zeros(1)
-    matrix, bias = plant.chain.mass_matrix(q)[0], plant.chain.bias(q, still, None)
+    matrix, bias = plant.links.mass_matrix(q)[0], plant.links.bias(q, still, None)
     demand = matrix * (torque - bias) / (matrix + 2.0) + bias  # M q'' + n, with (M + B) q'' = tau - n
     theta = np.empty(0) if stiffness is None else q + demand / stiffness
     parts = len(theta)

@@ -17,11 +17,12 @@ from oracles.lagrange import Chain, Link, State
 from oracles.mutants import Mutant, mutants_of
 from oracles.rational import random_chain, random_contact
 from samples.marks import slow, slow_but
+from samples.serial_links import serial_links
 
 from vsacli.compute.vector import SymmetricTensor, Vector
 from vsacli.dynamics import recursion as recursion_module
-from vsacli.dynamics.chain import JointState, LinkConstants, TipLoad
 from vsacli.dynamics.recursion import recursion
+from vsacli.dynamics.tree import JointState, LinkConstants, ToolLoad
 
 type_chains = pytest.mark.parametrize("types", ["R", "P", "RR", "RP", "PR", "PP", "RPR", "RRP"])
 contacts = pytest.mark.parametrize(
@@ -71,15 +72,15 @@ def joint_state_jets(link: Link, state: State) -> JointState:
     return JointState(Jet(*cosines), Jet(*sines), Jet(state.d, *sliding[:2]), (dq, ddq, d3q, d4q))
 
 
-def tip_load(contact: Contact) -> TipLoad:
+def tool_load(contact: Contact, joint: int) -> ToolLoad:
     force, moment = ([Vector(*row) for row in rows] for rows in (contact.force, contact.moment))
-    return TipLoad(force, moment, Vector(*contact.point), contact.in_base)
+    return ToolLoad(joint, force, moment, Vector(*contact.point), contact.in_base)
 
 
-def tip_load_jets(contact: Contact) -> TipLoad:
+def tool_load_jets(contact: Contact, joint: int) -> ToolLoad:
     """The load with its first two derivatives; those beyond the second of a component are zero."""
     force, moment = (_jets([*rows, *NO_RATES]) for rows in (contact.force, contact.moment))
-    return TipLoad(force, moment, Vector(*contact.point), contact.in_base)
+    return ToolLoad(joint, force, moment, Vector(*contact.point), contact.in_base)
 
 
 def _jets(rows: Sequence[Sequence[Scalar]]) -> list[Vector]:
@@ -94,17 +95,17 @@ def torques(
     """(tau_e, dtau_e, ddtau_e) of each joint."""
     links = [link_constants(link) for link in chain.links]
     states = [joint_state(state) for state in chain.states]
-    tip = contact and tip_load(contact)
-    return [tuple(joint) for joint in run(links, states, Vector(*chain.gravity[:3]), tip)]
+    load = contact and tool_load(contact, len(links) - 1)
+    return [tuple(joint) for joint in run(serial_links(links, states, Vector(*chain.gravity[:3]), load))]
 
 
 def ladder_gaps(chain: Chain, contact: Contact | None = None, run: Recursion = recursion) -> list[Scalar]:
     """d/dt tau_e - dtau_e, d2/dt2 tau_e - ddtau_e and d/dt dtau_e - ddtau_e of each joint."""
     links = [link_constants(link) for link in chain.links]
     states = [joint_state_jets(*pair) for pair in zip(chain.links, chain.states, strict=True)]
-    tip = contact and tip_load_jets(contact)
+    load = contact and tool_load_jets(contact, len(links) - 1)
     gaps = []
-    for tau, dtau, ddtau in run(links, states, Vector(*chain.gravity[:3]), tip):
+    for tau, dtau, ddtau in run(serial_links(links, states, Vector(*chain.gravity[:3]), load)):
         _, tau_1, tau_2 = tau.derivatives
         dtau_0, dtau_1, _ = dtau.derivatives
         gaps += [tau_1 - dtau_0, tau_2 - ddtau.derivatives[0], dtau_1 - ddtau.derivatives[0]]

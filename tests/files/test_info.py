@@ -16,11 +16,11 @@ from samples.command_line import REPOSITORY, ROBOT, rest_to_rest, without_hint
 from samples.marks import slow, slow_but
 
 from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.files.info.robot_info import describe_robot, free_range, reach, reach_bound, static_load
+from vsacli.files.info.robot_info import describe_robot, free_range, reach, reach_bounds, static_load
 from vsacli.files.info.trajectory_info import describe_trajectory
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import Joint, Limits, Pose
-from vsacli.robot.kinematics import tip_position
+from vsacli.robot.kinematics import frames
 from vsacli.robot.model import Robot
 from vsacli.trajectory.file import load_trajectory
 
@@ -54,7 +54,7 @@ def test_the_tip_is_where_the_transforms_put_it(name: str) -> None:
     robot = load_robot(REPOSITORY / "robots" / f"{name}.yaml")
     robot = dataclasses.replace(robot, tool=Pose(xyz=(0.1, -0.2, 0.3)))
     q = np.random.default_rng(1).uniform(-2, 2, (5, len(robot.joints)))
-    for configuration, tip in zip(q, tip_position(robot, q), strict=True):
+    for configuration, tip in zip(q, frames(robot, q).tools[0].origin, strict=True):
         chain = np.linalg.multi_dot(
             [*map(transform, robot.joints, configuration), np.array([0.1, -0.2, 0.3, 1.0])]
         )
@@ -63,14 +63,14 @@ def test_the_tip_is_where_the_transforms_put_it(name: str) -> None:
 
 def test_reach_of_a_planar_chain_is_the_sum_of_its_links() -> None:
     assert reach(ARM).values[0] == pytest.approx(0.6, abs=1e-12)
-    assert reach_bound(ARM) == pytest.approx(0.6, abs=1e-12)
+    assert reach_bounds(ARM)[0] == pytest.approx(0.6, abs=1e-12)
 
 
 def test_reach_within_limits_by_the_law_of_cosines() -> None:
     bent = limited(ARM, (-1, 1), (-1, 1), (1.0, 2.0))
     assert reach(bent).values[0] == pytest.approx(0.6 * math.cos(0.5), abs=1e-9)
     assert reach(bent).configurations[0, 2] == pytest.approx(1.0)
-    assert reach_bound(bent) == pytest.approx(0.6)
+    assert reach_bounds(bent)[0] == pytest.approx(0.6)
 
 
 def test_reach_of_a_slide_is_at_the_end_of_its_range() -> None:
@@ -100,9 +100,9 @@ def test_no_random_configuration_beats_the_extremes(name: str) -> None:
     sampled = np.abs(recursion_torques(robot, q)).max(axis=0)
     assert (sampled <= loads.values + rounding).all()
     assert (sampled >= 0.7 * loads.values - rounding).all()  # and the samples come near
-    distance = np.linalg.norm(tip_position(robot, q), axis=1).max()
+    distance = np.linalg.norm(frames(robot, q).tools[0].origin, axis=1).max()
     assert 0.8 * farthest.values[0] <= distance <= farthest.values[0] + rounding
-    assert farthest.values[0] <= reach_bound(robot) + rounding
+    assert farthest.values[0] <= reach_bounds(robot)[0] + rounding
     assert ((low <= loads.configurations) & (loads.configurations <= high)).all()
     own = np.abs(np.diagonal(recursion_torques(robot, loads.configurations)))
     np.testing.assert_allclose(own, loads.values, atol=1e-9)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from vsacli.dynamics.chain import JointState
-from vsacli.dynamics.elastic_torques import link_constants, tip_load
+from vsacli.dynamics.elastic_torques import carriers, link_constants, tool_loads
 from vsacli.dynamics.recursion import recursion
+from vsacli.dynamics.tree import JointState, RecursionInputs
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot
@@ -51,8 +51,8 @@ def complex_torques(
     q, *rates = motion
     states = [_state(joint, q[k], [rate[k] for rate in rates]) for k, joint in enumerate(robot.joints)]
     links = [link_constants(joint) for joint in robot.joints]
-    tip = None if wrench is None else tip_load(robot, frame, wrench)
-    torques = recursion(links, states, base_gravity(robot), tip)
+    loads = [] if wrench is None else tool_loads(robot, frame, wrench)
+    torques = recursion(RecursionInputs(links, states, carriers(robot), base_gravity(robot), loads))
     return np.moveaxis(np.array([tuple(joint) for joint in torques]), 0, -1)
 
 

@@ -9,6 +9,7 @@ import pytest
 from samples.command_line import REPOSITORY
 from samples.marks import slow_but
 from samples.mechanisms import DEVICES
+from samples.serial_links import serial_links
 from samples.springs import SPRINGS
 
 from vsacli import Antagonistic, Elastic, Motor, load_robot, load_trajectory, sensitivity
@@ -92,7 +93,7 @@ def test_inertial_numbers_by_complex_steps():
         link = links[3]._replace(
             mass=values[0], com=Vector(*values[1:4]), inertia=SymmetricTensor(*values[4:])
         )
-        moved = recursion([*links[:3], link, *links[4:]], states, base_gravity(robot))
+        moved = recursion(serial_links([*links[:3], link, *links[4:]], states, base_gravity(robot)))
         for joint, of_joint in enumerate(moved[:4]):
             expected = np.array([np.imag(torque) for torque in of_joint]) / 1e-30
             # Both are exact to rounding, which grows over some hundred operations.

@@ -17,7 +17,7 @@ from vsacli.actuators.drivetrain import DrivetrainState
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.signals import STIFFNESS
-from vsacli.base.wrench import Wrench
+from vsacli.base.wrench import Wrench, WrenchFrame
 from vsacli.compute.vector import add
 from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, Gains, Integral, linear_control
 from vsacli.dynamics.forward import Plant, State
@@ -77,7 +77,7 @@ class Decoupling:
             (link.stiffness, link.dstiffness),
             self._gains.stiffness, self._gains.stiffness_integral, integral.stiffness,
         )  # fmt: skip
-        ddtau_e = self._plant.chain.torque_acceleration(  # (60)
+        ddtau_e = self._plant.links.torque_acceleration(  # (60)
             q, dq, link.ddq, link.d3q, v_q, reference.wrench
         )
         dampers = self._plant.dampers.of_links(reference.commanded, dq, link.ddq, link.d3q)
@@ -108,13 +108,13 @@ class Decoupling:
         wrench: Wrench | None,
         commanded: Mapping[str, FloatArray],
     ) -> LinkMotion:
-        chain, tau_e, dtau_e = self._plant.chain, springs.tau_e, springs.dtau_e
-        matrix = chain.mass_matrix(q)
+        links, tau_e, dtau_e = self._plant.links, springs.tau_e, springs.dtau_e
+        matrix = links.mass_matrix(q)
         dampers = self._plant.dampers
-        bias = add(chain.bias(q, dq, wrench), dampers.of_links(commanded, dq).tau)
-        ddq = chain.solve(matrix, tau_e - bias)  # (34)
-        rate = add(chain.torque_rate(q, dq, ddq, wrench), dampers.of_links(commanded, dq, ddq).dtau)
-        d3q = chain.solve(matrix, dtau_e - rate)  # (35)
+        bias = add(links.bias(q, dq, wrench), dampers.of_links(commanded, dq).tau)
+        ddq = links.solve(matrix, tau_e - bias)  # (34)
+        rate = add(links.torque_rate(q, dq, ddq, wrench), dampers.of_links(commanded, dq, ddq).dtau)
+        d3q = links.solve(matrix, dtau_e - rate)  # (35)
         return LinkMotion(tau_e, dtau_e, ddq, d3q, springs.stiffness, springs.dstiffness)
 
 
@@ -141,8 +141,8 @@ class ComputedTorque:
             (q, dq),
             self._gains.position, self._gains.position_integral, integral.q,
         )  # fmt: skip
-        chain, drivetrain = self._plant.chain, self._plant.drivetrain
-        of_links = (chain.mass_matrix(q) @ v_q[..., None])[..., 0] + chain.bias(q, dq, reference.wrench)
+        links, drivetrain = self._plant.links, self._plant.drivetrain
+        of_links = (links.mass_matrix(q) @ v_q[..., None])[..., 0] + links.bias(q, dq, reference.wrench)
         of_links += drivetrain.inertia * v_q + drivetrain.damping * dq
         friction = drivetrain.friction
         return of_links if friction is None else of_links + friction.torque(dq, slip)
@@ -185,7 +185,7 @@ class FeedbackLinearization:
         law: law for the torques of the motors of `plant`.
     """
 
-    def __init__(self, robot: Robot, gains: Gains, frame: str | None = None) -> None:
+    def __init__(self, robot: Robot, gains: Gains, frame: WrenchFrame | None = None) -> None:
         check_robot(robot)
         check_type("gains", gains, Gains, "Gains.from_poles([-20] * 4) makes some")
         self.plant = Plant(robot, frame)

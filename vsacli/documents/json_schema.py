@@ -23,6 +23,7 @@ from vsacli.documents.fields import (
     Integer,
     Interval,
     Items,
+    ItemsByName,
     Name,
     NamedNumbers,
     NumberList,
@@ -69,7 +70,8 @@ class _SchemaBuilder:
         self, cls: type, beside: Mapping[str, Schema], required: tuple[str, ...] = ()
     ) -> Schema:
         """Return the schema of a mapping with a record class's fields and the further keys `beside`."""
-        fields = declared_fields(cls)
+        key = getattr(cls, "keyed_by", None)
+        fields = {name: field for name, field in declared_fields(cls).items() if name != key}
         return {
             "type": "object",
             "properties": {
@@ -96,6 +98,15 @@ class _SchemaBuilder:
                 return self._reference(cls)
             case OneOf(variants):
                 return self._variants_schema(variants)
+            case ItemsByName(item=item):
+                entry = self._value_schema(item, check)
+                names = {"pattern": f"^{IDENTIFIER.pattern}$"}
+                return {
+                    "type": "object",
+                    "minProperties": 1,
+                    "propertyNames": names,
+                    "additionalProperties": entry,
+                }
             case OneOrMore(item=item):
                 return {
                     "anyOf": [self._value_schema(item, check), _list_schema(self._value_schema(item, check))]

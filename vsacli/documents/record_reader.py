@@ -25,6 +25,7 @@ from vsacli.documents.fields import (
     Integer,
     Interval,
     Items,
+    ItemsByName,
     Name,
     NamedNumbers,
     NumberList,
@@ -285,6 +286,21 @@ def _read_items(kind: Items, node: Node, label: str, scope: Scope) -> Any:
     return INVALID if kind.unique and _note_repeated(kind.unique, node, label, scope) else values
 
 
+def _read_items_by_name(kind: ItemsByName, node: Node, label: str, scope: Scope) -> Any:
+    """Return the records of a mapping, each with its key as `name`."""
+    if not isinstance(node, tree.MapNode) or not node.entries:
+        return scope.unexpected(node, "a mapping with at least one name", label)
+    assert kind.unique is not None, "see ItemsByName"
+    records = []
+    for name, entry in node.entries.items():
+        named, line = entry, node.key_lines[name]
+        if isinstance(entry, tree.MapNode) and kind.unique not in entry.entries:
+            entries = {kind.unique: TextNode(line, name, plain=False), **entry.entries}
+            named = entry._replace(entries=entries, key_lines={kind.unique: line, **entry.key_lines})
+        records.append(read_value(kind.item, named, f"{label}.{name}", scope))
+    return all_valid(records)
+
+
 def _note_repeated(key: str, node: tree.ListNode, label: str, scope: Scope) -> bool:
     """Note the entries of a list whose text under a key occurred before; return whether there are any."""
     entries = [_scalar_entry(item, key) for item in node.items]
@@ -418,6 +434,7 @@ _READERS: Mapping[type[ValueKind], Callable[[Any, Node, str, Scope], Any]] = {
     Interval: _read_interval,
     NamedNumbers: _read_named_numbers,
     Items: _read_items,
+    ItemsByName: _read_items_by_name,
     OneOrMore: _read_one_or_more,
     PairOf: _read_pair,
     PerJoint: _read_per_joint,

@@ -13,6 +13,7 @@ from vsacli.base.texts import on_one_line
 from vsacli.base.units import Quantity
 from vsacli.documents.fields import (
     Items,
+    ItemsByName,
     NamedNumbers,
     OneOf,
     OwnKind,
@@ -129,6 +130,9 @@ def value_as_json(kind: ValueKind, content: Any, of_record: Callable[[Any], Any]
             return dict(content)
         case TablePath():
             return content.source.path
+        case ItemsByName(item=item):
+            fields = (value_as_json(item, entry, of_record) for entry in content)
+            return {each.pop(kind.unique): each for each in fields}
         case ValueKind(item=ValueKind() as item):
             return [value_as_json(item, entry, of_record) for entry in content]
     return content

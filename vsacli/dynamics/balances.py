@@ -6,10 +6,10 @@ shafts and links are for `analysis.self_check`, which compares an energy's deriv
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,12 +23,14 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import Flag, has_flag
 from vsacli.base.variables import VARIABLES, Block, Variable
+from vsacli.base.wrench import WRENCH_AXES, WrenchFrame, frames_by_tool
 from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
 from vsacli.dynamics.dampers import joints_with_parallel_damper, parallel_damper_torques
-from vsacli.dynamics.elastic_torques import link_constants
+from vsacli.dynamics.elastic_torques import carriers, link_constants
 from vsacli.dynamics.inverse import BlockKernel, InverseDynamics, call_at_joints, rows_of_joints
-from vsacli.robot.joint import Joint
+from vsacli.dynamics.tree import Seat
+from vsacli.robot.joint import Joint, Tool
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot
 
@@ -336,6 +338,9 @@ def _transmission_rates(actuator: Actuator, of_joint: JointVariables) -> Sequenc
     return actuator.springs_of(of_joint).transmission_rates(rates)
 
 
+_Axes: TypeAlias = tuple[Vector, Vector, Vector]
+
+
 class _FrameVelocity(NamedTuple):
     """Motion of a link frame, in components of that frame.
 
@@ -344,14 +349,49 @@ class _FrameVelocity(NamedTuple):
         velocity: Velocity of the origin.
         omega: Angular velocity.
         gravity: Acceleration.
-        rotations: Rotations from frame 0 on.
+        base: Axes of frame 0.
     """
 
     origin: Vector
     velocity: Vector
     omega: Vector
     gravity: Vector
-    rotations: tuple[Rotation, ...]
+    base: _Axes
+
+    def seen_from(self, seat: Seat) -> _FrameVelocity:
+        """Return the motion of a frame fixed in this one, in its components."""
+        into_seat, lever = seat.rotation.transposed().times, seat.lever
+        return _FrameVelocity(
+            origin=into_seat(self.origin + lever),
+            velocity=into_seat(self.velocity + cross(self.omega, lever)),
+            omega=into_seat(self.omega),
+            gravity=into_seat(self.gravity),
+            base=_mapped(into_seat, self.base),
+        )
+
+    def behind(self, joint: Joint, q: FloatArray, dq: FloatArray) -> _FrameVelocity:
+        """Return the motion of the frame of the link that a joint moves, seated here."""
+        link = link_constants(joint)
+        angle, offset = (
+            (joint.dh.theta + q, joint.dh.d) if joint.is_revolute else (joint.dh.theta, joint.dh.d + q)
+        )
+        into_link = Rotation(np.cos(angle), np.sin(angle), link.cos_alpha, link.sin_alpha).undo
+        axis = into_link(Vector(0, 0, 1))
+        step = Vector(link.a, 0, 0) + axis * offset
+        omega = into_link(self.omega) + (axis * dq if joint.is_revolute else ZERO)
+        slide = ZERO if joint.is_revolute else axis * dq
+        return _FrameVelocity(
+            origin=into_link(self.origin) + step,
+            velocity=into_link(self.velocity) + cross(omega, step) + slide,
+            omega=omega,
+            gravity=into_link(self.gravity),
+            base=_mapped(into_link, self.base),
+        )
+
+
+def _mapped(function: Callable[[Vector], Vector], axes: Sequence[Vector]) -> _Axes:
+    x, y, z = map(function, axes)
+    return x, y, z
 
 
 def link_energy(robot: Robot, block: Block) -> FloatArray:
@@ -366,8 +406,8 @@ def link_energy(robot: Robot, block: Block) -> FloatArray:
     return energy
 
 
-def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArray]:
-    """Return the powers that change `link_energy`: joints, losses between links, and the wrench; W.
+def link_powers(robot: Robot, block: Block, frame: WrenchFrame | None) -> list[FloatArray]:
+    """Return the powers that change `link_energy`: joints, losses between links, and the wrenches; W.
 
     Args:
         robot: Robot.
@@ -379,43 +419,48 @@ def link_powers(robot: Robot, block: Block, frame: str | None) -> list[FloatArra
         of_joint = JointVariables.of(block.of_joint(index))
         powers.append(of_joint.tau_e * of_joint.dq)
         powers.extend(-lost for lost in link_losses(joint, of_joint))
-    return powers if frame is None else [*powers, _wrench_power(robot, block, frame)]
+    return powers if frame is None else [*powers, *_wrench_powers(robot, block, frame)]
 
 
-def _frame_velocities(robot: Robot, block: Block) -> Iterator[_FrameVelocity]:
-    frame = _FrameVelocity(ZERO, ZERO, ZERO, base_gravity(robot), ())
-    for joint, q, dq in zip(robot.joints, block.q.T, block.dq.T, strict=True):
-        link = link_constants(joint)
-        angle, offset = (
-            (joint.dh.theta + q, joint.dh.d) if joint.is_revolute else (joint.dh.theta, joint.dh.d + q)
-        )
-        rotation = Rotation(np.cos(angle), np.sin(angle), link.cos_alpha, link.sin_alpha)
-        axis = rotation.undo(Vector(0, 0, 1))
-        step = Vector(link.a, 0, 0) + axis * offset
-        omega = rotation.undo(frame.omega) + (axis * dq if joint.is_revolute else ZERO)
-        slide = ZERO if joint.is_revolute else axis * dq
-        frame = _FrameVelocity(
-            origin=rotation.undo(frame.origin) + step,
-            velocity=rotation.undo(frame.velocity) + cross(omega, step) + slide,
-            omega=omega,
-            gravity=rotation.undo(frame.gravity),
-            rotations=(*frame.rotations, rotation),
-        )
-        yield frame
+def _frame_velocities(robot: Robot, block: Block) -> list[_FrameVelocity]:
+    axes = (Vector(1, 0, 0), Vector(0, 1, 0), Vector(0, 0, 1))
+    still = _FrameVelocity(ZERO, ZERO, ZERO, base_gravity(robot), axes)
+    moving = list[_FrameVelocity]()
+    for joint, (parent, seat), q, dq in zip(
+        robot.joints, carriers(robot), block.q.T, block.dq.T, strict=True
+    ):
+        frame = moving[parent] if parent >= 0 else still
+        moving.append((frame if seat is None else frame.seen_from(seat)).behind(joint, q, dq))
+    return moving
 
 
-def _wrench_power(robot: Robot, block: Block, frame: str) -> FloatArray:
-    """Return the power of the wrench on the end effector."""
-    *_, last = _frame_velocities(robot, block)
-    force, moment = Vector(*block.wrench.T[:3]), Vector(*block.wrench.T[3:])
-    velocity = last.velocity + cross(last.omega, Vector(*robot.tool.xyz))
+def _wrench_powers(robot: Robot, block: Block, frame: WrenchFrame) -> Iterator[FloatArray]:
+    """Yield the power of the wrench on each tool on which one acts."""
+    velocities = _frame_velocities(robot, block)
+    by_tool = block.wrench.reshape(len(block.time), -1, len(WRENCH_AXES))
+    for index, (tool, of_tool) in enumerate(zip(robot.end_effectors, frames_by_tool(frame), strict=True)):
+        if of_tool is not None:
+            moved, components = velocities[robot.tool_joints[index]], by_tool[:, index].T
+            yield _wrench_power(robot, tool, moved, of_tool, components)
+
+
+def _wrench_power(
+    robot: Robot, tool: Tool, moved: _FrameVelocity, frame: str, wrench: FloatArray
+) -> FloatArray:
+    force, moment = Vector(*wrench[:3]), Vector(*wrench[3:])
+    velocity = moved.velocity + cross(moved.omega, Vector(*tool.xyz))
     if frame == "end_effector":
-        into_link = rotation_matrix(robot.tool)
+        into_link = rotation_matrix(tool)
         force, moment = into_link.times(force), into_link.times(moment)
     else:
         into_frame_0 = rotation_matrix(robot.base).transposed()
-        force, moment = into_frame_0.times(force), into_frame_0.times(moment)
-        for rotation in last.rotations:
-            force, moment = rotation.undo(force), rotation.undo(moment)
-    power: FloatArray = force.dot(velocity) + moment.dot(last.omega)
+        force, moment = (_from_axes(moved.base, into_frame_0.times(part)) for part in (force, moment))
+    power: FloatArray = force.dot(velocity) + moment.dot(moved.omega)
     return power
+
+
+def _from_axes(axes: _Axes, components: Vector) -> Vector:
+    """Return the vector with components along axes, which are given in the components of the result."""
+    x, y, z = axes
+    total: Vector = x * components.x + y * components.y + z * components.z
+    return total

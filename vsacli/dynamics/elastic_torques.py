@@ -16,7 +16,15 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, by_joint, checked_shape
 from vsacli.base.errors import InputError
 from vsacli.base.signals import DAMPING, POSITION
-from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, check_wrench
+from vsacli.base.wrench import (
+    WRENCH_AXES,
+    WRENCH_NAMES,
+    Wrench,
+    WrenchFrame,
+    check_wrench,
+    frames_by_tool,
+    wrench_components,
+)
 from vsacli.compute.control_flow import Keyed, call
 from vsacli.compute.engine import KEPT_PROGRAMS, NUMBERS, Engine, engine_of_call
 from vsacli.compute.rows import RowKernel, RowLayout
@@ -29,11 +37,19 @@ from vsacli.compute.vector import (
     exact,
     trigonometric,
 )
-from vsacli.dynamics.chain import JointState, LinkConstants, RecursionInputs, TipLoad, TorqueDerivatives
 from vsacli.dynamics.dampers import damper_torque
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.dynamics.recursion import recursion
-from vsacli.robot.joint import Joint
+from vsacli.dynamics.tree import (
+    Carrier,
+    JointState,
+    LinkConstants,
+    RecursionInputs,
+    Seat,
+    ToolLoad,
+    TorqueDerivatives,
+)
+from vsacli.robot.joint import Joint, Pose, Tool
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot, check_robot
 
@@ -61,23 +77,55 @@ def link_constants(joint: Joint) -> LinkConstants:
     )
 
 
-def tip_load(robot: Robot, frame: str, wrench: Iterable[Sequence[Scalar]]) -> TipLoad:
-    """Return the load of the end effector while the environment exerts a wrench on it.
+def carriers(robot: Robot) -> list[Carrier]:
+    """Return what carries each joint of a robot."""
+    return [
+        Carrier(parent, None if joint.mount is None else _seat(joint.mount))
+        for parent, joint in zip(robot.parents, robot.joints, strict=True)
+    ]
+
+
+def _seat(mount: Pose) -> Seat:
+    return Seat(rotation_matrix(mount), _position(mount))
+
+
+def tool_loads(robot: Robot, frame: WrenchFrame, wrench: Sequence[Sequence[Scalar]]) -> list[ToolLoad]:
+    """Return the loads of the tools while the environment exerts wrenches on them.
 
     Args:
-        robot: Robot with its base and tool.
-        frame: Frame of the components, one of `vsacli.base.wrench.WRENCH_FRAMES`.
-        wrench: Six components, their first and their second derivatives; scalars of any kind.
+        robot: Robot with its base and tools.
+        frame: Frame of the components for each tool.
+        wrench: Components of all tools, six each, their first and their second derivatives; scalars of any
+            kind.
     """
+    axes, loads = len(WRENCH_AXES), []
+    frames = frames_by_tool(frame)
+    for index, (tool, carrier, of_tool) in enumerate(
+        zip(robot.end_effectors, robot.tool_joints, frames, strict=True)
+    ):
+        if of_tool is not None:
+            own = [components[axes * index : axes * (index + 1)] for components in wrench]
+            loads.append(_tool_load(robot, tool, carrier, of_tool, own))
+    return loads
+
+
+def _tool_load(
+    robot: Robot, tool: Tool, carrier: int, frame: str, wrench: Iterable[Sequence[Scalar]]
+) -> ToolLoad:
     in_base = frame == "base"
-    rotation = rotation_matrix(robot.base).transposed() if in_base else rotation_matrix(robot.tool)
+    rotation = rotation_matrix(robot.base).transposed() if in_base else rotation_matrix(tool)
     exerted = [(ZERO - Vector(*components[:3]), ZERO - Vector(*components[3:])) for components in wrench]
-    return TipLoad(
+    return ToolLoad(
+        joint=carrier,
         force=[rotation.times(force) for force, _ in exerted],
         moment=[rotation.times(moment) for _, moment in exerted],
-        point=Vector(*map(exact, robot.tool.xyz)),
+        point=_position(tool),
         in_base=in_base,
     )
+
+
+def _position(pose: Pose) -> Vector:
+    return Vector(*map(exact, pose.xyz))
 
 
 @dataclass(frozen=True)
@@ -89,19 +137,21 @@ class LinkTorques(RowKernel):
     ddtau_e of the joints.
 
     Attributes:
-        robot: Robot with the chain.
+        robot: Robot.
         frame: Frame of the wrench; None without a wrench.
     """
 
     robot: Robot
-    frame: str | None = None
+    frame: WrenchFrame | None = None
 
     @cached_property
     def arguments(self) -> RowLayout:
         """Layout of the input rows."""
-        joints, names = (len(self.robot.joints),), () if self.frame is None else WRENCH_NAMES
         of_joints = (*POSITION.names, *(DAMPING.names if link_damped(self.robot) else ()))
-        return RowLayout(dict.fromkeys(of_joints, joints) | dict.fromkeys(names, (len(WRENCH_AXES),)))
+        shapes = dict.fromkeys(of_joints, (len(self.robot.joints),))
+        if self.frame is not None:
+            shapes |= dict.fromkeys(WRENCH_NAMES, (wrench_components(self.frame),))
+        return RowLayout(shapes)
 
     @cached_property
     def results(self) -> RowLayout:
@@ -110,7 +160,7 @@ class LinkTorques(RowKernel):
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(60)."""
-        torques = recursion(*self.recursion_inputs(rows))  # (36)-(60)
+        torques = recursion(self.recursion_inputs(rows))  # (36)-(60)
         return self.results.pack(dict(zip(TORQUES, zip(*torques, strict=True), strict=True)))
 
     def recursion_inputs(self, rows: Sequence[Scalar]) -> RecursionInputs:
@@ -125,12 +175,16 @@ class LinkTorques(RowKernel):
             )
         ]
         wrench = [inputs[name] for name in WRENCH_NAMES if name in inputs]
-        tip = None if self.frame is None else tip_load(self.robot, self.frame, wrench)
-        return RecursionInputs(self._links, states, self._gravity, tip)
+        loads = () if self.frame is None else tool_loads(self.robot, self.frame, wrench)
+        return RecursionInputs(self._links, states, self._carriers, self._gravity, loads)
 
     @cached_property
     def _links(self) -> list[LinkConstants]:
         return list(map(link_constants, self.robot.joints))
+
+    @cached_property
+    def _carriers(self) -> list[Carrier]:
+        return carriers(self.robot)
 
     @cached_property
     def _gravity(self) -> Vector:
@@ -171,13 +225,13 @@ def link_torques(
     requires dq and ddq, dtau_e also d3q, ddtau_e also d4q.
 
     Args:
-        robot: Robot with the chain.
+        robot: Robot.
         q: Joint positions, ([samples,] joints), rad (m).
         dq: First derivative of q.
         ddq: Second derivative of q.
         d3q: Third derivative of q.
         d4q: Fourth derivative of q.
-        wrench: Wrench of the environment on the end effector, arrays ([samples,] 6); zero if None.
+        wrench: Wrench of the environment on the tools, see `Wrench`; zero if None.
         damping: Damping of the dampers between the links, of the shape of q; their minimum if None.
         ddamping: First derivative of the damping; zero if None.
         dddamping: Second derivative of the damping; zero if None.
@@ -193,7 +247,7 @@ def link_torques(
     """
     check_robot(robot)
     if wrench is not None:
-        check_wrench(wrench)
+        check_wrench(wrench, robot.tool_names)
     motion_arrays = _check_motion_arrays(
         robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True))
     )
@@ -215,7 +269,7 @@ def link_torques(
 
 
 @lru_cache(KEPT_PROGRAMS)
-def _recursion_kernel(robot: Robot, frame: str | None) -> LinkTorques:
+def _recursion_kernel(robot: Robot, frame: WrenchFrame | None) -> LinkTorques:
     return LinkTorques(robot, frame)
 
 
@@ -259,7 +313,7 @@ def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[Fl
     if wrench is None:
         return
     for name in WRENCH_NAMES:
-        array, expected = getattr(wrench, name), (*samples, len(WRENCH_AXES))
+        array, expected = getattr(wrench, name), (*samples, wrench_components(wrench.frame))
         if (shape := np.shape(array)) != expected:
             raise InputError.one(f"{name} must have the shape {expected}, not {shape}")
         yield _rows_over_samples(np.asarray(array, dtype=np.float64))

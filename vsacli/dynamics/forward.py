@@ -14,7 +14,7 @@ from vsacli.actuators.drivetrain import Drivetrain
 from vsacli.base.arrays import BoolArray, FloatArray, checked_shape
 from vsacli.base.errors import InputError, check_type
 from vsacli.base.signals import DAMPING
-from vsacli.base.wrench import Wrench, check_wrench
+from vsacli.base.wrench import Wrench, WrenchFrame, check_wrench
 from vsacli.compute.engine import KEPT_PROGRAMS
 from vsacli.compute.vector import add
 from vsacli.dynamics.dampers import Dampers
@@ -52,7 +52,7 @@ def mass_matrix(robot: Robot, q: npt.ArrayLike) -> FloatArray:
     """Compute the mass matrix M(q) of the links, without rotors, ([samples,] joints, joints).
 
     Args:
-        robot: Chain.
+        robot: Robot.
         q: Joint positions, ([samples,] joints), rad (m).
 
     Raises:
@@ -79,7 +79,7 @@ def state_derivative(
         robot: Robot.
         state: State of the robot, at one instant or over samples.
         tau_motor: Torque of each motor, ([samples,] joints, 2), N m (N), joint side of the gear.
-        wrench: Wrench of the environment on the end effector, arrays ([samples,] 6).
+        wrench: Wrench of the environment on the tools, see `Wrench`; zero if None.
         damping: Damping of the dampers, ([samples,] joints); their minimum if None.
 
     Raises:
@@ -88,7 +88,7 @@ def state_derivative(
     """
     check_robot(robot)
     if wrench is not None:
-        check_wrench(wrench)
+        check_wrench(wrench, robot.tool_names)
     plant = plant_of(robot, None if wrench is None else wrench.frame)
     q, dq, theta, dtheta = plant.unpacked(state)
     torque = plant.drivetrain.of_motors(checked_shape("tau_motor", tau_motor, len(robot.joints), 2))
@@ -103,7 +103,7 @@ def state_derivative(
 
 
 @lru_cache(KEPT_PROGRAMS)
-def plant_of(robot: Robot, frame: str | None = None) -> Plant:
+def plant_of(robot: Robot, frame: WrenchFrame | None = None) -> Plant:
     """Return the plant of a robot, prepared once for many calls; see `Plant`."""
     return Plant(robot, frame)
 
@@ -113,17 +113,17 @@ class Plant:
 
     Args:
         robot: Robot.
-        frame: Frame of the wrench at the end effector; None without a wrench.
+        frame: Frame of the wrench on the tools; None without a wrench.
 
     Attributes:
-        chain: Links and joints.
+        links: Links and joints.
         drivetrain: Motors and springs.
         dampers: Dampers with commanded damping.
     """
 
-    def __init__(self, robot: Robot, frame: str | None = None) -> None:
+    def __init__(self, robot: Robot, frame: WrenchFrame | None = None) -> None:
         self.drivetrain = Drivetrain(robot.actuators)
-        self.chain = link_dynamics(robot, frame)
+        self.links = link_dynamics(robot, frame)
         self.dampers = Dampers(robot, self.drivetrain)
         self._rigid_inertia = self.drivetrain.of_rigid_joints(self.drivetrain.inertia)
         self._rigid_matrix = np.diag(self._rigid_inertia)
@@ -177,8 +177,8 @@ class Plant:
         """
         tau_e, spring = self.drivetrain.torques(q, theta)
         damper = self.dampers.parallel(commanded, dq, dtheta)
-        resistance = add(self.chain.bias(q, dq, wrench), self.dampers.of_links(commanded, dq).tau)
-        matrix = self.chain.mass_matrix(q) + self._rigid_matrix
+        resistance = add(self.links.bias(q, dq, wrench), self.dampers.of_links(commanded, dq).tau)
+        matrix = self.links.mass_matrix(q) + self._rigid_matrix
         laws, velocity = self.drivetrain.friction, self.drivetrain.of_all_motors(dq, dtheta)
 
         def accelerate(
@@ -202,11 +202,11 @@ class Plant:
         rotors = self.drivetrain.rotors
         if held is None or not held.any():
             still = np.zeros((*on_motors.shape[:-1], len(self.drivetrain.joint)))
-            return self.chain.solve(matrix, on_joints), rotors.accelerations(on_motors), still
+            return self.links.solve(matrix, on_joints), rotors.accelerations(on_motors), still
         held_joints = self.drivetrain.of_rigid_joints(held.astype(np.float64)) > 0
         decoupled = held_joints[..., :, None] | held_joints[..., None, :]
         free = np.where(decoupled, np.eye(on_joints.shape[-1]), matrix)
-        ddq = self.chain.solve(free, np.where(held_joints, 0.0, on_joints))
+        ddq = self.links.solve(free, np.where(held_joints, 0.0, on_joints))
         holding_joints = on_joints - (matrix @ ddq[..., None])[..., 0]
         ddtheta, holding_motors = rotors.accelerations_with_held(on_motors, held[..., self.drivetrain.sprung])
         holding = self.drivetrain.of_all_motors(holding_joints, holding_motors)

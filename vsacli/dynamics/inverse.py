@@ -23,6 +23,7 @@ from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.json_records import Stored
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.variables import VARIABLES, Block
+from vsacli.base.wrench import WrenchFrame, check_wrench_frame
 from vsacli.compute.control_flow import Keyed, call
 from vsacli.compute.engine import KEPT_PROGRAMS, NUMPY, Engine, engine_of_call, samples_per_pass
 from vsacli.compute.rows import RowKernel, RowLayout
@@ -86,7 +87,7 @@ class InverseDynamics(BlockKernel):
     """
 
     robot: Robot
-    frame: str | None = None
+    frame: WrenchFrame | None = None
     min_margin: float = MIN_MARGIN
     prescribed: tuple[IntegratedRows | InternalRows, ...] = ()
 
@@ -223,7 +224,7 @@ def compute_block(
 
 @lru_cache(KEPT_PROGRAMS)
 def _inverse_dynamics_kernel(
-    robot: Robot, frame: str | None, min_margin: float, damped: tuple[int, ...]
+    robot: Robot, frame: WrenchFrame | None, min_margin: float, damped: tuple[int, ...]
 ) -> InverseDynamics:
     prescribed = (InternalRows(damped),) if damped else ()
     return InverseDynamics(robot, frame, min_margin, prescribed)
@@ -350,6 +351,8 @@ def adapt_trajectory(robot: Robot, trajectory: Trajectory) -> Trajectory:
     if trajectory.joints != len(robot.joints):
         joints = f"{trajectory.joints} joints, the robot {robot.name} {len(robot.joints)}"
         raise InputError.one(f"the trajectory {trajectory.name} has {joints}")
+    if trajectory.wrench is not None:
+        check_wrench_frame(trajectory.wrench.frame, robot.tool_names)
     trajectory = set_uncommanded_dampers(trajectory, robot)
     for key, signal in COMMANDED.items():
         lacking = [

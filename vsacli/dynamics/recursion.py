@@ -1,20 +1,31 @@
 """The recursion of Buondonno & De Luca (2016), (36)-(60): link torques and their first two derivatives.
 
-`forward` runs (36)-(51) from base to tip, `backward` (52)-(60) from tip to base. Scalars are of any kind:
-floats, NumPy rows of samples, complex numbers, fractions, symbols. Given cos and sin of each joint angle (and
-the offset d of prismatic joints) the recursion is a polynomial in its inputs.
+`forward` runs (36)-(51) from the base to the tips, `backward` (52)-(60) from the tips to the base. The paper
+has chains; in a tree, "frame k-1" is the seat of joint k: the frame on the link that carries it at which its
+row begins. The reactions of all joints on a link add up. Scalars are of any kind: floats, NumPy rows of
+samples, complex numbers, fractions, symbols. Given cos and sin of each joint angle (and the offset d of
+prismatic joints) the recursion is a polynomial in its inputs.
 
 Every quantity of frame k is a derivative taken in the base frame, written in components of frame k.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple, TypeAlias
 
 from vsacli.compute.control_flow import call
-from vsacli.compute.vector import ZERO, Rotation, Scalar, SymmetricTensor, Vector, add, cross, mul
-from vsacli.dynamics.chain import JointState, LinkConstants, TipLoad, TorqueDerivatives
+from vsacli.compute.vector import ZERO, Matrix, Rotation, Scalar, SymmetricTensor, Vector, add, cross, mul
+from vsacli.dynamics.tree import (
+    Carrier,
+    JointState,
+    LinkConstants,
+    RecursionInputs,
+    Seat,
+    ToolLoad,
+    TorqueDerivatives,
+)
 
 Z0 = Vector(0, 0, 1)
 
@@ -80,37 +91,30 @@ class MovingBody(NamedTuple):
     moment: tuple[Vector, Vector, Vector]
 
 
+_WithRates: TypeAlias = tuple[Vector, Vector, Vector]
+"""A vector and its first two derivatives in the base frame."""
+
+
 class _Reaction(NamedTuple):
     """Force f and moment n of link k-1 on link k, with their derivatives f', f'', n', n''.
 
-    For k = N + 1, force and moment of the last link on the environment.
+    Also those of a link on a tool's environment, and of a link on all that it carries.
     """
 
-    f: tuple[Vector, Vector, Vector]
-    n: tuple[Vector, Vector, Vector]
+    f: _WithRates
+    n: _WithRates
 
 
 _NO_REACTION = _Reaction((ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO))
 
 
-def recursion(
-    links: Sequence[LinkConstants],
-    states: Sequence[JointState],
-    gravity: Vector,
-    tip: TipLoad | None = None,
-) -> list[TorqueDerivatives]:
-    """Run (36)-(60) once over a chain.
-
-    Args:
-        links: Constants of each joint and link, base to tip.
-        states: Pose and motion of each joint, in the same order.
-        gravity: Acceleration of gravity in frame 0, m/s^2.
-        tip: Load of the end effector on the environment, if any; N and N m per s^k.
+def recursion(inputs: RecursionInputs) -> list[TorqueDerivatives]:
+    """Run (36)-(60) once over a tree.
 
     Returns:
-        tau_e, tau_e', tau_e'' of each joint, base to tip; N m (N at a prismatic joint) per s^k.
+        tau_e, tau_e', tau_e'' of each joint; N m (N at a prismatic joint) per s^k.
     """
-    return backward(links, states, forward(links, states, base_frame(gravity)), tip)
+    return backward(inputs, forward(inputs))
 
 
 def base_frame(gravity: Vector) -> FrameMotion:
@@ -119,32 +123,53 @@ def base_frame(gravity: Vector) -> FrameMotion:
 
 
 def forward(
-    links: Sequence[LinkConstants], states: Sequence[JointState], previous: FrameMotion
+    inputs: RecursionInputs, known: Mapping[int, MovingBody] = MappingProxyType({})
 ) -> list[MovingBody]:
-    """Run (36)-(51) from a frame whose motion is known to the tip."""
-    bodies = []
-    for link, state in zip(links, states, strict=True):
-        # Computes _forward(link, state, previous); `call` lets links of equal structure share one body.
-        body: MovingBody = call(state.rates[0], _forward, link, state, previous)
-        previous = body.frame
-        bodies.append(body)
+    """Run (36)-(51) from the base to the tips, except for links whose motion is known, by index."""
+    base, bodies = base_frame(inputs.gravity), list[MovingBody]()
+    joints = zip(inputs.links, inputs.states, inputs.carriers, strict=True)
+    for index, (link, state, (parent, seat)) in enumerate(joints):
+        if index in known:
+            bodies.append(known[index])
+            continue
+        frame = bodies[parent].frame if parent >= 0 else base
+        # `call` computes e.g. _forward(link, state, frame); it lets links of equal structure share one body.
+        if seat is not None:
+            frame = call(state.rates[0], _seat_motion, seat, frame)
+        bodies.append(call(state.rates[0], _forward, link, state, frame))
     return bodies
 
 
-def backward(
-    links: Sequence[LinkConstants],
-    states: Sequence[JointState],
-    bodies: Sequence[MovingBody],
-    tip: TipLoad | None,
-) -> list[TorqueDerivatives]:
-    """Run (52)-(60) from tip to base; arguments and result as for `recursion`."""
+def backward(inputs: RecursionInputs, bodies: Sequence[MovingBody]) -> list[TorqueDerivatives]:
+    """Run (52)-(60) from the tips to the base; result as for `recursion`."""
+    links, states, carriers, _, loads = inputs
+    beyond: list[list[_Reaction]] = [[] for _ in links]
+    for load in loads:
+        beyond[load.joint].append(_tool_reaction(load, carriers, bodies))
     torques: list[TorqueDerivatives] = []
-    beyond = _NO_REACTION if tip is None else _tip_reaction(tip, bodies)
-    for link, state, body in zip(reversed(links), reversed(states), reversed(bodies), strict=True):
-        of_base = body is bodies[0]
-        torque, beyond = call(state.rates[0], _backward, link, state, body, beyond, of_base)
+    for index in reversed(range(len(links))):
+        (parent, seat), row = carriers[index], states[index].rates[0]
+        on_link = _total_reaction(row, beyond[index])
+        torque, reaction = call(
+            row, _backward, links[index], states[index], bodies[index], on_link, parent < 0
+        )
         torques.append(torque)
+        if parent >= 0:
+            if seat is not None:
+                reaction = call(row, _seat_reaction, seat, bodies[parent].frame.angular, reaction)
+            beyond[parent].append(reaction)
     return torques[::-1]
+
+
+def _seat_motion(seat: Seat, frame: FrameMotion) -> FrameMotion:
+    """Return the motion of a seat from that of the link frame, as (41), (43), (45) for its origin."""
+    rates, into_seat = _point_rates(frame.angular, seat.lever), seat.rotation.transposed()
+    return FrameMotion(
+        _Angular(*map(into_seat.times, frame.angular)),
+        a=into_seat.times(frame.a + rates.second),
+        j=into_seat.times(frame.j + rates.third),
+        s=into_seat.times(frame.s + rates.fourth),
+    )
 
 
 def _forward(link: LinkConstants, state: JointState, previous: FrameMotion) -> MovingBody:
@@ -233,29 +258,62 @@ def _euler(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector,
     return moment, dmoment, ddmoment
 
 
-def _tip_reaction(tip: TipLoad, bodies: Sequence[MovingBody]) -> _Reaction:
-    """Return f_N+1, n_N+1 and their derivatives, about the origin of frame N, in frame N."""
-    angular = bodies[-1].frame.angular
-    if tip.in_base:
-        rotations = [body.rotation for body in bodies]
-        f, df, ddf = (_into_last_frame(rotations, vector) for vector in tip.force)
-        m, dm, ddm = (_into_last_frame(rotations, vector) for vector in tip.moment)
+def _tool_reaction(load: ToolLoad, carriers: Sequence[Carrier], bodies: Sequence[MovingBody]) -> _Reaction:
+    """Return force and moment of a tool on the environment about the origin of its link's frame, in it.
+
+    In a chain they are f_N+1, n_N+1 and their derivatives.
+    """
+    angular = bodies[load.joint].frame.angular
+    if load.in_base:
+        f, df, ddf = (_into_link(load.joint, carriers, bodies, vector) for vector in load.force)
+        m, dm, ddm = (_into_link(load.joint, carriers, bodies, vector) for vector in load.moment)
     else:
-        f, df, ddf = _turning(angular, *tip.force)
-        m, dm, ddm = _turning(angular, *tip.moment)
+        f, df, ddf = _turning(angular, *load.force)
+        m, dm, ddm = _turning(angular, *load.moment)
+    return _Reaction((f, df, ddf), _shifted_moment(angular, load.point, (f, df, ddf), (m, dm, ddm)))
 
-    v_r = _point_rates(angular, tip.point)
-    r, dr, ddr = tip.point, v_r.first, v_r.second
-    n = m + cross(r, f)
-    dn = dm + cross(dr, f) + cross(r, df)
-    ddn = ddm + cross(ddr, f) + cross(dr, df) * 2 + cross(r, ddf)
+
+def _into_link(joint: int, carriers: Sequence[Carrier], bodies: Sequence[MovingBody], v: Vector) -> Vector:
+    """Return components in frame 0 as components in a link frame."""
+    parent, seat = carriers[joint]
+    if parent >= 0:
+        v = _into_link(parent, carriers, bodies, v)
+    if seat is not None:
+        v = call(v.x, Matrix.times, seat.rotation.transposed(), v)
+    turned: Vector = call(v.x, Rotation.undo, bodies[joint].rotation, v)
+    return turned
+
+
+def _shifted_moment(angular: _Angular, r: Vector, force: _WithRates, moment: _WithRates) -> _WithRates:
+    """Return the moment about the origin of a frame from that about a point r fixed in it."""
+    v_r, (f, df, ddf), (m, dm, ddm) = _point_rates(angular, r), force, moment
+    dr, ddr = v_r.first, v_r.second
+    return (
+        m + cross(r, f),
+        dm + cross(dr, f) + cross(r, df),
+        ddm + cross(ddr, f) + cross(dr, df) * 2 + cross(r, ddf),
+    )
+
+
+def _seat_reaction(seat: Seat, angular: _Angular, reaction: _Reaction) -> _Reaction:
+    """Return the reaction of a joint on its seat about the origin of the link frame, in this frame."""
+    f, df, ddf = (seat.rotation.times(vector) for vector in reaction.f)
+    n, dn, ddn = (seat.rotation.times(vector) for vector in reaction.n)
+    return _Reaction((f, df, ddf), _shifted_moment(angular, seat.lever, (f, df, ddf), (n, dn, ddn)))
+
+
+def _total_reaction(row: Scalar, reactions: Sequence[_Reaction]) -> _Reaction:
+    """Return the sum of what the joints and tools on a link take from it."""
+    total, *others = reactions or [_NO_REACTION]
+    for reaction in others:
+        total = call(row, _sum_of_reactions, total, reaction)
+    return total
+
+
+def _sum_of_reactions(one: _Reaction, other: _Reaction) -> _Reaction:
+    f, df, ddf = (a + b for a, b in zip(one.f, other.f, strict=True))
+    n, dn, ddn = (a + b for a, b in zip(one.n, other.n, strict=True))
     return _Reaction((f, df, ddf), (n, dn, ddn))
-
-
-def _into_last_frame(rotations: Sequence[Rotation], v: Vector) -> Vector:
-    for rotation in rotations:
-        v = call(v.x, Rotation.undo, rotation, v)
-    return v
 
 
 def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vector, Vector, Vector]:
@@ -279,7 +337,7 @@ def _reaction(body: MovingBody, beyond: _Reaction) -> _Reaction:
     force, dforce, ddforce = body.force
     moment, dmoment, ddmoment = body.moment
 
-    # `beyond` is the reaction on link k+1, already in frame k.
+    # `beyond` is the reaction on link k+1, or on all that link k carries, already in frame k.
     f = beyond.f[0] + force  # (52)
     df = beyond.f[1] + dforce  # (53)
     ddf = beyond.f[2] + ddforce  # (54)

@@ -1,4 +1,4 @@
-"""The dynamics of the chain of links without drives: M(q), n(q, q'), and the terms of (35) and (60).
+"""The dynamics of the links without drives: M(q), n(q, q'), and the terms of (35) and (60).
 
 Each is a program traced from the recursion (36)-(60), so that a single sample takes microseconds.
 """
@@ -6,7 +6,7 @@ Each is a program traced from the recursion (36)-(60), so that a single sample t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache, reduce
 from typing import Any
@@ -17,13 +17,13 @@ from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
+from vsacli.base.wrench import WRENCH_NAMES, Wrench, WrenchFrame, wrench_components
 from vsacli.compute.tracing import Symbol, Tape, TracedArray
 from vsacli.compute.tracing.python_functions import StateFunction
 from vsacli.compute.vector import ZERO, Scalar, Vector
-from vsacli.dynamics.chain import TipLoad, TorqueDerivatives
-from vsacli.dynamics.elastic_torques import joint_state, link_constants, tip_load
+from vsacli.dynamics.elastic_torques import carriers, joint_state, link_constants, tool_loads
 from vsacli.dynamics.recursion import recursion
+from vsacli.dynamics.tree import RecursionInputs, ToolLoad, TorqueDerivatives
 from vsacli.robot.joint import Limits
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot
@@ -33,13 +33,13 @@ SMALLEST_PIVOT = 1e-12
 
 
 class LinkDynamics:
-    """Programs of a chain of joints, each traced at first use; use `link_dynamics` to obtain one.
+    """Programs of the links of a robot, each traced at first use; use `link_dynamics` to obtain one.
 
-    Arrays are (joints,) or (samples, joints) throughout. A wrench must be given if and only if the chain was
-    made for one.
+    Arrays are (joints,) or (samples, joints) throughout. A wrench must be given if and only if the programs
+    were made for one.
     """
 
-    def __init__(self, robot: Robot, frame: str | None) -> None:
+    def __init__(self, robot: Robot, frame: WrenchFrame | None) -> None:
         self._names = robot.joint_names
         self._lower = np.tril_indices(len(robot.joints))
         self._robot, self._frame = robot, frame
@@ -102,9 +102,19 @@ class LinkDynamics:
                 A traced program gives NaN instead.
         """
         if isinstance(matrix, TracedArray):
-            return _solve_positive_definite(matrix, torque, SMALLEST_PIVOT)
+            return self._solve_traced(matrix, torque)
         self._check_positive_definite(matrix)
         return np.asarray(np.linalg.solve(matrix, torque[..., None])[..., 0], dtype=np.float64)
+
+    def _solve_traced(self, matrix: Any, torque: Any) -> Any:
+        """Return matrix^-1 torque: a chain from the base; a tree from the tips, so that nothing fills in."""
+        paths = self._robot.paths
+        joints = range(len(paths))
+        if len(self._robot.tips) == 1:
+            return _solve_positive_definite(matrix, torque, SMALLEST_PIVOT, joints, lambda *_: True)
+        return _solve_positive_definite(
+            matrix, torque, SMALLEST_PIVOT, joints[::-1], lambda row, column: row in paths[column]
+        )
 
     def _check_positive_definite(self, matrices: FloatArray) -> None:
         try:
@@ -131,36 +141,47 @@ def _wrench_derivatives(wrench: Wrench | None, order: int) -> list[FloatArray]:
     return [] if wrench is None else [getattr(wrench, name) for name in WRENCH_NAMES[: order + 1]]
 
 
-def _solve_positive_definite(matrix: Any, right: Any, smallest_pivot: float) -> Any:
+def _solve_positive_definite(
+    matrix: Any,
+    right: Any,
+    smallest_pivot: float,
+    order: Sequence[int],
+    coupled: Callable[[int, int], bool],
+) -> Any:
     """Return matrix^-1 right, by L D L^T without pivoting; NaN where the matrix is not positive definite.
 
     Args:
         matrix: (n, n), symmetric.
         right: (n,).
         smallest_pivot: Relative to the diagonal entry, below which a pivot of D counts as not positive.
+        order: Order of elimination of the columns.
+        coupled: Function that says whether L has an entry in a row and an earlier column.
     """
-    size = len(right)
     lower: dict[tuple[int, int], Any] = {}
-    pivots: list[Any] = []
-    for column in range(size):
-        scaled = {inner: lower[column, inner] * pivots[inner] for inner in range(column)}
-        pivot = _subtracted(
-            matrix[column, column], [lower[column, inner] * scaled[inner] for inner in range(column)]
-        )
+    pivots: dict[int, Any] = {}
+    for place, column in enumerate(order):
+        scaled = {
+            inner: lower[column, inner] * pivots[inner] for inner in order[:place] if (column, inner) in lower
+        }
+        products = [lower[column, inner] * scaled[inner] for inner in scaled]
+        pivot = _subtracted(matrix[column, column], products)
         regular = pivot > smallest_pivot * matrix[column, column]
-        pivots.append(np.where(regular, pivot, math.nan))
-        for row in range(column + 1, size):
-            products = [lower[row, inner] * scaled[inner] for inner in range(column)]
-            lower[row, column] = _subtracted(matrix[row, column], products) / pivots[column]
+        pivots[column] = np.where(regular, pivot, math.nan)
+        for row in order[place + 1 :]:
+            if coupled(row, column):
+                products = [lower[row, inner] * scaled[inner] for inner in scaled if (row, inner) in lower]
+                lower[row, column] = _subtracted(matrix[row, column], products) / pivots[column]
 
-    forward: list[Any] = []
-    for row in range(size):
-        forward.append(_subtracted(right[row], [lower[row, inner] * forward[inner] for inner in range(row)]))
+    forward: dict[int, Any] = {}
+    for row in order:
+        terms = [lower[row, inner] * forward[inner] for inner in forward if (row, inner) in lower]
+        forward[row] = _subtracted(right[row], terms)
     solution: dict[int, Any] = {}
-    for row in reversed(range(size)):
-        terms = [lower[below, row] * solution[below] for below in range(row + 1, size)]
+    for place in reversed(range(len(order))):
+        row = order[place]
+        terms = [lower[below, row] * solution[below] for below in order[place + 1 :] if (below, row) in lower]
         solution[row] = _subtracted(forward[row] / pivots[row], terms)
-    return np.stack([solution[row] for row in range(size)])
+    return np.stack([solution[row] for row in range(len(right))])
 
 
 def _subtracted(value: Any, terms: list[Any]) -> Any:
@@ -176,28 +197,28 @@ def _last_pivot(matrices: FloatArray) -> float:
 
 
 @lru_cache(maxsize=16)
-def link_dynamics(robot: Robot, frame: str | None = None) -> LinkDynamics:
-    """Return the programs of a robot's links and joints; equal chains share them.
+def link_dynamics(robot: Robot, frame: WrenchFrame | None = None) -> LinkDynamics:
+    """Return the programs of a robot's links and joints; robots with equal links share them.
 
     Args:
         robot: Robot; its actuators and dampers are ignored.
-        frame: Frame of the wrench at the end effector, as in `Wrench`; None without a wrench.
+        frame: Frame of the wrench on the tools, as in `Wrench`; None without a wrench.
     """
     return _shared_link_dynamics(without_drives(robot), frame)
 
 
 def without_drives(robot: Robot) -> Robot:
-    """Return the robot with a common placeholder for its drives, so that equal chains compare equal."""
+    """Return the robot with a common placeholder for its drives, for robots with equal links to be equal."""
     nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
     joints = tuple(replace(joint, **nothing) for joint in robot.joints)
-    return Robot(name="chain", gravity=robot.gravity, base=robot.base, tool=robot.tool, joints=joints)
+    return replace(robot, name="links", description="", placeholder=False, joints=joints, sources=())
 
 
 _ANY_DRIVE: Any = Rigid(motor=Motor(inertia=1.0))
 
 
 @lru_cache(maxsize=16)
-def _shared_link_dynamics(robot: Robot, frame: str | None) -> LinkDynamics:
+def _shared_link_dynamics(robot: Robot, frame: WrenchFrame | None) -> LinkDynamics:
     return LinkDynamics(robot, frame)
 
 
@@ -208,33 +229,30 @@ def _inertia_program(robot: Robot) -> StateFunction:
     q = tape.inputs(len(robot.joints))
     numbers = range(len(robot.joints))
     columns = [
-        _recursion_torques(robot, q, [(0, int(joint == moving), 0, 0) for joint in numbers], ZERO, None)
+        _recursion_torques(robot, q, [(0, int(joint == moving), 0, 0) for joint in numbers], ZERO)
         for moving in numbers
     ]
     lower = [columns[column][row].tau for row in numbers for column in range(row + 1)]
     return StateFunction(tape.program(lower))
 
 
-def _torque_program(robot: Robot, frame: str | None, output: str, orders: int) -> StateFunction:
+def _torque_program(robot: Robot, frame: WrenchFrame | None, output: str, orders: int) -> StateFunction:
     """Return an output of the recursion; derivatives of q beyond `orders` are zero."""
     tape = Tape()
     joints = len(robot.joints)
     q = tape.inputs(joints)
     rates = [tape.inputs(joints) if order < orders else [0] * joints for order in range(4)]
-    tip = (
-        None
-        if frame is None
-        else _tip_load_inputs(tape, robot, frame, ("tau", "dtau", "ddtau").index(output))
-    )
-    torques = _recursion_torques(robot, q, list(zip(*rates, strict=True)), base_gravity(robot), tip)
+    order = ("tau", "dtau", "ddtau").index(output)
+    loads = () if frame is None else _tool_load_inputs(tape, robot, frame, order)
+    torques = _recursion_torques(robot, q, list(zip(*rates, strict=True)), base_gravity(robot), loads)
     return StateFunction(tape.program([getattr(torque, output) for torque in torques]))
 
 
-def _tip_load_inputs(tape: Tape, robot: Robot, frame: str, order: int) -> TipLoad:
-    """Return the wrench and its derivatives up to an order as inputs, the others zero."""
-    axes = len(WRENCH_AXES)
-    wrench = [tape.inputs(axes) if derivative <= order else [0] * axes for derivative in range(3)]
-    return tip_load(robot, frame, wrench)
+def _tool_load_inputs(tape: Tape, robot: Robot, frame: WrenchFrame, order: int) -> list[ToolLoad]:
+    """Return the loads with the wrench and its derivatives up to an order as inputs, the others zero."""
+    components = wrench_components(frame)
+    wrench = [tape.inputs(components) if derivative <= order else [0] * components for derivative in range(3)]
+    return tool_loads(robot, frame, wrench)
 
 
 def _recursion_torques(
@@ -242,10 +260,11 @@ def _recursion_torques(
     q: Sequence[Symbol],
     rates: Sequence[tuple[Scalar, ...]],
     gravity: Vector,
-    tip: TipLoad | None,
+    loads: Sequence[ToolLoad] = (),
 ) -> list[TorqueDerivatives]:
     states = [
         joint_state(joint, position, (d1, d2, d3, d4))
         for joint, position, (d1, d2, d3, d4) in zip(robot.joints, q, rates, strict=True)
     ]
-    return recursion([link_constants(joint) for joint in robot.joints], states, gravity, tip)
+    links = [link_constants(joint) for joint in robot.joints]
+    return recursion(RecursionInputs(links, states, carriers(robot), gravity, loads))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,10 @@ from vsacli.documents.fields import (
     NON_NEGATIVE,
     SMALLEST,
     OneOf,
+    OwnKind,
     RecordOf,
+    Refer,
+    Schema,
     choice,
     interval,
     number,
@@ -30,8 +34,13 @@ from vsacli.documents.fields import (
     vector,
 )
 from vsacli.documents.record_checks import DeclaredRecord
+from vsacli.documents.record_reader import read_text
+from vsacli.documents.tree import Node, Scope, TextNode
 
 UNBOUNDED = (-math.inf, math.inf)
+FRAME_0 = "frame 0"
+"""Parent of a joint on the base; no joint has this name."""
+
 INERTIA_ROUNDING = 1e-12
 """Relative size below which a negative eigenvalue of an inertia tensor counts as rounding of its entries."""
 
@@ -63,6 +72,42 @@ class Pose(DeclaredRecord):
         "roll, pitch, yaw: turned about the fixed x, then y, then z axis, Rz(yaw) Ry(pitch) Rx(roll)",
         default=(0.0, 0.0, 0.0),
     )
+
+    @staticmethod
+    def example(_joint_type: str) -> dict[str, Any]:
+        """Return plausible values of the fields, for a new robot file."""
+        return {"xyz": [0.0, 0.1, 0.0], "rpy": [0.0, 0.0, 0.0]}
+
+
+class ParentName(OwnKind):
+    """The joint on whose link a joint is mounted: its name, or null for the base, read as `FRAME_0`."""
+
+    words = "name of an earlier joint, or null"
+    dims = ()
+
+    def read(self, node: Node, label: str, scope: Scope) -> Any:
+        """Return the name; see `OwnKind.read`."""
+        if isinstance(node, TextNode) and node.is_null:
+            return FRAME_0
+        return read_text(self, node, label, scope)
+
+    def schema(self, _refer: Refer) -> Schema:
+        """See `OwnKind.schema`."""
+        return {"type": ["string", "null"]}
+
+    def json_value(self, content: str, _of_record: Callable[[Any], Any]) -> str | None:
+        """See `OwnKind.json_value`."""
+        return None if content == FRAME_0 else content
+
+
+@dataclass(frozen=True)
+class Tool(Pose):
+    """An end effector: a frame on the link of a joint."""
+
+    name: str = text("name of the tool", identifier=True)
+    joint: str = text("joint whose link carries the tool", identifier=True)
+
+    keyed_by = "name"
 
 
 @dataclass(frozen=True)
@@ -121,6 +166,16 @@ class Joint(DeclaredRecord):
 
     name: str = text("name of the joint, used in reports and CSV headers", identifier=True)
     type: str = choice(("revolute", "prismatic"), "kind of joint")
+    parent: str | None = value(
+        ParentName(),
+        "joint on whose link it is mounted; null: frame 0; by default the joint before, if any",
+        default=None,
+    )
+    mount: Pose | None = value(
+        RecordOf(Pose),
+        "where its DH row begins, in the frame of that link; by default there",
+        default=None,
+    )
     dh: DenavitHartenberg = value(RecordOf(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")
     link: Link = value(RecordOf(Link), "link that the joint moves")
     damping: float = number(

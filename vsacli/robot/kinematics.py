@@ -1,9 +1,9 @@
-"""Forward kinematics of the frames of a robot by standard Denavit-Hartenberg rows, and its Jacobian."""
+"""Forward kinematics of a robot by standard Denavit-Hartenberg rows and mounts; Jacobians of its tools."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -26,6 +26,10 @@ class DhJoint(Protocol):
         """Denavit-Hartenberg row."""
 
     @property
+    def mount(self) -> Pose | None:
+        """Where the row begins on the link that carries the joint; None if at its frame."""
+
+    @property
     def is_revolute(self) -> bool:
         """Whether the joint variable is an angle."""
 
@@ -38,12 +42,20 @@ class Geometry(Protocol):
         """Pose of DH frame 0 in the base frame."""
 
     @property
-    def tool(self) -> Pose:
-        """Pose of the end effector in the last DH frame."""
+    def joints(self) -> Sequence[DhJoint]:
+        """Joints, each after the one that carries it."""
 
     @property
-    def joints(self) -> Sequence[DhJoint]:
-        """Joints from the base to the tip."""
+    def parents(self) -> Sequence[int]:
+        """Index of the joint whose link carries each joint; -1 for frame 0."""
+
+    @property
+    def end_effectors(self) -> Sequence[Pose]:
+        """Pose of each tool in the frame of its link."""
+
+    @property
+    def tool_joints(self) -> Sequence[int]:
+        """Index of the joint whose link carries each tool."""
 
 
 class FramePose(NamedTuple):
@@ -62,13 +74,47 @@ class FramePose(NamedTuple):
         return FramePose(self.axes @ inner.axes, origin)
 
 
-def frames(robot: Geometry, q: FloatArray) -> Iterator[FramePose]:
-    """Yield frames 0 to N in DH frame 0, at joint positions q, (samples, joints)."""
-    frame = FramePose(np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))
-    yield frame
-    for joint, variable in zip(robot.joints, q.T, strict=True):
-        frame = frame.compose(_link_frame(joint, variable))
-        yield frame
+class RobotFrames(NamedTuple):
+    """Frames of a robot, all in the same frame.
+
+    Attributes:
+        base: frame 0.
+        seats: for each joint the frame at which its row begins; its z is the axis of the joint.
+        links: frame of each link.
+        tools: frame of each tool.
+    """
+
+    base: FramePose
+    seats: tuple[FramePose, ...]
+    links: tuple[FramePose, ...]
+    tools: tuple[FramePose, ...]
+
+
+def frames(robot: Geometry, q: FloatArray) -> RobotFrames:
+    """Return the frames of a robot in DH frame 0, at joint positions q, (samples, joints)."""
+    base = FramePose(np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))
+    seats, links = list[FramePose](), list[FramePose]()
+    for joint, parent, variable in zip(robot.joints, robot.parents, q.T, strict=True):
+        carrying = links[parent] if parent >= 0 else base
+        seats.append(carrying if joint.mount is None else carrying.compose(_constant_frame(joint.mount)))
+        links.append(seats[-1].compose(_link_frame(joint, variable)))
+    return RobotFrames(base, tuple(seats), tuple(links), _tool_frames(robot, links))
+
+
+def frames_in_base(robot: Geometry, q: FloatArray) -> RobotFrames:
+    """Return the frames of a robot in the base frame, at joint positions q, (samples, joints)."""
+    base = _constant_frame(robot.base)
+    frame_0, seats, links, _ = frames(robot, q)
+    links_in_base = tuple(map(base.compose, links))
+    tools = _tool_frames(robot, links_in_base)
+    return RobotFrames(base.compose(frame_0), tuple(map(base.compose, seats)), links_in_base, tools)
+
+
+def _tool_frames(robot: Geometry, links: Sequence[FramePose]) -> tuple[FramePose, ...]:
+    return tuple(
+        links[carrier].compose(_constant_frame(tool))
+        for carrier, tool in zip(robot.tool_joints, robot.end_effectors, strict=True)
+    )
 
 
 def _link_frame(joint: DhJoint, variable: FloatArray) -> FramePose:
@@ -81,15 +127,15 @@ def _link_frame(joint: DhJoint, variable: FloatArray) -> FramePose:
 
 
 def forward_kinematics(robot: Robot, q: ArrayLike) -> FloatArray:
-    """Return the poses of the link frames (DH frames 1 to N) and of the end effector, in the base frame.
+    """Return the poses of the link frames (DH frames 1 to N) and of the tools, in the base frame.
 
     Args:
         robot: robot with its base and tool poses.
         q: joint positions, ([samples,] joints), rad (m).
 
     Returns:
-        Homogeneous 4x4 matrices, ([samples,] joints + 1, 4, 4): axes as columns, origin in m; the last one is
-        that of the end effector.
+        Homogeneous 4x4 matrices, ([samples,] joints + tools, 4, 4): axes as columns, origin in m; the last
+        ones are those of the tools, of a chain that of its end effector.
 
     Raises:
         InputError: q has another shape.
@@ -97,64 +143,56 @@ def forward_kinematics(robot: Robot, q: ArrayLike) -> FloatArray:
     """
     check_robot(robot)
     positions = checked_shape("q", q, len(robot.joints))
-    _, *moving = frames_in_base(robot, np.atleast_2d(positions))
-    poses = np.zeros((*np.atleast_2d(positions).shape[:1], len(moving), 4, 4))
+    _, _, links, tools = frames_in_base(robot, np.atleast_2d(positions))
+    poses = np.zeros((*np.atleast_2d(positions).shape[:1], len(links) + len(tools), 4, 4))
     poses[..., 3, 3] = 1
-    for index, frame in enumerate(moving):
+    for index, frame in enumerate((*links, *tools)):
         poses[:, index, :3, :3], poses[:, index, :3, 3] = frame
     return poses.reshape(*positions.shape[:-1], *poses.shape[1:])
 
 
-def jacobian(robot: Robot, q: ArrayLike, frame: str = "end_effector") -> FloatArray:
-    """Return the geometric Jacobian: velocity and angular velocity of the end effector per joint velocity.
+def jacobian(
+    robot: Robot, q: ArrayLike, frame: str = "end_effector", *, tool: str | None = None
+) -> FloatArray:
+    """Return the geometric Jacobian: velocity and angular velocity of a tool per joint velocity.
 
-    The power of a `Wrench` w in the same frame is w^T J q', so that it changes tau_e by -J^T w.
+    The power of a `Wrench` w on the tool in the same frame is w^T J q', so that it changes tau_e by -J^T w.
 
     Args:
         robot: robot with its base and tool poses.
         q: joint positions, ([samples,] joints), rad (m).
         frame: frame along whose axes the components are, "end_effector" or "base", as of a `Wrench`.
+        tool: name of the tool, if the robot has several.
 
     Returns:
         J, ([samples,] 6, joints): velocity of the tool frame's origin, then angular velocity, in the order of
-        fx fy fz mx my mz; m/rad and rad/rad (m/m and 0 for a prismatic joint).
+        fx fy fz mx my mz; m/rad and rad/rad (m/m and 0 for a prismatic joint); 0 for joints that do not move
+        the tool.
 
     Raises:
-        InputError: q has another shape, or there is no such frame.
+        InputError: q has another shape, or there is no such frame or tool.
         TypeError: robot is of another type.
     """
     check_robot(robot)
     check_frame(frame, "Jacobian")
+    chosen = robot.end_effector(tool)
     positions = checked_shape("q", q, len(robot.joints))
-    *driving, _, tool = frames_in_base(robot, np.atleast_2d(positions))
+    _, seats, _, tools = frames_in_base(robot, np.atleast_2d(positions))
+    moved = tools[chosen]
     columns = np.zeros((*np.atleast_2d(positions).shape[:1], len(WRENCH_AXES), len(robot.joints)))
-    for index, (joint, moved) in enumerate(zip(robot.joints, driving, strict=True)):
-        axis = moved.axes[..., 2]
-        columns[:, :3, index] = np.cross(axis, tool.origin - moved.origin) if joint.is_revolute else axis
-        columns[:, 3:, index] = axis if joint.is_revolute else 0
+    for index in robot.paths[robot.tool_joints[chosen]]:
+        seat, is_revolute = seats[index], robot.joints[index].is_revolute
+        axis = seat.axes[..., 2]
+        columns[:, :3, index] = np.cross(axis, moved.origin - seat.origin) if is_revolute else axis
+        columns[:, 3:, index] = axis if is_revolute else 0
     if frame == "end_effector":
-        turn = np.swapaxes(tool.axes, -1, -2)
+        turn = np.swapaxes(moved.axes, -1, -2)
         columns = np.concatenate((turn @ columns[:, :3], turn @ columns[:, 3:]), axis=1)
     return columns.reshape(*positions.shape[:-1], *columns.shape[1:])
 
 
-def frames_in_base(robot: Geometry, q: FloatArray) -> Iterator[FramePose]:
-    """Yield frames 0 to N and the end effector's in the base frame, at positions q, (samples, joints)."""
-    base, tool = _constant_frame(robot.base), _constant_frame(robot.tool)
-    for frame in frames(robot, q):
-        last = base.compose(frame)
-        yield last
-    yield last.compose(tool)
-
-
 def _constant_frame(pose: Pose) -> FramePose:
     return FramePose(np.array(rotation_matrix(pose), dtype=np.float64), np.array(pose.xyz))
-
-
-def tip_position(robot: Robot, q: FloatArray) -> FloatArray:
-    """Return the origin of the tool frame in DH frame 0, (samples, 3), m, at q, (samples, joints)."""
-    *_, last = frames(robot, q)
-    return last.point(robot.tool.xyz)
 
 
 def rotation_matrix(pose: Pose) -> Matrix:

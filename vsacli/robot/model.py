@@ -1,20 +1,22 @@
-"""The robot: a Denavit-Hartenberg chain of links, each joint with its motors and springs."""
+"""The robot: a tree of links by Denavit-Hartenberg rows, each joint with its motors and springs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.base import units
-from vsacli.base.errors import Problem, check_type
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.base.errors import FieldProblem, InputError, Problem, check_type
 from vsacli.base.signals import COMMANDED, Signal
 from vsacli.base.tables import aligned, html_table
 from vsacli.base.variables import LOSSES, OF_ANY_ROBOT, VARIABLES, Variable
 from vsacli.documents.fields import (
     Items,
+    ItemsByName,
     Name,
     RecordOf,
     boolean,
@@ -22,12 +24,15 @@ from vsacli.documents.fields import (
     value,
     vector,
 )
-from vsacli.documents.record_checks import DeclaredRecord
+from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
 from vsacli.documents.source import Source
-from vsacli.robot.joint import Joint, Pose
+from vsacli.robot.joint import FRAME_0, Joint, Pose, Tool
 
 if TYPE_CHECKING:
     from vsacli.robot.plausibility.checked_robot import CheckedRobot
+
+END_EFFECTOR = "end_effector"
+"""Name of the tool of a robot without `tools`."""
 
 OF_PLACEHOLDERS = (
     "the springs and motors of this robot are placeholders: replace them by those of your devices "
@@ -38,7 +43,7 @@ WITHOUT_MASSES = "no link has a mass, so that hardly anything but the motor iner
 
 @dataclass(frozen=True, repr=False)
 class Robot(DeclaredRecord):
-    """A serial chain of joints from a fixed base."""
+    """A chain or tree of joints from a fixed base."""
 
     name: str = value(Name(), "name of the robot")
     description: str = text("description of the robot and source of its parameters", default="")
@@ -52,7 +57,10 @@ class Robot(DeclaredRecord):
     base: Pose = value(RecordOf(Pose), "DH frame 0 in the base frame", default=Pose())
     tool: Pose = value(RecordOf(Pose), "end effector in the last DH frame (frame N)", default=Pose())
     joints: tuple[Joint, ...] = value(
-        Items(RecordOf(Joint), unique="name"), "joints from the base to the tip"
+        Items(RecordOf(Joint), unique="name"), "joints from the base to the tips"
+    )
+    tools: tuple[Tool, ...] = value(
+        ItemsByName(RecordOf(Tool)), "end effectors by name, instead of `tool`", default=()
     )
     sources: tuple[Source, ...] = field(default=(), kw_only=True, repr=False, compare=False)
 
@@ -63,6 +71,41 @@ class Robot(DeclaredRecord):
     def _hash(self) -> int:
         """Hash of all parameters, computed once: robots are keys of recorded functions."""
         return hash(tuple(getattr(self, each.name) for each in fields(self) if each.compare))
+
+    def _problems(self) -> Iterator[FieldProblem]:
+        """Yield problems of parents, or else of tools."""
+        problems = list(self._parent_problems())
+        yield from problems or self._tool_problems()
+
+    def _parent_problems(self) -> Iterator[FieldProblem]:
+        names = self.joint_names
+        for number, joint in enumerate(self.joints):
+            if joint.parent in (None, FRAME_0, *names[:number]):
+                continue
+            if joint.parent == joint.name:
+                reason = "a joint is not mounted on its own link; name an earlier joint, or null for the base"
+            elif joint.parent in names:
+                reason = (
+                    f"{joint.parent!r} comes later in the file; list joints after the one that carries them "
+                    "(a cycle has no such order)"
+                )
+            else:
+                earlier = names[:number]
+                hint = did_you_mean(str(joint.parent), earlier) if earlier else ""
+                reason = f"no earlier joint is called {joint.parent!r}{hint or '; null is the base'}"
+            yield FieldProblem(("joints", number, "parent"), reason)
+
+    def _tool_problems(self) -> Iterator[FieldProblem]:
+        if self.tool != Pose() and self.tools:
+            yield FieldProblem(("tool",), "give `tool` or `tools`, not both")
+        if self.tool != Pose() and not self.tools and len(self.tips) > 1:
+            tips = ", ".join(self.joint_names[tip] for tip in self.tips)
+            example = f"tools: {{NAME: {{joint: {self.joint_names[self.tips[-1]]}, xyz: [...]}}}}"
+            yield FieldProblem(("tool",), f"which of the tips {tips} carries it? Give `{example}` instead")
+        for tool in self.tools:
+            if tool.joint not in self.joint_names:
+                hint = did_you_mean(tool.joint, self.joint_names)
+                yield FieldProblem(("tools", tool.name, "joint"), f"no joint is called {tool.joint!r}{hint}")
 
     def __repr__(self) -> str:
         return "\n".join([f"Robot {self.name}", *aligned(self._joint_rows())])
@@ -109,6 +152,63 @@ class Robot(DeclaredRecord):
         """Actuator of each joint."""
         return tuple(joint.actuator for joint in self.joints)
 
+    @cached_property
+    def parents(self) -> tuple[int, ...]:
+        """Index of the joint on whose link each joint is mounted; -1 for frame 0."""
+        index = {FRAME_0: -1, **{name: number for number, name in enumerate(self.joint_names)}}
+        return tuple(
+            number - 1 if joint.parent is None else index[joint.parent]
+            for number, joint in enumerate(self.joints)
+        )
+
+    @cached_property
+    def paths(self) -> tuple[tuple[int, ...], ...]:
+        """Joints that move the link of each joint, from the base to this joint."""
+        paths: list[tuple[int, ...]] = []
+        for number, parent in enumerate(self.parents):
+            paths.append((*(paths[parent] if parent >= 0 else ()), number))
+        return tuple(paths)
+
+    @property
+    def tips(self) -> tuple[int, ...]:
+        """Joints whose links carry no other joint."""
+        return tuple(sorted(set(range(len(self.joints))) - set(self.parents)))
+
+    @cached_property
+    def end_effectors(self) -> tuple[Tool, ...]:
+        """All tools: `tools`, or else `tool` at the only tip; none if there are several tips."""
+        if self.tools or len(self.tips) > 1:
+            return self.tools
+        pose = {"xyz": self.tool.xyz, "rpy": self.tool.rpy}
+        return (construct_unchecked(Tool, {**pose, "name": END_EFFECTOR, "joint": self.joints[-1].name}),)
+
+    @cached_property
+    def tool_joints(self) -> tuple[int, ...]:
+        """Index of the joint whose link carries each of `end_effectors`."""
+        return tuple(self.joint_names.index(tool.joint) for tool in self.end_effectors)
+
+    @property
+    def tool_names(self) -> tuple[str, ...]:
+        """Names of `end_effectors`."""
+        return tuple(tool.name for tool in self.end_effectors)
+
+    def end_effector(self, name: str | None = None) -> int:
+        """Return the index of a tool among `end_effectors`; None stands for the only one.
+
+        Raises:
+            InputError: there is no such tool, or which one is not said.
+        """
+        names = self.tool_names
+        if name is None and len(names) == 1:
+            return 0
+        if not names:
+            raise InputError.one(f"{self.name} has no tools; give `tools` in its file")
+        if name is None:
+            raise InputError.one(f"{self.name} has the tools {', '.join(names)}; say which one")
+        if name not in names:
+            raise InputError.one(f"{self.name} has no tool {name!r}{did_you_mean(name, names)}")
+        return names.index(name)
+
     def has_variable(self, variable: Variable) -> bool:
         """Return whether results of the robot contain a variable of joints."""
         if variable.requires == LOSSES:
@@ -134,7 +234,12 @@ class Robot(DeclaredRecord):
         from vsacli.robot.plausibility.checked_robot import CheckedRobot
 
         return CheckedRobot(
-            self.joints, self.base, self.gravity, tuple(numbers_in_record(self)), self.placeholder
+            self.joints,
+            self.parents,
+            self.base,
+            self.gravity,
+            tuple(numbers_in_record(self)),
+            self.placeholder,
         )
 
     @property

@@ -6,21 +6,28 @@ Introduction to Robotics, 3rd ed., 2005, eq. (3.6); W. Khalil, J. Kleinfinger, I
 
 Regrouped, Rz(theta_i) Tz(d_i) is followed by Tx(a_i) Rx(alpha_i) of the next row: a standard row. The
 transform before the first Rz belongs to the base. Standard frame i is modified frame i, translated along and
-rotated about their common x axis by a_i and alpha_i; the last frame is unchanged.
+rotated about their common x axis by a_i and alpha_i, with the tools on its link; the last frame is unchanged.
+
+A link that carries several joints, or one with a mount, keeps its modified frame too; the transform before
+the Rz of such a joint belongs to its mount.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from itertools import pairwise
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
 
 from vsacli.compute.vector import Scalar, Vector, add, exact, mul, sub, trigonometric
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link, Pose
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link, Pose, Tool
 from vsacli.robot.kinematics import rotation_matrix
 from vsacli.robot.model import Robot
+from vsacli.robot.urdf.link_tree import roll_pitch_yaw
 
-AFTER_LAST = DenavitHartenberg(a=0, alpha=0)
-"""Row in place of the one after the last, so that the last frame is unchanged."""
+UNCHANGED = DenavitHartenberg(a=0, alpha=0)
+"""Row in place of the next one for a link that keeps its frame."""
 
 
 def as_standard(robot: Robot) -> Robot:
@@ -31,14 +38,36 @@ def as_standard(robot: Robot) -> Robot:
     Raises:
         InvalidRecordError: a number becomes too large.
     """
-    rows = (*(joint.dh for joint in robot.joints), AFTER_LAST)
-    joints = (
-        _standard_joint(joint, row, next_row)
-        for joint, (row, next_row) in zip(robot.joints, pairwise(rows), strict=True)
-    )
+    next_joints = joints_without_mount(robot.joints, robot.parents)
+    rows = {link: robot.joints[following].dh for link, following in next_joints.items()}
+    joints = []
+    for index, joint in enumerate(robot.joints):
+        if index not in next_joints.values() and (joint.mount or joint.dh.a or joint.dh.alpha):
+            joint = dataclasses.replace(joint, mount=_before_row(joint.mount or Pose(), joint.dh))
+        joints.append(_standard_joint(joint, rows.get(index, UNCHANGED)))
     return dataclasses.replace(
-        robot, base=_append_link_twist_and_length(robot.base, rows[0]), joints=tuple(joints)
+        robot,
+        base=_before_row(robot.base, rows.get(-1, UNCHANGED)),
+        joints=tuple(joints),
+        tools=tuple(
+            _in_shifted_frame(tool, rows.get(robot.joint_names.index(tool.joint), UNCHANGED))
+            for tool in robot.tools
+        ),
     )
+
+
+def joints_without_mount(joints: Sequence[Joint], parents: Sequence[int]) -> dict[int, int]:
+    """Return the joint that each link carries, if it carries only one, without a mount; -1 is frame 0.
+
+    For them the rows of both conventions are regrouped alike, so that the result is the same for a robot with
+    modified rows and for the standard one.
+    """
+    count = Counter(parents)
+    return {
+        parent: index
+        for index, parent in enumerate(parents)
+        if count[parent] == 1 and joints[index].mount is None
+    }
 
 
 def modified_link(joint: Joint) -> Link:
@@ -46,15 +75,29 @@ def modified_link(joint: Joint) -> Link:
     return _link_in_shifted_frame(joint.link, DenavitHartenberg(a=-joint.dh.a, alpha=-joint.dh.alpha))
 
 
-def _append_link_twist_and_length(base: Pose, row: DenavitHartenberg) -> Pose:
+def _before_row(pose: Pose, row: DenavitHartenberg) -> Pose:
     """Return the pose followed by Rx(alpha) Tx(a); alpha adds to the roll, which is about the same axis."""
-    shift = rotation_matrix(base).times(Vector(exact(row.a), 0, 0))
-    x, y, z = (float(start + step) for start, step in zip(base.xyz, shift, strict=True))
-    roll, pitch, yaw = base.rpy
+    shift = rotation_matrix(pose).times(Vector(exact(row.a), 0, 0))
+    x, y, z = (float(start + step) for start, step in zip(pose.xyz, shift, strict=True))
+    roll, pitch, yaw = pose.rpy
     return Pose(xyz=(x, y, z), rpy=(roll + row.alpha, pitch, yaw))
 
 
-def _standard_joint(joint: Joint, row: DenavitHartenberg, next_row: DenavitHartenberg) -> Joint:
+def _in_shifted_frame(tool: Tool, row: DenavitHartenberg) -> Tool:
+    """Return the tool expressed in the frame at Tx(a) Rx(alpha)."""
+    if row == UNCHANGED:
+        return tool
+    c, s = trigonometric("cos", row.alpha), trigonometric("sin", row.alpha)
+    xyz = (tool.xyz[0] - row.a, *_rotate_about_x(c, s, *tool.xyz[1:]))
+    if row.alpha == 0:
+        return dataclasses.replace(tool, xyz=xyz)
+    axes = rotation_matrix(tool).transposed()  # the axes of the tool
+    turned = [(axis.x, *_rotate_about_x(c, s, axis.y, axis.z)) for axis in axes]
+    return dataclasses.replace(tool, xyz=xyz, rpy=roll_pitch_yaw(np.array(turned, dtype=np.float64).T))
+
+
+def _standard_joint(joint: Joint, next_row: DenavitHartenberg) -> Joint:
+    row = joint.dh
     dh = DenavitHartenberg(a=next_row.a, alpha=next_row.alpha, d=row.d, theta=row.theta)
     return dataclasses.replace(joint, dh=dh, link=_link_in_shifted_frame(joint.link, next_row))
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-from vsacli.base.wrench import WRENCH_AXES, check_frame
+from vsacli.base.wrench import WRENCH_AXES, WrenchFrame, check_frame, frames_by_tool, wrench_components
 
 if TYPE_CHECKING:
     from vsacli.trajectory.recorded.samples import SampledProfile
@@ -101,18 +101,23 @@ class ContinuousProfile:
 
 @dataclass(frozen=True)
 class WrenchProfile:
-    """The force and moment of the environment on the end effector, over time.
+    """The force and moment of the environment on each tool, over time.
 
     Attributes:
-        profile: force and moment about the origin of the tool frame, `WRENCH_AXES`, N and N m.
-        frame: frame along whose axes the components are, "end_effector" or "base".
+        profile: force and moment about the origin of the tool frame, `WRENCH_AXES`, N and N m; of several
+            tools the six components of each in turn.
+        frame: frame along whose axes the components are, "end_effector" or "base"; for several tools that of
+            each, None for a tool on which nothing acts.
     """
 
     profile: Profile
-    frame: str = "end_effector"
+    frame: WrenchFrame = "end_effector"
 
     def __post_init__(self) -> None:
-        check_frame(self.frame)
-        if self.profile.components != len(WRENCH_AXES):
-            expected = f"{len(WRENCH_AXES)} ({', '.join(WRENCH_AXES)})"
+        for frame in frames_by_tool(self.frame):
+            if frame is not None:
+                check_frame(frame)
+        if self.profile.components != wrench_components(self.frame):
+            of_tool = f"({', '.join(WRENCH_AXES)}{'' if isinstance(self.frame, str) else ', of each tool'})"
+            expected = f"{wrench_components(self.frame)} {of_tool}"
             raise InputError.one(f"the wrench has {self.profile.components} components, not {expected}")

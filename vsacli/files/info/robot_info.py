@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.record_values import json_fields
 from vsacli.robot.joint import Joint
-from vsacli.robot.kinematics import base_gravity, frames, tip_position
+from vsacli.robot.kinematics import base_gravity, frames
 from vsacli.robot.model import Robot
 
 MOST_STARTS = 16
@@ -140,26 +140,38 @@ LOAD_ROUNDING = 1e-12
 def describe_robot(robot: Robot) -> dict[str, Any]:
     """Describe a robot as JSON values in SI units: fields, reach, static load and attainable stiffness.
 
-    `reach` and `static_load` are the largest values found over the configurations within the position limits;
-    a prismatic joint without limits is held at zero. `static_load` is the torque of gravity alone.
-    `stiffness_range` of a joint with commanded stiffness is the attainable range `unloaded`, without torque,
-    and `loaded`, with the static load in either direction; an unbounded end is infinite, and both ends are
-    NaN if the springs cannot carry the load. For an elastic joint it is the stiffness of its spring at these
-    torques.
+    `reach`, by tool if there are `tools`, and `static_load` are the largest values found over the
+    configurations within the position limits; a prismatic joint without limits is held at zero. `static_load`
+    is the torque of gravity alone. `stiffness_range` of a joint with commanded stiffness is the attainable
+    range `unloaded`, without torque, and `loaded`, with the static load in either direction; an unbounded end
+    is infinite, and both ends are NaN if the springs cannot carry the load. For an elastic joint it is the
+    stiffness of its spring at these torques.
     """
-    furthest = reach(robot)
+    by_tool = _reaches(robot)
     return {
         "kind": "robot",
-        **json_fields(robot),
+        **_without_defaults(json_fields(robot), "tools"),
         "mass": sum(joint.link.mass for joint in robot.joints),
-        "reach": {
-            "bound": reach_bound(robot),
-            "found": float(furthest.values[0]),
-            "at": furthest.configurations[0].tolist(),
-        },
+        "reach": by_tool if robot.tools else next(iter(by_tool.values()), None),
         "joints": _joints(robot),
         "held_at_zero": held_at_zero(robot),
         "warnings": list(robot.warnings),
+    }
+
+
+def _without_defaults(fields: dict[str, Any], *names: str) -> dict[str, Any]:
+    """Return fields without those of trees that are not given."""
+    return {name: content for name, content in fields.items() if content or name not in names}
+
+
+def _reaches(robot: Robot) -> dict[str, Any]:
+    """Return the reach of each tool by its name."""
+    furthest, bounds = reach(robot), reach_bounds(robot)
+    return {
+        name: {"bound": bound, "found": float(found), "at": configuration.tolist()}
+        for name, bound, found, configuration in zip(
+            robot.tool_names, bounds, furthest.values, furthest.configurations, strict=True
+        )
     }
 
 
@@ -167,7 +179,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
     loads = static_load(robot)
     return [
         {
-            **json_fields(joint),
+            **_without_defaults(json_fields(joint), "parent", "mount"),
             "static_load": {"torque": float(value), "at": configuration.tolist()},
             "stiffness_range": stiffness_ranges(joint, float(value), float(configuration[index])),
         }
@@ -203,42 +215,51 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
 def gravity_torques(robot: Robot, q: FloatArray) -> FloatArray:
     """Return the torques that hold the links at rest at q, (samples, joints), N m (N).
 
-    Moment of the weight of all links beyond a joint about its axis, or weight along it.
+    Moment of the weight of all links that a joint moves about its axis, or weight along it.
     """
     gravity = np.array([float(component) for component in base_gravity(robot)])
-    poses = list(frames(robot, q))
-    torques, mass, moment = np.empty_like(q), 0.0, np.zeros((len(q), 3))
+    _, seats, links, _ = frames(robot, q)
+    torques = np.empty_like(q)
+    mass, moment = np.zeros(len(robot.joints)), np.zeros((len(robot.joints), len(q), 3))
     for index, joint in reversed(list(enumerate(robot.joints))):
-        mass += joint.link.mass
-        moment += joint.link.mass * poses[index + 1].point(joint.link.com)
-        axis = poses[index].axes[..., 2]
-        arm = np.cross(axis, moment - mass * poses[index].origin) if joint.is_revolute else mass * axis
-        torques[:, index] = -arm @ gravity
+        mass[index] += joint.link.mass
+        moment[index] += joint.link.mass * links[index].point(joint.link.com)
+        axis, origin = seats[index].axes[..., 2], seats[index].origin
+        about = np.cross(axis, moment[index] - mass[index] * origin)
+        torques[:, index] = -(about if joint.is_revolute else mass[index] * axis) @ gravity
+        if (parent := robot.parents[index]) >= 0:
+            mass[parent] += mass[index]
+            moment[parent] += moment[index]
     return torques
 
 
 def reach(robot: Robot) -> Extremes:
-    """Return the largest distance found of the end effector from the origin of DH frame 0, m."""
+    """Return the largest distance found of each tool from the origin of DH frame 0, m."""
 
     def squared(q: FloatArray) -> FloatArray:
-        position = tip_position(robot, q)
-        return np.asarray(np.sum(position * position, axis=1, keepdims=True))
+        positions = [tool.origin for tool in frames(robot, q).tools]
+        return np.stack([np.sum(position * position, axis=1) for position in positions], axis=1)
 
-    found = largest_sizes(squared, 1, robot)
+    found = largest_sizes(squared, len(robot.end_effectors), robot)
     return found._replace(values=np.sqrt(found.values))
 
 
-def reach_bound(robot: Robot) -> float:
-    """Return an upper bound on the distance of the end effector from the origin of DH frame 0, m.
+def reach_bounds(robot: Robot) -> list[float]:
+    """Return an upper bound on the distance of each tool from the origin of DH frame 0, m.
 
-    The bound is the sum of the lengths of all links, with prismatic joints at the farther end of their range.
+    The bound is the sum of the lengths of all links on the way and of their mounts, with prismatic joints at
+    the farther end of their range.
     """
-    return sum(map(_length, robot.joints)) + math.hypot(*robot.tool.xyz)
+    return [
+        sum(_length(robot.joints[index]) for index in robot.paths[carrier]) + math.hypot(*tool.xyz)
+        for tool, carrier in zip(robot.end_effectors, robot.tool_joints, strict=True)
+    ]
 
 
 def _length(joint: Joint) -> float:
     ends = (0.0,) if joint.is_revolute else free_range(joint)
-    return math.hypot(joint.dh.a, max(abs(joint.dh.d + end) for end in ends))
+    mount = 0.0 if joint.mount is None else math.hypot(*joint.mount.xyz)
+    return mount + math.hypot(joint.dh.a, max(abs(joint.dh.d + end) for end in ends))
 
 
 def static_load(robot: Robot) -> Extremes:

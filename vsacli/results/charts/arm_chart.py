@@ -47,13 +47,13 @@ class Chain(NamedTuple):
     @classmethod
     def of(cls, geometry: Geometry, q: FloatArray) -> Chain:
         """Return the chain at joint positions, (samples, joints)."""
-        frames = list(frames_in_base(geometry, q))
-        origins = np.stack([frame.origin for frame in frames], axis=1)
+        base, seats, links, tools = frames_in_base(geometry, q)
+        origins = np.stack([frame.origin for frame in (base, *links, *tools)], axis=1)
         lengths = np.array([joint.dh.a for joint in geometry.joints])
-        normals = np.stack([frame.axes[..., 0] for frame in frames[1:-1]], axis=1)
-        axes = np.stack([frame.axes[..., 2] for frame in frames[:-2]], axis=1)
+        normals = np.stack([frame.axes[..., 0] for frame in links], axis=1)
+        axes = np.stack([seat.axes[..., 2] for seat in seats], axis=1)
         elbows = origins[:, 1:-1] - lengths[:, None] * normals
-        return cls(origins, elbows, axes, frames[0].axes, frames[-1].axes)
+        return cls(origins, elbows, axes, base.axes, tools[-1].axes)
 
 
 def home_position(joint: Joint) -> float:

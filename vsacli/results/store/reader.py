@@ -87,6 +87,7 @@ class StoredRow(NamedTuple):
 
     dh: DenavitHartenberg
     is_revolute: bool
+    mount: Pose | None = None
 
 
 class StoredGeometry(NamedTuple):
@@ -111,6 +112,21 @@ class StoredGeometry(NamedTuple):
             for row, joint_type in zip(rows.tolist(), joint_types, strict=True)
         )
         return cls(_pose(base), _pose(tool), tuple(joints))
+
+    @property
+    def parents(self) -> Sequence[int]:
+        """Index of the joint whose link carries each joint; -1 for frame 0."""
+        return range(-1, len(self.joints) - 1)
+
+    @property
+    def end_effectors(self) -> tuple[Pose, ...]:
+        """Pose of the tool in the frame of its link."""
+        return (self.tool,)
+
+    @property
+    def tool_joints(self) -> tuple[int, ...]:
+        """Index of the joint whose link carries the tool."""
+        return (len(self.joints) - 1,)
 
 
 def _pose(numbers: FloatArray) -> Pose:

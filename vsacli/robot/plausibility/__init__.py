@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 from vsacli.base.errors import Problem
 from vsacli.documents import tree
@@ -23,30 +24,35 @@ def robot_findings(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Pr
 
     The robot file is the first of the sources.
     """
-    lines = _robot_file_lines(sources)
+    lines = _robot_file_lines(checked, sources)
     return (*impossible_links(checked.joints, lines), *implausible_values(ROBOT_RULES, checked, lines))
 
 
 def robot_rules_with_findings(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
     """Return the names of the rules that have findings."""
-    return frozenset(implausible_measurements(ROBOT_RULES, checked, _robot_file_lines(sources)))
+    lines = _robot_file_lines(checked, sources)
+    return frozenset(implausible_measurements(ROBOT_RULES, checked, lines))
 
 
-def _robot_file_lines(sources: Sequence[Source]) -> ValuesInFile | None:
-    return ValuesInFile(sources[0], _path_in_robot_file) if sources else None
+def _robot_file_lines(checked: CheckedRobot, sources: Sequence[Source]) -> ValuesInFile | None:
+    return ValuesInFile(sources[0], partial(_path_in_robot_file, checked)) if sources else None
 
 
-def _path_in_robot_file(root: tree.Node, path: NumberPath) -> NumberPath:
+def _path_in_robot_file(checked: CheckedRobot, root: tree.Node, path: NumberPath) -> NumberPath:
     """Return the path in the robot file for a path of the robot; modified rows become standard ones.
 
-    The standard row i has a and alpha of the modified row i+1; those of the first one are in the base.
+    The standard row of a joint has a and alpha of the modified row of the next one; those of the first one
+    are in the base, and those of a joint with a mount in its mount.
     """
     convention = root.entries.get("convention") if isinstance(root, tree.MapNode) else None
     if not (isinstance(convention, tree.TextNode) and convention.text == "modified"):
         return path
+    from vsacli.robot.modified_dh import joints_without_mount
+
+    following = joints_without_mount(checked.joints, checked.parents)
     match path:
-        case ("joints", PathIndex(number=number), "dh", "a" | "alpha" as word):
-            return ("joints", PathIndex(number + 1), "dh", word)
-        case ("base", "rpy", PathIndex(number=0)):
-            return ("joints", PathIndex(0), "dh", "alpha")
+        case ("joints", PathIndex(number=number), "dh", "a" | "alpha" as word) if number in following:
+            return ("joints", PathIndex(following[number]), "dh", word)
+        case ("base", "rpy", PathIndex(number=0)) if -1 in following:
+            return ("joints", PathIndex(following[-1]), "dh", "alpha")
     return path

@@ -43,7 +43,8 @@ class CheckedRobot:
     """A robot with the data that plausibility rules need.
 
     Attributes:
-        joints: joints from the base to the tip.
+        joints: joints, each after the one that carries it.
+        parents: index of the joint whose link carries each joint; -1 for frame 0.
         base: pose of DH frame 0 in the base frame.
         gravity: gravity acceleration in the base frame, m/s^2.
         numbers: all numbers of the file.
@@ -51,6 +52,7 @@ class CheckedRobot:
     """
 
     joints: tuple[Joint, ...]
+    parents: tuple[int, ...]
     base: Pose
     gravity: tuple[float, float, float]
     numbers: tuple[NumberAtPath, ...]

@@ -269,7 +269,7 @@ def _chain_tips(chain: SerialChain, q: FloatArray) -> FloatArray:
 
 
 def _robot_tips(robot: Robot, q: FloatArray) -> FloatArray:
-    *_, last = frames(robot, q)
+    last = frames(robot, q).links[-1]
     poses = np.tile(np.eye(4), (len(q), 1, 1))
     poses[:, :3, :3], poses[:, :3, 3] = last.axes, last.origin
     result: FloatArray = _matrix_of_pose(robot.base) @ poses @ _matrix_of_pose(robot.tool)

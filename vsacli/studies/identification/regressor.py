@@ -20,10 +20,10 @@ from vsacli.base.arrays import FloatArray, IndexArray, by_joint
 from vsacli.compute.engine.engines import TracedEngine
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import ZERO, Scalar, SymmetricTensor, Vector, sub
-from vsacli.dynamics.chain import TorqueDerivatives
-from vsacli.dynamics.elastic_torques import joint_state, link_constants
+from vsacli.dynamics.elastic_torques import carriers, joint_state, link_constants
 from vsacli.dynamics.recursion import recursion
 from vsacli.dynamics.rigid_body import without_drives
+from vsacli.dynamics.tree import RecursionInputs, TorqueDerivatives
 from vsacli.robot.joint import Inertia, Link
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot
@@ -155,19 +155,26 @@ class Regressor(RowKernel):
     def _torques(
         self, moving: int, given: Motion, mass: int, com: Vector, inertia: SymmetricTensor
     ) -> list[Scalar]:
-        """Return the torques of all joints for one link alone; joints beyond it carry nothing."""
-        joints = self.robot.joints
+        """Return the torques of all joints for one link alone; only those that move it carry it."""
+        path = self.robot.paths[moving]
+        joints, seats = [self.robot.joints[index] for index in path], carriers(self.robot)
         *before, last = [
             link_constants(joint)._replace(mass=0, com=ZERO, inertia=_NO_INERTIA, viscous_damping=0)
-            for joint in joints[: moving + 1]
+            for joint in joints
         ]
-        links = [*before, last._replace(mass=mass, com=com, inertia=inertia)]
-        states = [
-            joint_state(joint, q, (dq, ddq, 0, 0))._replace(resistance=TorqueDerivatives(0, 0, 0))
-            for joint, q, dq, ddq in zip(joints[: moving + 1], *given.values(), strict=False)
-        ]
-        torques = recursion(links, states, base_gravity(self.robot))
-        return [*(torque.tau for torque in torques), *[0] * (len(joints) - len(links))]
+        states = []
+        for index, joint in zip(path, joints, strict=True):
+            q, dq, ddq = (rows[index] for rows in given.values())
+            state = joint_state(joint, q, (dq, ddq, 0, 0))
+            states.append(state._replace(resistance=TorqueDerivatives(0, 0, 0)))
+        inputs = RecursionInputs(
+            links=[*before, last._replace(mass=mass, com=com, inertia=inertia)],
+            states=states,
+            carriers=[seats[index]._replace(parent=place - 1) for place, index in enumerate(path)],
+            gravity=base_gravity(self.robot),
+        )
+        by_joint = {index: torque.tau for index, torque in zip(path, recursion(inputs), strict=True)}
+        return [by_joint.get(index, 0) for index in range(len(self.robot.joints))]
 
 
 def regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:

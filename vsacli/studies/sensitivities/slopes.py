@@ -18,11 +18,11 @@ from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.variables import Block
 from vsacli.compute.duals import tangents_of
 from vsacli.compute.vector import Scalar
-from vsacli.dynamics.chain import RecursionInputs
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import adapt_trajectory, command_of, compute_block
-from vsacli.dynamics.recursion import backward, base_frame, forward
+from vsacli.dynamics.recursion import MovingBody, backward, forward
+from vsacli.dynamics.tree import RecursionInputs
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters, seeded
 from vsacli.studies.sensitivities.joint_derivatives import MARGIN, OF_MOTORS, drive_derivatives
@@ -51,22 +51,26 @@ def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> 
         motion: samples of the motion, and the wrench if there is one.
         chosen: parameters; link torques do not depend on those of actuators.
     """
-    # by joint, since the motion of previous links does not depend on its parameters, and derivatives of the
-    # whole chain by all parameters would not fit into the caches: at once they took a tenth longer
+    # by joint, since the motion of other links does not depend on its parameters, and derivatives of the
+    # whole tree by all parameters would not fit into the caches: at once they took a tenth longer
     frame, given = None if motion.wrench is None else motion.wrench.frame, motion.variables()
     arguments = LinkTorques(robot, frame).arguments
+    samples = len(motion.time)
     rows = arguments.pack({name: by_joint(given[name]) for name in arguments.shapes})
     plain, carrying = (
         LinkTorques(each, frame).recursion_inputs(rows) for each in (robot, seeded(robot, chosen))
     )
-    bodies = forward(plain.links, plain.states, base_frame(plain.gravity))
+    bodies = forward(plain)
     for joint, places in _parameter_indices(chosen).items():
-        links, states, gravity, tip = _mixed_inputs(plain, carrying, joint)
-        known = bodies[:joint] if joint else []
-        previous = known[-1].frame if known else base_frame(gravity)
-        moved = [*known, *forward(links[len(known) :], states[len(known) :], previous)]
-        torques = backward(links, states, moved, tip)
-        yield TorqueSlopes(places, [_derivatives(each, places, len(motion.time)) for each in torques])
+        mixed = _mixed_inputs(plain, carrying, joint)
+        known = {} if joint is None else _unmoved(robot, joint, bodies)
+        torques = backward(mixed, forward(mixed, known))
+        yield TorqueSlopes(places, [_derivatives(each, places, samples) for each in torques])
+
+
+def _unmoved(robot: Robot, joint: int, bodies: Sequence[MovingBody]) -> dict[int, MovingBody]:
+    """Return the links that a joint does not move, by index."""
+    return {index: body for index, body in enumerate(bodies) if joint not in robot.paths[index]}
 
 
 def _parameter_indices(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
@@ -78,12 +82,13 @@ def _parameter_indices(chosen: Sequence[Parameter]) -> dict[int | None, list[int
 
 
 def _mixed_inputs(plain: RecursionInputs, carrying: RecursionInputs, joint: int | None) -> RecursionInputs:
-    """Return the chain with derivatives by the parameters of one joint, or of the robot as a whole."""
+    """Return the tree with derivatives by the parameters of one joint, or of the robot as a whole."""
     if joint is None:
-        return plain._replace(gravity=carrying.gravity, tip=carrying.tip)
-    links, states = list(plain.links), list(plain.states)
+        return plain._replace(gravity=carrying.gravity, loads=carrying.loads)
+    links, states, carriers = list(plain.links), list(plain.states), list(plain.carriers)
     links[joint], states[joint] = carrying.links[joint], carrying.states[joint]
-    return plain._replace(links=links, states=states)
+    carriers[joint] = carrying.carriers[joint]
+    return plain._replace(links=links, states=states, carriers=carriers)
 
 
 def _derivatives(torques: Sequence[Scalar], places: Sequence[int], samples: int) -> FloatArray | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from vsacli.compute.vector import Scalar, SymmetricTensor, Vector
+from vsacli.compute.vector import Matrix, Scalar, SymmetricTensor, Vector
 
 
 class LinkConstants(NamedTuple):
@@ -50,16 +50,37 @@ class JointState(NamedTuple):
     resistance: TorqueDerivatives = TorqueDerivatives(0, 0, 0)
 
 
-class TipLoad(NamedTuple):
-    """Force and moment of the end effector on the environment, at a point of the last link.
+class Seat(NamedTuple):
+    """The place on a link at which the row of a joint begins, if that is not the frame of the link.
 
     Attributes:
-        force: Force and its first and second derivatives.
-        moment: Moment about the point and its first and second derivatives.
-        point: Vector from the origin of frame N, in frame N.
-        in_base: Whether the components are along the axes of frame 0, else of frame N.
+        rotation: From components of the seat to those of the link.
+        lever: Vector from the origin of the link's frame, in this frame.
     """
 
+    rotation: Matrix
+    lever: Vector
+
+
+class Carrier(NamedTuple):
+    """What carries a joint: the link of joint `parent`, or frame 0 if that is -1, and the seat on it."""
+
+    parent: int
+    seat: Seat | None = None
+
+
+class ToolLoad(NamedTuple):
+    """Force and moment of a tool on the environment, at a point of its link.
+
+    Attributes:
+        joint: Index of the joint whose link carries the tool.
+        force: Force and its first and second derivatives.
+        moment: Moment about the point and its first and second derivatives.
+        point: Vector from the origin of the link's frame, in this frame.
+        in_base: Whether the components are along the axes of frame 0, else of the link's frame.
+    """
+
+    joint: int
     force: Sequence[Vector]
     moment: Sequence[Vector]
     point: Vector
@@ -67,16 +88,18 @@ class TipLoad(NamedTuple):
 
 
 class RecursionInputs(NamedTuple):
-    """A whole chain, base to tip.
+    """A whole tree; each joint comes after the one that carries it.
 
     Attributes:
         links: Constants of each joint and link.
         states: Pose and motion of each joint.
+        carriers: What carries each joint.
         gravity: Gravity acceleration in frame 0, m/s^2.
-        tip: Load of the end effector on the environment, if any; N and N m per s^k.
+        loads: Loads of the tools on the environment; N and N m per s^k.
     """
 
     links: Sequence[LinkConstants]
     states: Sequence[JointState]
+    carriers: Sequence[Carrier]
     gravity: Vector
-    tip: TipLoad | None = None
+    loads: Sequence[ToolLoad] = ()
