@@ -17,7 +17,7 @@ GROUPS = {
     "Inverse dynamics and its results": "inverse_dynamics motor_torques Result Report Flag open_result fixes "
     "compare Comparison sensitivity Sensitivity identify Identification plan_excitation Excitation "
     "excitation_text optimize Optimum size_drives Sizing run_study StudySummary",
-    "Links": "link_torques forward_kinematics jacobian mass_matrix",
+    "Links": "link_torques forward_kinematics jacobian tip_compliance mass_matrix",
     "Control and simulation": "State state_derivative Gains feedback_linearization FeedbackLinearization "
     "Integral simulate perturbed simulate_perturbed InitialError Sensors GoalTolerance Tolerances",
     "Errors": "InputError StorageError",

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import DAMPING
@@ -160,3 +161,39 @@ def _dampers(joint: Any) -> int:
     if joint.damper_at("transmission"):
         return sum(joint.actuator.has_columns(VARIABLES["phi"]))
     return int(joint.damper is not None)
+
+
+def settled_compliance(robot: Robot, result: Any, wrench: FloatArray, step: float) -> FloatArray:
+    """Displacement and rotation of the tool per wrench in base axes, (6, 6), motors held as in sample 0.
+
+    Half the difference of two equilibria with a further wrench of this step, N and N m, on the tool.
+    """
+    with compiled(robot) as (model, data):
+        held = coordinates(robot, model, result).positions[0]
+        sprung = [joint.name for joint in robot.joints if joint.actuator.sprung]
+        places = [model.joint(name).qposadr[0] for name in sprung]
+        dofs = [model.joint(name).dofadr[0] for name in sprung]
+        site = model.site("tool")
+
+        def torques_at(positions: FloatArray, load: FloatArray) -> FloatArray:
+            data.qpos[:], data.qvel[:] = held, 0
+            data.qpos[places] = positions
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            data.qfrc_applied[:] = 0
+            point = data.site_xpos[site.id]
+            mujoco.mj_applyFT(model, data, load[:3], load[3:], point, int(site.bodyid[0]), data.qfrc_applied)
+            mujoco.mj_forward(model, data)
+            return np.array(data.qfrc_smooth[dofs])
+
+        poses = []
+        for load in (sign * step * unit for unit in np.eye(6) for sign in (1, -1)):
+            solution = optimize.root(torques_at, held[places], args=(wrench + load,), tol=1e-13)
+            assert np.abs(torques_at(solution.x, wrench + load)).max() < 1e-6 * step
+            poses.append((data.site_xpos[site.id].copy(), data.site_xmat[site.id].reshape(3, 3).copy()))
+    columns = []
+    for (ahead, turned), (behind, turned_back) in zip(poses[::2], poses[1::2], strict=True):
+        spin = (turned - turned_back) @ ((turned + turned_back) / 2).T
+        rotation = [spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]]
+        columns.append([*(ahead - behind), *np.array(rotation) / 2])
+    return np.array(columns).T / (2 * step)

@@ -177,18 +177,30 @@ def jacobian(
     check_frame(frame, "Jacobian")
     chosen = robot.end_effector(tool)
     positions = checked_shape("q", q, len(robot.joints))
-    _, seats, _, tools = frames_in_base(robot, np.atleast_2d(positions))
-    moved = tools[chosen]
-    columns = np.zeros((*np.atleast_2d(positions).shape[:1], len(WRENCH_AXES), len(robot.joints)))
-    for index in robot.paths[robot.tool_joints[chosen]]:
-        seat, is_revolute = seats[index], robot.joints[index].is_revolute
+    in_base = frames_in_base(robot, np.atleast_2d(positions))
+    columns = jacobian_in_base(robot, in_base, chosen)
+    if frame == "end_effector":
+        turn = np.swapaxes(in_base.tools[chosen].axes, -1, -2)
+        columns = np.concatenate((turn @ columns[:, :3], turn @ columns[:, 3:]), axis=1)
+    return columns.reshape(*positions.shape[:-1], *columns.shape[1:])
+
+
+def jacobian_in_base(robot: Robot, frames: RobotFrames, tool: int) -> FloatArray:
+    """Return the Jacobian of a tool by index in base axes, (samples, 6, joints), as `jacobian` does.
+
+    Args:
+        robot: robot.
+        frames: its frames in the base frame.
+        tool: index of the tool among the end effectors.
+    """
+    moved = frames.tools[tool]
+    columns = np.zeros((len(moved.origin), len(WRENCH_AXES), len(robot.joints)))
+    for index in robot.paths[robot.tool_joints[tool]]:
+        seat, is_revolute = frames.seats[index], robot.joints[index].is_revolute
         axis = seat.axes[..., 2]
         columns[:, :3, index] = np.cross(axis, moved.origin - seat.origin) if is_revolute else axis
         columns[:, 3:, index] = axis if is_revolute else 0
-    if frame == "end_effector":
-        turn = np.swapaxes(moved.axes, -1, -2)
-        columns = np.concatenate((turn @ columns[:, :3], turn @ columns[:, 3:]), axis=1)
-    return columns.reshape(*positions.shape[:-1], *columns.shape[1:])
+    return columns
 
 
 def _constant_frame(pose: Pose) -> FramePose:
