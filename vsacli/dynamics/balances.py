@@ -29,7 +29,7 @@ from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
 from vsacli.dynamics.dampers import joints_with_parallel_damper, parallel_damper_torques
 from vsacli.dynamics.elastic_torques import carriers, link_constants
 from vsacli.dynamics.inverse import BlockKernel, InverseDynamics, call_at_joints, rows_of_joints
-from vsacli.dynamics.tree import Seat
+from vsacli.dynamics.recursion_inputs import Seat
 from vsacli.robot.joint import Joint, Tool
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot

@@ -40,7 +40,7 @@ from vsacli.compute.vector import (
 from vsacli.dynamics.dampers import damper_torque
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.dynamics.recursion import recursion
-from vsacli.dynamics.tree import (
+from vsacli.dynamics.recursion_inputs import (
     Carrier,
     JointState,
     LinkConstants,
