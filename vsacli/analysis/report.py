@@ -12,6 +12,7 @@ from vsacli.analysis.dry_friction import dry_friction_lines
 from vsacli.analysis.joint_report import JointDrift, JointReport
 from vsacli.analysis.report_text import energy_lines
 from vsacli.analysis.self_check import DRIFT_BOUND, SPRING_BOUND, SelfCheck
+from vsacli.analysis.tool_report import ToolReport, tool_stiffness_lines
 from vsacli.analysis.trouble_text import (
     NOT_DETERMINED,
     failing_joints_line,
@@ -48,6 +49,7 @@ class Report(Stored):
         joints: Reports of the joints.
         drifts: Drifts of the joints if the deflections were integrated, else empty.
         fits: Facts about the splines that replace recorded samples, JSON values.
+        tools: Reports of the tools if their stiffness is limited or was asked for, else empty.
     """
 
     robot: str
@@ -61,6 +63,7 @@ class Report(Stored):
     notes: tuple[str, ...] = ()
     drifts: tuple[JointDrift, ...] = ()
     fits: tuple[dict[str, Any], ...] = ()
+    tools: tuple[ToolReport, ...] = ()
 
     format: ClassVar = "vsacli-report/2"
     shape: ClassVar = {
@@ -68,6 +71,7 @@ class Report(Stored):
         **named("warnings", "notes", "fits", "self_check"),
         "deflections": {"method": "deflections", "joints?": "drifts"},
         "joints": "joints",
+        "tools?": "tools",
     }
 
     @property
@@ -75,7 +79,8 @@ class Report(Stored):
         """Verdict: the worst of `VERDICTS` that applies."""
         if not self.self_check.passed:
             return VERDICTS[-1]
-        applies = (each for each in reversed(VERDICTS) if any(joint.shows(each) for joint in self.joints))
+        places = (*self.joints, *self.tools)
+        applies = (each for each in reversed(VERDICTS) if any(place.shows(each) for place in places))
         return next(applies, "ok")
 
     @property
@@ -94,7 +99,7 @@ class Report(Stored):
         entries = [
             *self._failed_check(),
             *warnings_and_notes(first, ()),
-            *finding_lines(self.joints, self.samples),
+            *finding_lines((*self.joints, *self.tools), self.samples),
             *text.integration_stop_lines(self.joints, self.drifts),
             *self._recorded_infeasible(causes=bool(first)),
             *([hint] if hint else []),
@@ -110,6 +115,7 @@ class Report(Stored):
                 [(joint.name, joint.type, motor) for joint in self.joints for motor in joint.dry_friction]
             ),
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
+            *tool_stiffness_lines(self.tools),
             *spread_lines(self.joints),
             *text.drift_lines(self.drifts),
             *([text.self_check_line(self.self_check)] if self.self_check.passed else []),
@@ -146,7 +152,7 @@ class Report(Stored):
         """Return names, size, and how many joints fail which requirement."""
         length = counted(self.samples, "sample") + ("" if self.complete else ", stopped early")
         title = f"{self.robot}, {self.trajectory}: {length}, {self.duration:g} s"
-        return "; ".join([title, *filter(None, [failing_joints_line(self.joints)])])
+        return "; ".join([title, *filter(None, [failing_joints_line(self.joints, self.tools)])])
 
     @classmethod
     def from_json(cls, content: JsonObject, **further: Any) -> Self:

@@ -14,7 +14,7 @@ from vsacli.base.errors import InputError, check_path
 from vsacli.base.renamed import now_called
 from vsacli.base.storage import temporary_folder
 from vsacli.base.tables import aligned, html_table
-from vsacli.base.variables import VARIABLES, Block
+from vsacli.base.variables import ALL, ON_REQUEST, VARIABLES, Block
 from vsacli.results.store.reader import StoredResult, open_one_of
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -80,7 +80,11 @@ class Result(Shown, Block):
         with (
             Outputs(overwrite=overwrite) as outputs,
             ResultWriter(
-                outputs.file(Path(path)), self.robot, self.trajectory, precision=precision
+                outputs.file(Path(path)),
+                self.robot,
+                self.trajectory,
+                (ALL, *(name for name in ON_REQUEST if getattr(self, name) is not None)),
+                precision=precision,
             ) as writer,
         ):
             writer.write(self)

@@ -22,11 +22,12 @@ from vsacli.analysis.run_dynamics import RunDynamics, choose_deflections, damped
 from vsacli.analysis.self_check import RunCheck
 from vsacli.analysis.summaries import DriftSummary, JointSummary
 from vsacli.base.arrays import AnyArray
+from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has_flag
 from vsacli.base.progress import Tell, unheard
 from vsacli.base.signals import POSITION
 from vsacli.base.units import time_text
-from vsacli.base.variables import Block
+from vsacli.base.variables import TIP_COMPLIANCE, Block
 from vsacli.compute.engine import Engine, choose
 from vsacli.dynamics.balances import BALANCES
 from vsacli.dynamics.energy import JointEnergy, RunEnergy
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from vsacli.analysis.joint_report import JointUncertainty
     from vsacli.analysis.result import Result
     from vsacli.analysis.run_uncertainty import RunUncertainty
+    from vsacli.analysis.tool_stiffness import ToolStiffness
     from vsacli.dynamics.integrated_deflections import IntegratedDeflections
 
 
@@ -56,7 +58,7 @@ class Run:
         engine: Backend, one of `vsacli.compute.engine.NAMES`.
         threads: Number of threads of compiled code; by default the number of CPU cores.
         asked: Names of the requested variables; if recorded signals leave them too uncertain, the verdict is
-            unreliable.
+            unreliable. Those of `ON_REQUEST` are computed only if they are among them.
         tell: Callback for messages of the choice of the engine: failures, and work that takes long.
 
     Attributes:
@@ -106,6 +108,7 @@ class Run:
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = _drift_summaries(robot, self._dynamics.deflections)
         self._energy = RunEnergy(robot, self.choice.engine)
+        self._tools = _tool_stiffness(robot, trajectory, asked)
         self._samples = 0
         self._stopped = False
 
@@ -141,6 +144,8 @@ class Run:
         if self._uncertainty is not None:
             block = self._uncertainty.add(block)
             _mark_minima(between, block)  # again, since the samples themselves may keep limits within it
+        if self._tools is not None:
+            block = self._tools.add(block)
         self._summarize(block, between)
         return self._without_balances(block)
 
@@ -207,6 +212,7 @@ class Run:
             ),
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=self.trajectory.fits,
+            tools=() if self._tools is None else self._tools.reports(),
         )
 
     def _of_recording(self, *, undetermined: bool) -> tuple[str, ...]:
@@ -254,6 +260,7 @@ def inverse_dynamics(
     stop_on_infeasible: bool = False,
     deflection_solver: str | IntegratedDeflections = "root",
     engine: str = "numpy",
+    tip_compliance: bool = False,
 ) -> Result:
     """Compute the motor torques that execute a motion and a stiffness profile, VSA-NEA (36)-(74).
 
@@ -266,6 +273,8 @@ def inverse_dynamics(
         deflection_solver: "root" solves (14) at each sample; "ode" follows the root of the first sample by
             (19); or deflections that were integrated before.
         engine: Backend: "numpy", compiled "c", or "auto", which uses compiled code where that saves time.
+        tip_compliance: Whether to compute the compliance of each tool as well, (samples, tools, 6, 6), see
+            `vsacli.tip_compliance`, with its smallest stiffness in the report.
 
     Returns:
         Every variable of `Block` over (samples, joints[, 2]); `report` holds the verdict.
@@ -282,8 +291,22 @@ def inverse_dynamics(
         stop_on_infeasible=stop_on_infeasible,
         deflection_solver=deflection_solver,
         engine=engine,
+        asked=(JUDGED, *((TIP_COMPLIANCE,) if tip_compliance else ())),
     )
     return Result(**_concatenate_blocks(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
+
+
+def _tool_stiffness(robot: Robot, trajectory: Trajectory, asked: Collection[str]) -> ToolStiffness | None:
+    """Return the compliance of the tools along the run; None if neither a request nor a limit needs it."""
+    stored = TIP_COMPLIANCE in asked
+    if not stored and not any(tool.min_stiffness for tool in robot.tools):
+        return None
+    from vsacli.analysis.tool_stiffness import ToolStiffness
+
+    if not robot.end_effectors:
+        raise InputError.one(f"there is no {TIP_COMPLIANCE}: {robot.name} has no tools")
+    frame = None if trajectory.wrench is None else trajectory.wrench.frame
+    return ToolStiffness(robot, frame, stored=stored)
 
 
 def _prepare_uncertainty(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 from vsacli.analysis.joint_report import DETERMINED, JUDGED, JointReport, JointUncertainty, Spread
 from vsacli.analysis.report_text import (
@@ -18,7 +19,8 @@ from vsacli.analysis.report_text import (
     values_of_motors,
     wrap_joint_entries,
 )
-from vsacli.base.flags import Flag
+from vsacli.analysis.tool_report import ToolReport
+from vsacli.base.flags import labeled_flag
 from vsacli.base.texts import counted, significant
 from vsacli.base.units import time_text
 from vsacli.dynamics.limits import OFF_TARGET, Finding
@@ -46,10 +48,14 @@ FAILURES = {
 }
 """Verdicts that joints are counted for in the first line of a report, and their words there."""
 
-GRAVEST = ("not_finite", "infeasible", "internal_instability", "singular", OFF_TARGET)
+GRAVEST = ("not_finite", "infeasible", "internal_instability", "static_instability", "singular", OFF_TARGET)
 """Kinds of problems that come first; limits follow, and warnings come last."""
 
-COUNTED_AS = {"not_finite": "infeasible", "internal_instability": "singular"}
+COUNTED_AS = {
+    "not_finite": "infeasible",
+    "internal_instability": "singular",
+    "static_instability": "singular",
+}
 """Kinds of problems whose samples are counted under another name."""
 
 
@@ -119,34 +125,39 @@ def undetermined_text(spread: Spread) -> str:
     return f"{subject}: {error}; {100 * DETERMINED:.0f} % is allowed"
 
 
-def failing_joints_line(joints: Sequence[JointReport]) -> str:
-    """Return how many joints fail which requirement; empty if none does, or there is only one."""
-    failing = {words: sum(joint.shows(verdict) for joint in joints) for verdict, words in FAILURES.items()}
-    return of_all_joints(failing, len(joints))
+def failing_joints_line(joints: Sequence[JointReport], tools: Sequence[ToolReport] = ()) -> str:
+    """Return how many joints and tools fail which requirement; empty if none does, or there is only one."""
+    sentences = []
+    for members, reports in (("joints", joints), ("tools", tools)):
+        failing = {words: sum(each.shows(verdict) for each in reports) for verdict, words in FAILURES.items()}
+        sentences.append(of_all_joints(failing, len(reports), members))
+    return ", ".join(filter(None, sentences))
 
 
-def of_all_joints(failing: Mapping[str, int], total: int) -> str:
+def of_all_joints(failing: Mapping[str, int], total: int, members: str = "joints") -> str:
     """Return numbers of joints and what they fail; empty if none does, or there is only one joint."""
     failed = [(words, number) for words, number in failing.items() if number]
     if total == 1 or not failed:
         return ""
     (words, first), *further = failed
-    return ", ".join([f"{first} of {total} joints {words}", *(f"{each} {words}" for words, each in further)])
+    return ", ".join(
+        [f"{first} of {total} {members} {words}", *(f"{each} {words}" for words, each in further)]
+    )
 
 
-def finding_lines(joints: Sequence[JointReport], samples: int) -> Iterator[str]:
+def finding_lines(reports: Sequence[JointReport | ToolReport], samples: int) -> Iterator[str]:
     """Yield the problems of a run, the most critical first.
 
     Args:
-        joints: reports of the joints, base to tip.
+        reports: reports of the joints, base to tip, and of the tools.
         samples: number of samples of the run.
     """
     worst_findings = [
-        (number, worst) for number, joint in enumerate(joints) for worst in joint.worst.values()
+        (number, worst) for number, report in enumerate(reports) for worst in report.worst.values()
     ]
-    names = [joint.name for joint in joints]
+    names = [report.name for report in reports]
     yield from group_findings(
-        worst_findings, names, lambda index, worst: _finding_texts(joints[index], worst, samples)
+        worst_findings, names, lambda index, worst: _finding_texts(reports[index], worst, samples)
     )
 
 
@@ -201,7 +212,7 @@ def _further_joints_line(kind: str, briefs: Mapping[int, tuple[str, Finding]], n
     return list_by_joint(f"also {_kind_text(kind)}{unit}: ", texts, names)
 
 
-def _finding_texts(joint: JointReport, worst: Finding, samples: int) -> tuple[str, str, int]:
+def _finding_texts(joint: JointReport | ToolReport, worst: Finding, samples: int) -> tuple[str, str, int]:
     """Return the words of a finding of a run of so many samples."""
     counted_as = COUNTED_AS.get(worst.kind, worst.kind)
     if counted_as not in joint.samples:
@@ -214,7 +225,8 @@ def _rank(kind: str) -> tuple[int, int]:
     """Return the place of a kind of problem in a report; limits in the order of their flags."""
     if kind in GRAVEST:
         return 0, GRAVEST.index(kind)
-    return (2, 0) if kind == "near_singular" else (1, Flag.labeled(kind).value)
+    flag = labeled_flag(kind)
+    return (2, 0) if flag is None or kind == "near_singular" else (1, flag.value)
 
 
 def _kind_text(kind: str) -> str:
@@ -222,7 +234,7 @@ def _kind_text(kind: str) -> str:
     return f"beyond the {words}" if kind.endswith("limit") else words
 
 
-def _occurrence_text(joint: JointReport, kind: str, samples: int) -> str:
+def _occurrence_text(joint: JointReport | ToolReport, kind: str, samples: int) -> str:
     """Return in how many samples a joint has a kind of problem, and from when on."""
     affected = joint.samples[kind]
     if affected == samples:
@@ -289,10 +301,18 @@ def _unstable_text(joint: JointReport, worst: Finding, samples: int) -> str:
     )
 
 
-_SENTENCES = {
+def _buckling_text(tool: ToolReport, worst: Finding, samples: int) -> str:
+    return (
+        f"{worst.text}; increase the stiffness of the joints that carry it "
+        f"({_occurrence_text(tool, 'singular', samples)})"
+    )
+
+
+_SENTENCES: Mapping[str, Callable[[Any, Finding, int], str]] = {
     "not_finite": _not_finite_text,
     "infeasible": _infeasible_text,
     "singular": _singular_text,
     "near_singular": _near_singular_text,
     "internal_instability": _unstable_text,
+    "static_instability": _buckling_text,
 }

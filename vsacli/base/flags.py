@@ -1,9 +1,9 @@
-"""Flags of a sample of a joint: one enum for result files, reports and documentation."""
+"""Flags of samples of joints and tools: enums for result files, reports and documentation."""
 
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import reduce
 from operator import and_, or_
 from typing import Self
@@ -20,8 +20,8 @@ MIN_MARGIN = 0.01
 """Relative margin to a critical point below which a sample is near-singular; the paper's runs keep 3 %."""
 
 
-class Flag(enum.IntFlag):
-    """Bits of the variable `flags`, each with its meaning and, if it marks a limit, the bounded quantity.
+class SampleFlag(enum.IntFlag):
+    """A bit of a variable of flags, with its meaning and, if it marks a limit, the bounded quantity.
 
     Attributes:
         meaning: description of the finding, a clause.
@@ -31,6 +31,26 @@ class Flag(enum.IntFlag):
 
     meaning: str
     quantity: str | None
+
+    def __new__(cls, bit: int, meaning: str, quantity: str | None) -> Self:
+        """Return a bit with its attributes."""
+        flag = int.__new__(cls, bit)
+        flag._value_ = bit
+        flag.meaning, flag.quantity = meaning, quantity
+        return flag
+
+    @property
+    def label(self) -> str:
+        """Lower-case name, as in `flag_meanings` and the report."""
+        return str(self.name).lower()
+
+    def quantity_of(self, motor: int | None) -> str:
+        """Return the quantity over the limit in words, with the number of its motor, if any."""
+        return f"{self.quantity}" if motor is None else f"{self.quantity} {motor}"
+
+
+class Flag(SampleFlag):
+    """Bits of the variable `flags`, each with its meaning and, if it marks a limit, the bounded quantity."""
 
     INFEASIBLE = 1, "the springs cannot carry the elastic torque, or not at this stiffness", None
     SINGULAR = (
@@ -66,39 +86,43 @@ class Flag(enum.IntFlag):
         None,
     )
 
-    def __new__(cls, bit: int, meaning: str, quantity: str | None) -> Self:
-        """Return a bit with its attributes."""
-        flag = int.__new__(cls, bit)
-        flag._value_ = bit
-        flag.meaning, flag.quantity = meaning, quantity
-        return flag
 
-    @property
-    def label(self) -> str:
-        """Lower-case name, as in `flag_meanings` and the report."""
-        return str(self.name).lower()
+class ToolFlag(SampleFlag):
+    """Bits of the variable `tool_flags`, as `Flag` of joints."""
 
-    def quantity_of(self, motor: int | None) -> str:
-        """Return the quantity over the limit in words, with the number of its motor, if any."""
-        return f"{self.quantity}" if motor is None else f"{self.quantity} {motor}"
+    STATIC_INSTABILITY = (
+        1,
+        "statically unstable: with the motors held, the links buckle under gravity and the wrenches",
+        None,
+    )
+    TOOL_STIFFNESS_LIMIT = (
+        2,
+        "the stiffness of the tool in its softest direction is below min_stiffness",
+        "stiffness in the softest direction",
+    )
 
-    @classmethod
-    def labeled(cls, label: str) -> Flag:
-        """Return the flag with this label."""
-        return cls[label.upper()]
+
+FLAG_BITS: Mapping[str, type[SampleFlag]] = {"flags": Flag, "tool_flags": ToolFlag}
+"""Bits of each variable of flags, by its name."""
+
+
+def labeled_flag(label: str) -> SampleFlag | None:
+    """Return the flag with this label; None if there is none."""
+    labeled = (bits.__members__.get(label.upper()) for bits in FLAG_BITS.values())
+    return next((flag for flag in labeled if flag is not None), None)
 
 
 LIMITS = reduce(or_, (flag for flag in Flag if flag.quantity is not None))
 """All bits that mark an exceeded limit."""
 
 
-def has_flag(flags: FlagArray, bits: Flag) -> BoolArray:
+def has_flag(flags: FlagArray, bits: SampleFlag) -> BoolArray:
     """Return where any of the bits is set."""
     hit: BoolArray = (flags & FLAG_TYPE(bits)) != 0
     return hit
 
 
-def marked(flag: Flag, where: BoolArray) -> FlagArray:
+def marked(flag: SampleFlag, where: BoolArray) -> FlagArray:
     """Return an array with the bit set where the condition holds, else 0."""
     return where.astype(FLAG_TYPE) * FLAG_TYPE(flag)
 

@@ -58,6 +58,19 @@ class WrenchQuantity(Quantity):
         return f"{self.prismatic} (forces), {self.revolute} (moments)"
 
 
+class ComplianceQuantity(WrenchQuantity):
+    """A compliance: translation and rotation, each per force and moment, in the order of its 36 entries."""
+
+    def of_axis(self, axis: int) -> str:
+        """Return the unit of an entry, row by row."""
+        row, column = divmod(axis % 36, 6)
+        displacement, wrench = "m" if row < 3 else "rad", "N" if column < 3 else "(N m)"
+        return f"{displacement}/{wrench}"
+
+    def __str__(self) -> str:
+        return "m/N and m/(N m) (translation), rad/N and rad/(N m) (rotation)"
+
+
 def units_of(quantity: Quantity, joint_types: Iterable[str]) -> str:
     """Return the unit of a quantity; of both types of joints where there are both."""
     return in_header(map(quantity.unit, joint_types))
@@ -101,6 +114,7 @@ WRENCH_RATE = WrenchQuantity("N m/s", "N/s")
 WRENCH_ACCELERATION = WrenchQuantity("N m/s^2", "N/s^2")
 LEAD = Quantity("m/rad", "1")
 LINEAR_STIFFNESS = constant("N/m")
+COMPLIANCE = ComplianceQuantity("rad/(N m)", "m/N")
 STIFFNESS = Quantity("N m/rad", "N/m")
 STIFFNESS_RATE = Quantity("N m/(rad s)", "N/(m s)")
 STIFFNESS_ACCELERATION = Quantity("N m/(rad s^2)", "N/(m s^2)")

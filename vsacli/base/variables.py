@@ -27,6 +27,18 @@ LOSSES = "friction"
 """Requirement of the variables of losses: dry friction or a damper at any joint; viscous damping does not
 count."""
 
+TIP_COMPLIANCE = "tip_compliance"
+"""Name of the variable with the compliance of each tool."""
+
+TOOL_FLAGS = "tool_flags"
+"""Name of the variable with the flags of each tool."""
+
+TOOLS = "tools"
+"""Requirement of variables of tools."""
+
+MIN_STIFFNESS = "min_stiffness"
+"""Requirement of variables of tools of which one has this limit, or whose compliance was asked for."""
+
 OF_ANY_ROBOT = (None, SPRINGS, STIFFNESS.key)
 """Requirements of variables that every result has, NaN at joints that do not meet them. A result omits
 variables with other requirements if no joint of the robot meets these."""
@@ -42,7 +54,8 @@ class Variable(NamedTuple):
         long_name: short description.
         equation: number in Buondonno & De Luca (2016), or source of the value.
         requires: condition on a joint: `SPRINGS`, a commanded signal by key, or one of `MOTOR_CONSTANTS`;
-            values of other joints are NaN. All joints meet `LOSSES` if any has friction.
+            values of other joints are NaN. All joints meet `LOSSES` if any has friction. For variables of
+            tools, `TOOLS` or `MIN_STIFFNESS`.
         geared: exponent e: value on the motor shaft = value * gear_ratio**e (1 for position, -1 for torque).
     """
 
@@ -177,7 +190,29 @@ _COMPUTED = (
         "flags of this sample of the joint; 0 if there is no finding",
         "margins of (14)",
     ),
+    Variable(
+        TIP_COMPLIANCE,
+        ("tool", "displacement_axis", "wrench_axis"),
+        units.COMPLIANCE,
+        "compliance of each tool with the motors held, base axes",
+        "J (K + dg/dq)^-1 J^T",
+        TOOLS,
+    ),
+    Variable(
+        TOOL_FLAGS,
+        ("tool",),
+        units.DIMENSIONLESS,
+        "flags of this sample of the tool; 0 if there is no finding",
+        TIP_COMPLIANCE,
+        MIN_STIFFNESS,
+    ),
 )
+
+ALL = "all"
+"""Name that stands for all variables of a run in a list of names."""
+
+ON_REQUEST = (TIP_COMPLIANCE,)
+"""Variables that a run has only if they are asked for."""
 
 
 UNCERTAIN = (

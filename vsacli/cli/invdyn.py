@@ -103,12 +103,12 @@ def invdyn(
     inputs = load_inputs(robot, trajectory, talk, changes, {} if rate is None else {"rate": "--rate"})
     from vsacli.analysis.joint_report import JUDGED
     from vsacli.analysis.run import Run
-    from vsacli.base.variables import select_variables
+    from vsacli.base.variables import ALL, select_variables
     from vsacli.results.store.writer import ResultWriter
 
-    if variables is not None:
-        with naming_option("--variables"):
-            select_variables(variables)
+    listed = () if variables is None else [name for name in variables if name != ALL]
+    with naming_option("--variables"):
+        select_variables(listed)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
         drawn = None if figures is None else _figures(inputs, figures, path.stem, variables, outputs)
@@ -118,7 +118,7 @@ def invdyn(
             deflection_solver=deflection_solver,
             engine=engine,
             threads=threads,
-            asked=(JUDGED,) if variables is None else variables,
+            asked=(*((JUDGED,) if variables is None or ALL in variables else ()), *listed),
             tell=talk.note,
         )
         provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]]), **run.provenance}
@@ -152,11 +152,13 @@ def _figures(
     inputs: Inputs, target: FigureTarget, stem: str, variables: tuple[str, ...] | None, outputs: Outputs
 ) -> FigureFiles:
     """Stage the figures that the stored variables suffice for, and the figure of a recording."""
-    from vsacli.base.variables import VARIABLES
+    from vsacli.base.variables import ALL, ON_REQUEST, VARIABLES
     from vsacli.cli.drawings import RECORDING
     from vsacli.results.charts.figures import drawable_figures, result_drawings
 
-    stored = VARIABLES if variables is None else variables
+    stored = {ALL} if variables is None else {*variables}
+    if ALL in stored:
+        stored |= {name for name in VARIABLES if name not in ON_REQUEST}
     drawn = drawable_figures(result_drawings(inputs.robot.has_variable), stored)
     if inputs.trajectory.estimates:
         drawn.append(RECORDING)

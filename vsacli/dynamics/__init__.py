@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from vsacli.dynamics.compliance import tip_compliance
     from vsacli.dynamics.elastic_torques import link_torques
     from vsacli.dynamics.forward import State, mass_matrix, state_derivative
     from vsacli.dynamics.inverse import motor_torques
@@ -19,6 +18,5 @@ __all__ = [
     "mass_matrix",
     "motor_torques",
     "state_derivative",
-    "tip_compliance",
 ]
 __getattr__, __dir__ = lazy_exports(__name__)

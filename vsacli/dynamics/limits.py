@@ -14,7 +14,7 @@ import numpy as np
 
 from vsacli.actuators.reach import LimitCheck, OfJoint
 from vsacli.base.arrays import FLAG_TYPE, BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import Flag
+from vsacli.base.flags import Flag, ToolFlag, labeled_flag
 from vsacli.base.json_records import Stored, named
 from vsacli.base.signals import DAMPING
 from vsacli.base.texts import distinguish, significant
@@ -70,7 +70,7 @@ OFF_TARGET = "off_target"
 
 @dataclass(frozen=True)
 class Finding(Stored):
-    """A quantity of a joint at the instant at which it is furthest beyond a bound, or nearest to it.
+    """A quantity of a joint or tool at the instant at which it is furthest beyond a bound, or nearest to it.
 
     Attributes:
         kind: Name of a flag, `MARGIN` or `OFF_TARGET`.
@@ -80,6 +80,7 @@ class Finding(Stored):
         unit: Unit of value and bound.
         motor: Motor or spring 1 or 2; None for a quantity of the joint.
         joint: Name of the joint.
+        tool: Name of the tool, in place of a joint.
         between: Whether the instant lies between two samples.
         at_rest: Whether the motion is held at that instant.
         end: End of the attainable range if the bound keeps a margin from it, else NaN.
@@ -103,15 +104,16 @@ class Finding(Stored):
     advice: str = ""
     fixable: bool = True
     first: float = field(default=math.nan, compare=False)
+    tool: str = ""
 
     key: ClassVar = "kind"
     shape: ClassVar = {
         **named("time", "value", "bound", "unit"),
-        **{f"{name}?": name for name in ("motor", "joint", "between", "at_rest")},
+        **{f"{name}?": name for name in ("motor", "joint", "tool", "between", "at_rest")},
     }
 
     def __str__(self) -> str:
-        return f"{self.joint}: {self.text}"
+        return f"{self.tool or self.joint}: {self.text}"
 
     @property
     def excess(self) -> float:
@@ -131,7 +133,7 @@ class Finding(Stored):
     @property
     def quantity(self) -> str:
         """Quantity in words, with the number of its motor."""
-        flag = Flag.__members__.get(self.kind.upper())
+        flag = labeled_flag(self.kind)
         if flag is None or flag.quantity is None:
             return "elastic torque" if flag is Flag.INFEASIBLE else "stiffness"
         return flag.quantity_of(self.motor)
@@ -157,13 +159,13 @@ class Finding(Stored):
 
     @property
     def text(self) -> str:
-        """The finding as a clause without the name of the joint, and the advice."""
+        """The finding as a clause without the name of joint or tool, and the advice."""
         return f"{self._fact('')}{self.advice and ': '}{self.advice}"
 
     @property
     def clause(self) -> str:
-        """The finding as a clause that names the joint."""
-        return f"the {self._fact(f' of {self.joint}').removeprefix('the ')}"
+        """The finding as a clause that names the joint or tool."""
+        return f"the {self._fact(f' of {self.tool or self.joint}').removeprefix('the ')}"
 
     def _fact(self, whose: str) -> str:
         """Return the finding as a clause in which the quantity, or the springs, are followed by `whose`."""
@@ -172,6 +174,8 @@ class Finding(Stored):
             return f"final q error{whose} {error} exceeds the goal tolerance of {tolerance}"
         if self.kind == Flag.NOT_FINITE.label:
             return f"a motor variable{whose} is not finite {self.when()}"
+        if self.kind == ToolFlag.STATIC_INSTABILITY.label:
+            return f"its pose is statically unstable {self.when()}: with the motors held, the links buckle"
         if math.isnan(self.bound):
             return f"the springs{whose} cannot carry the elastic torque {self.when()}"
         (value, bound), side = self.numbers, "below" if self.below else "above"

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from vsacli.robot.compliance import tip_compliance
     from vsacli.robot.file import load_robot
     from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link, Pose
     from vsacli.robot.kinematics import forward_kinematics, jacobian
@@ -24,5 +25,6 @@ __all__ = [
     "import_urdf",
     "jacobian",
     "load_robot",
+    "tip_compliance",
 ]
 __getattr__, __dir__ = lazy_exports(__name__)

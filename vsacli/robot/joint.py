@@ -20,6 +20,7 @@ from vsacli.base.signals import COMMANDED, Signal
 from vsacli.base.variables import LOSSES, MOTOR_CONSTANTS, OF_ANY_ROBOT, Variable
 from vsacli.documents.fields import (
     NON_NEGATIVE,
+    POSITIVE,
     SMALLEST,
     OneOf,
     OwnKind,
@@ -106,6 +107,12 @@ class Tool(Pose):
 
     name: str = text("name of the tool", identifier=True)
     joint: str = text("joint whose link carries the tool", identifier=True)
+    min_stiffness: float | None = number(
+        units.LINEAR_STIFFNESS,
+        "smallest stiffness against forces in any direction, motors held; flagged below",
+        check=POSITIVE,
+        default=None,
+    )
 
     keyed_by = "name"
 

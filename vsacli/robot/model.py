@@ -13,7 +13,7 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_type
 from vsacli.base.signals import COMMANDED, Signal
 from vsacli.base.tables import aligned, html_table
-from vsacli.base.variables import LOSSES, OF_ANY_ROBOT, VARIABLES, Variable
+from vsacli.base.variables import LOSSES, MIN_STIFFNESS, OF_ANY_ROBOT, TOOLS, VARIABLES, Variable
 from vsacli.documents.fields import (
     Items,
     ItemsByName,
@@ -210,7 +210,11 @@ class Robot(DeclaredRecord):
         return names.index(name)
 
     def has_variable(self, variable: Variable) -> bool:
-        """Return whether results of the robot contain a variable of joints."""
+        """Return whether results of the robot contain a variable unless it is asked for."""
+        if variable.requires == TOOLS:
+            return bool(self.end_effectors)
+        if variable.requires == MIN_STIFFNESS:
+            return any(tool.min_stiffness is not None for tool in self.end_effectors)
         if variable.requires == LOSSES:
             return any(joint.has_friction or joint.damper is not None for joint in self.joints)
         required_of_none = variable.requires in OF_ANY_ROBOT

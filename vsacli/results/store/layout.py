@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 
 from vsacli.base.arrays import AnyArray
+from vsacli.base.flags import FLAG_BITS
 from vsacli.base.variables import MOTORS, OF_ANY_ROBOT, VARIABLES, Variable
 from vsacli.base.version import __version__
 from vsacli.base.wrench import WRENCH_AXES
@@ -154,11 +155,11 @@ def _create_variable(
         maxshape=(samples, *row),
         dtype=storage_type(variable, precision),
         chunks=(chunk_rows(samples, row_bytes(variable, joints, precision)), *row),
-        compression=GZIP_LEVEL if variable.name == "flags" else None,
+        compression=GZIP_LEVEL if variable.name in FLAG_BITS else None,
         track_order=True,
     )
     dataset.attrs.update(variable_attributes(variable, robot.joint_types))
-    if variable.requires not in OF_ANY_ROBOT:
+    if "joint" in variable.dims and variable.requires not in OF_ANY_ROBOT:
         there = [joint.has_columns(variable) for joint in robot.joints]
         dataset.attrs[EXISTING] = np.array(there, dtype=np.uint8)
     return dataset

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from vsacli.base.arrays import FLAG_TYPE
-from vsacli.base.flags import Flag
+from vsacli.base.flags import FLAG_BITS
 from vsacli.base.units import Quantity, WrenchQuantity
 from vsacli.base.variables import MOTORS, Variable
 from vsacli.base.wrench import WRENCH_AXES
@@ -50,15 +50,15 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
     attributes |= {"long_name": variable.long_name, "equation": variable.equation}
     if "joint" in variable.dims:
         attributes["coordinates"] = "joint_type"
-    if variable.name == "flags":
-        attributes["flag_masks"] = np.array([int(flag) for flag in Flag], dtype=FLAG_TYPE)
-        attributes["flag_meanings"] = " ".join(flag.label for flag in Flag)
+    if bits := FLAG_BITS.get(variable.name):
+        attributes["flag_masks"] = np.array([int(flag) for flag in bits], dtype=FLAG_TYPE)
+        attributes["flag_meanings"] = " ".join(flag.label for flag in bits)
     return attributes
 
 
 def storage_type(variable: Variable, precision: str = DOUBLE) -> np.dtype[Any]:
     """Return the little-endian type of a variable in a file of some precision; times are always double."""
-    if variable.name == "flags":
+    if variable.name in FLAG_BITS:
         return np.dtype(FLAG_TYPE).newbyteorder("<")
     return FLOATS[precision if variable.dims else DOUBLE]
 

@@ -16,7 +16,19 @@ from vsacli.base.errors import InputError, StorageError
 from vsacli.base.outputs import Staged
 from vsacli.base.signals import COMMANDED
 from vsacli.base.units import time_text
-from vsacli.base.variables import MOTOR_CONSTANTS, UNCERTAIN, VARIABLES, Variable, deviation, select_variables
+from vsacli.base.variables import (
+    ALL,
+    MIN_STIFFNESS,
+    MOTOR_CONSTANTS,
+    ON_REQUEST,
+    TIP_COMPLIANCE,
+    TOOL_FLAGS,
+    UNCERTAIN,
+    VARIABLES,
+    Variable,
+    deviation,
+    select_variables,
+)
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.layout import create_layout, row_bytes
 from vsacli.results.store.new_file import ChunkFiller, NewFile
@@ -42,7 +54,8 @@ class ResultWriter(NewFile):
         file: staged file to write.
         robot: robot of the run, stored as resolved arrays.
         trajectory: source of the name, the number of samples, and the input files.
-        variables: names of the variables to store, by default all; coordinates are always stored.
+        variables: names of the variables to store, by default `ALL`, which leaves out those of `ON_REQUEST`;
+            coordinates are always stored.
         provenance: attributes of the file on the computation, such as `command_line`.
         precision: precision of the stored values, "double" or "single"; times are always double.
 
@@ -161,14 +174,15 @@ class ResultWriter(NewFile):
         self, names: Iterable[str] | None, robot: Robot, trajectory: Trajectory
     ) -> tuple[Variable, ...]:
         """Return the variables with these names, or all that a run of robot and trajectory has."""
+        named = {ALL} if names is None else set(names)
         absent = {**self._absent(trajectory), **_not_given(robot, self._declared)}
-        if names is None:
-            return select_variables((name for name in self._declared if name not in absent), self._declared)
-        selected = select_variables(names, self._declared)
-        for variable in selected:
+        if TIP_COMPLIANCE in named:
+            absent.pop(TOOL_FLAGS, None)
+        for variable in select_variables(named - {ALL}, self._declared):
             if variable.name in absent:
                 raise InputError.one(f"there is no {variable.name}: {absent[variable.name]}")
-        return selected
+        present = {name for name in self._declared if name not in absent and name not in ON_REQUEST}
+        return select_variables(named - {ALL} | (present if ALL in named else set()), self._declared)
 
     def _absent(self, trajectory: Trajectory) -> dict[str, str]:
         """Return the variables that a run along a trajectory does not have, each with the reason."""
@@ -186,13 +200,15 @@ class ResultWriter(NewFile):
 def _not_given(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
     """Return the variables that the robot does not have, each with the missing key of its file."""
     return {
-        name: f"no joint of {robot.name} has {_requirement(variable)}"
+        name: f"no {variable.dims[0]} of {robot.name} has {_requirement(variable)}"
         for name, variable in declared.items()
         if not robot.has_variable(variable)
     }
 
 
 def _requirement(variable: Variable) -> str:
+    if variable.requires == MIN_STIFFNESS:
+        return f"a {MIN_STIFFNESS}, and {TIP_COMPLIANCE} was not asked for"
     if variable.requires in MOTOR_CONSTANTS:
         return f"a motor with a {variable.requires}"
     signal = COMMANDED.get(f"{variable.requires}")

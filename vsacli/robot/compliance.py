@@ -66,12 +66,38 @@ def tip_compliance(
         components = wrench_components(wrenches.frame)
         _check_same_shape("the wrench", wrenches.wrench, (*positions.shape[:-1], components))
     pose = HeldPose(robot, np.atleast_2d(positions), np.atleast_2d(joint_stiffness), wrenches)
-    return pose.compliance(chosen).reshape(*positions.shape[:-1], len(WRENCH_AXES), len(WRENCH_AXES))
+    compliance, _ = pose.compliance(chosen)
+    return compliance.reshape(*positions.shape[:-1], len(WRENCH_AXES), len(WRENCH_AXES))
 
 
 def _check_same_shape(name: str, array: FloatArray, shape: tuple[int, ...]) -> None:
     if np.shape(array) != shape:
         raise InputError.one(f"{name} must have the shape {shape}, as q, not {np.shape(array)}")
+
+
+def softest_direction(compliance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest translational stiffness of a tool, and its direction.
+
+    It is 1 over the largest eigenvalue of the symmetric translational block: a force F along the direction
+    moves the tool by F over this stiffness along the direction, and less along any other.
+
+    Args:
+        compliance: C of `tip_compliance`, (..., 6, 6).
+
+    Returns:
+        Stiffness, (...), N/m, and unit vectors in base axes, (..., 3), with the largest component positive;
+        both NaN where C is. Where the tool does not yield, the stiffness is infinite, the direction NaN.
+    """
+    block = compliance[..., :3, :3]
+    known = np.isfinite(block).all(axis=(-2, -1))
+    values, vectors = np.linalg.eigh(
+        np.where(known[..., None, None], block + np.swapaxes(block, -1, -2), 0.0) / 2
+    )
+    largest, direction = values[..., -1], vectors[..., -1]
+    yields = known & (largest > 0)
+    stiffness = np.divide(1.0, largest, out=np.where(known, np.inf, np.nan), where=yields)
+    leading = np.take_along_axis(direction, np.abs(direction).argmax(axis=-1)[..., None], axis=-1)
+    return stiffness, np.where(yields[..., None], direction * np.sign(leading), np.nan)
 
 
 class HeldPose:
@@ -92,20 +118,19 @@ class HeldPose:
         joints = np.arange(len(robot.joints))
         self._matrix[:, joints, joints] += stiffness
 
-    def compliance(self, tool: int) -> FloatArray:
-        """Return C of a tool by index, (samples, 6, 6); NaN where it is unstable, or a value is NaN."""
+    def compliance(self, tool: int) -> tuple[FloatArray, BoolArray]:
+        """Return C of a tool by index, (samples, 6, 6), and where it is statically unstable, (samples,).
+
+        C is NaN there, and where a value is.
+        """
         coupled, matrix = self._coupled(tool)
         columns = jacobian_in_base(self._robot, self._frames, tool)[..., coupled]
-        stable = smallest_eigenvalues(matrix) > SMALLEST_EIGENVALUE
+        least = smallest_eigenvalues(matrix)
+        stable = least > SMALLEST_EIGENVALUE
         matrix[~stable] = np.eye(len(coupled))
         compliance: FloatArray = columns @ np.linalg.solve(matrix, np.swapaxes(columns, -1, -2))
         compliance[~stable] = np.nan
-        return compliance
-
-    def unstable(self, tool: int) -> BoolArray:
-        """Return where the joints that a tool depends on are statically unstable, (samples,)."""
-        unstable: BoolArray = smallest_eigenvalues(self._coupled(tool)[1]) <= SMALLEST_EIGENVALUE
-        return unstable
+        return compliance, least <= SMALLEST_EIGENVALUE
 
     def _coupled(self, tool: int) -> tuple[list[int], FloatArray]:
         """Return the joints with springs whose deflections depend on those of a tool, and K + dg/dq of them.

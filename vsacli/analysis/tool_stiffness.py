@@ -1,0 +1,122 @@
+"""Compliance of the tools along a run, block by block, for its report and its result."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vsacli.actuators.reach import LIMIT_ROUNDING
+from vsacli.analysis.tool_report import NO_DIRECTION, ToolReport
+from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.flags import Flag, SampleFlag, ToolFlag, has_flag, marked
+from vsacli.base.units import LINEAR_STIFFNESS
+from vsacli.base.variables import TIP_COMPLIANCE, Block
+from vsacli.base.wrench import Wrench, WrenchFrame
+from vsacli.dynamics.limits import Finding, keep_worse
+from vsacli.robot.compliance import HeldPose, softest_direction
+from vsacli.robot.joint import Tool
+from vsacli.robot.model import Robot
+
+COUNTED_AT_TOOLS: dict[str, SampleFlag] = {
+    "singular": ToolFlag.STATIC_INSTABILITY,
+    "over_limit": ToolFlag.TOOL_STIFFNESS_LIMIT,
+}
+"""Kinds of trouble whose samples are counted, with their bits."""
+
+
+class ToolSummary:
+    """Summary of one tool; `add` samples in order, then call `report`."""
+
+    def __init__(self, tool: Tool) -> None:
+        self._tool = tool
+        self._samples = dict.fromkeys(COUNTED_AT_TOOLS, 0)
+        self._first_time: dict[str, float] = {}
+        self._worst: dict[str, Finding] = {}
+        self._softest = (math.nan, math.nan, NO_DIRECTION)
+
+    def add(
+        self, time: FloatArray, stiffness: FloatArray, direction: FloatArray, unstable: BoolArray
+    ) -> FlagArray:
+        """Merge samples, and return their flags, (samples,).
+
+        Args:
+            time: Times, (samples,).
+            stiffness: Stiffness in the softest direction, (samples,), NaN where there is none.
+            direction: This direction, (samples, 3).
+            unstable: Where the pose is statically unstable, (samples,).
+        """
+        required = self._tool.min_stiffness or 0.0
+        below = stiffness < (1 - LIMIT_ROUNDING) * required
+        if np.isfinite(stiffness).any():
+            self._keep_softest(time, stiffness, direction)
+        if below.any():
+            step = int(np.where(below, stiffness, np.inf).argmin())
+            self._keep(ToolFlag.TOOL_STIFFNESS_LIMIT, time[step], float(stiffness[step]), required)
+        if unstable.any():
+            self._keep(ToolFlag.STATIC_INSTABILITY, time[unstable.argmax()], math.nan, math.nan)
+        flags: FlagArray = marked(ToolFlag.STATIC_INSTABILITY, unstable)
+        flags |= marked(ToolFlag.TOOL_STIFFNESS_LIMIT, below)
+        for kind, bit in COUNTED_AT_TOOLS.items():
+            hit = has_flag(flags, bit)
+            self._samples[kind] += int(hit.sum())
+            if hit.any():
+                for name in (kind, bit.label):
+                    self._first_time.setdefault(name, float(time[hit.argmax()]))
+        return flags
+
+    def report(self) -> ToolReport:
+        """Return the report so far."""
+        return ToolReport(
+            self._tool.name,
+            dict(self._samples),
+            dict(self._first_time),
+            dict(self._worst),
+            *self._softest,
+            self._tool.min_stiffness,
+        )
+
+    def _keep_softest(self, time: FloatArray, stiffness: FloatArray, direction: FloatArray) -> None:
+        step = int(np.nanargmin(stiffness))
+        if not self._softest[0] <= stiffness[step]:
+            x, y, z = direction[step].tolist()
+            self._softest = float(stiffness[step]), float(time[step]), (x, y, z)
+
+    def _keep(self, flag: ToolFlag, time: float, value: float, bound: float) -> None:
+        unit = LINEAR_STIFFNESS.unit("")
+        finding = Finding(flag.label, float(time), value, bound, unit, tool=self._tool.name)
+        keep_worse(self._worst, finding)
+
+
+class ToolStiffness:
+    """Compliance of the tools along a run, and their reports; `add` blocks in order, then call `reports`.
+
+    Args:
+        robot: Robot.
+        frame: Frame of the wrench on the tools; None without one.
+        stored: Whether blocks get the compliance itself, not only flags.
+    """
+
+    def __init__(self, robot: Robot, frame: WrenchFrame | None, *, stored: bool) -> None:
+        self._robot, self._frame, self._stored = robot, frame, stored
+        self._summaries = [ToolSummary(tool) for tool in robot.end_effectors]
+
+    def add(self, block: Block) -> Block:
+        """Merge a block into the reports, and return it with the variables of tools."""
+        wrench = None if self._frame is None else Wrench.constant(block.wrench, self._frame)
+        pose = HeldPose(self._robot, block.q, block.stiffness, wrench)
+        flags: list[FlagArray] = []
+        compliances: list[FloatArray] = []
+        for tool, (carrier, summary) in enumerate(zip(self._robot.tool_joints, self._summaries, strict=True)):
+            compliance, unstable = pose.compliance(tool)
+            moving = list(self._robot.paths[carrier])
+            infeasible = has_flag(block.flags[:, moving], Flag.INFEASIBLE).any(axis=1)
+            compliance[infeasible] = np.nan
+            flags.append(summary.add(block.time, *softest_direction(compliance), unstable & ~infeasible))
+            compliances.append(compliance)
+        asked = {TIP_COMPLIANCE: np.stack(compliances, axis=1)} if self._stored else {}
+        return block.replaced(tool_flags=np.stack(flags, axis=1), **asked)
+
+    def reports(self) -> tuple[ToolReport, ...]:
+        """Return the report of each tool so far."""
+        return tuple(summary.report() for summary in self._summaries)
