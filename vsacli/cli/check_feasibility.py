@@ -157,7 +157,7 @@ def _write_fix(found: Fixes, number: int, path: str, outputs: Outputs, talk: Tal
         write_fixed(found.fixes[number - 1], path, outputs)
         talk.note(f"fix {number} goes to {path}")
         return
-    if found.slow_down is None:
+    if not found.needed:
         reason = "nothing needs to change"
     elif not found.fixes:
         reason = "nothing that was tried fixes the task"

@@ -40,6 +40,21 @@ def with_raised_stiffness(trajectory: Trajectory, constants: Mapping[int, float]
     return with_stiffness(trajectory, raised)
 
 
+def with_scaled_stiffness(trajectory: Trajectory, factors: Mapping[int, float]) -> Trajectory:
+    """Return a trajectory with the stiffness of joints multiplied by factors, by joint index.
+
+    A stiffness in closed form remains in closed form.
+    """
+    stiffness = trajectory.commanded[STIFFNESS.key]
+    if isinstance(stiffness, ClosedForm):
+        by = [factors.get(joint, 1.0) for joint in range(trajectory.joints)]
+        return with_stiffness(trajectory, stiffness.scaled(by))
+    elapsed = elapsed_times(trajectory.times.block(0, trajectory.samples))
+    rows = stiffness.samples(0, trajectory.samples, elapsed)
+    changes = {joint: (factor - 1) * rows[:, joint] for joint, factor in factors.items()}
+    return with_changed_stiffness(trajectory, changes)
+
+
 def with_stiffness(trajectory: Trajectory, stiffness: Profile) -> Trajectory:
     """Return a trajectory at the same times with another profile of the stiffness."""
     return _fixed(trajectory, trajectory.times, stiffness)

@@ -19,6 +19,10 @@ _OTHER_SPRINGS = (
 )
 
 
+NOT_CONFIRMED = "a change within all limits at the samples exceeds one between them"
+"""Reason why a fix that its samples accept is none."""
+
+
 @dataclass(frozen=True)
 class NotPossible(Published):
     """Reasons why a kind of change fixes nothing."""
@@ -130,6 +134,32 @@ class StiffnessProfile(Published):
 
 
 @dataclass(frozen=True)
+class StiffnessFactor(Published):
+    """A factor on the stiffness of the joints that move a tool."""
+
+    factor: float
+    joints: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{joined(self.joints)} by {self.factor:.4g}"
+
+
+@dataclass(frozen=True)
+class StifferTools(Published):
+    """A factor for each set of joints that move tools that are too soft."""
+
+    factors: tuple[StiffnessFactor, ...]
+
+    possible: ClassVar = True
+    shape: ClassVar = {**named("possible", "factors"), "text": "sentence"}
+
+    @property
+    def sentence(self) -> str:
+        """Advice as a sentence, without a full stop."""
+        return f"multiply the stiffness of {', '.join(map(str, self.factors))}"
+
+
+@dataclass(frozen=True)
 class LongerTransition(Published):
     """A longer transition between stiffness levels, s; each transition begins when it did before."""
 
@@ -182,8 +212,12 @@ class Fix(Published):
     transition: LongerTransition | None = None
     stiffness_profile: StiffnessProfile | None = None
     branch: OtherBranch | None = None
+    stiffness_factor: StifferTools | None = None
 
-    PARTS: ClassVar = ("slow_down", "branch", "transition", "stiffness_offset", "stiffness_profile")
+    PARTS: ClassVar = (
+        *("slow_down", "branch", "transition"),
+        *("stiffness_offset", "stiffness_profile", "stiffness_factor"),
+    )
     shape: ClassVar = {"size": "size", **{f"{part}?": part for part in PARTS}, "text": "sentence"}
 
     @property
@@ -234,20 +268,27 @@ class Fixes(Published):
     stiffness_offset: StiffnessOffset | NotPossible | None = None
     stiffness_profile: StiffnessProfile | NotPossible | None = None
     transition: LongerTransition | NotPossible | None = None
+    stiffness_factor: StifferTools | NotPossible | None = None
     causes: tuple[Finding, ...] = ()
     fixes: tuple[Fix, ...] = ()
 
     shape: ClassVar = {
         **named("min_margin", "slow_down", "stiffness_offset", "stiffness_profile", "transition"),
+        "stiffness_factor?": "stiffness_factor",
         "causes": "published_causes",
         "fixes": "fixes",
     }
 
     @property
+    def needed(self) -> bool:
+        """Whether anything needs to change."""
+        return self.slow_down is not None or self.stiffness_factor is not None
+
+    @property
     def published_causes(self) -> list[dict[str, Any]]:
         """JSON values of the causes, with their words."""
         return [
-            {"joint": cause.joint, "text": cause.text, "fixable": cause.fixable, "kind": cause.kind}
+            {"joint": cause.joint or None, "text": cause.text, "fixable": cause.fixable, "kind": cause.kind}
             | cause.as_json()
             for cause in self.causes
         ]
@@ -258,12 +299,13 @@ class Fixes(Published):
     def _lines(self) -> Iterator[str]:
         """Yield the causes, a heading, and a numbered sentence for each fix."""
         margin = f"a margin of at least {100 * self.min_margin:.6g} %"
-        if self.slow_down is None:
+        if not self.needed:
             yield f"nothing to change: every sample has {margin} and is within all limits"
             return
         yield from map(str, self.causes)
-        left = [cause.joint for cause in self.causes if not cause.fixable]
-        but = f" of all joints but {joined(left)}" if left and self.fixes else ""
+        left = [cause.joint or cause.tool for cause in self.causes if not cause.fixable]
+        members = "joints and tools" if any(cause.tool for cause in self.causes) else "joints"
+        but = f" of all {members} but {joined(left)}" if left and self.fixes else ""
         if self.fixes:
             yield f"fixes; with any of them every sample{but} has {margin} and is within all limits:"
         else:

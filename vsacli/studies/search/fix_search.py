@@ -27,7 +27,7 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.combined import CombinedSearch
-from vsacli.studies.search.fix_report import Fix, Fixes, NotPossible
+from vsacli.studies.search.fix_report import NOT_CONFIRMED, Fix, Fixes, NotPossible
 from vsacli.studies.search.loads import Load, joint_loads
 from vsacli.studies.search.recorded_limits import RecordedLimits
 from vsacli.studies.search.scans import (
@@ -73,6 +73,11 @@ def fixes(
     """
     trajectory = adapt_trajectory(robot, trajectory)
     check_min_margin(min_margin)
+    if any(tool.min_stiffness for tool in robot.tools):
+        from vsacli.studies.search.tool_fixes import with_stiff_tools, without_limits
+
+        of_joints = fixes(without_limits(robot), trajectory, min_margin, progress=progress)
+        return with_stiff_tools(robot, trajectory, of_joints)
     acceptance = Acceptance(robot, min_margin, RecordedLimits(trajectory))
     asked = Task(acceptance, trajectory)
     as_it_is = Fix(0.0, robot, trajectory)
@@ -117,7 +122,7 @@ class _Tried(NamedTuple):
         if not isinstance(found, list):
             return found
         if any(found[0] is each for each in self.failed):
-            return NotPossible(("a change within all limits at the samples exceeds one between them",))
+            return NotPossible((NOT_CONFIRMED,))
         return getattr(found[0], name)
 
     @staticmethod

@@ -310,10 +310,11 @@ class Task:
         report = run.report()
         counted = (each for index, each in enumerate(report.joints) if index not in self.acceptance.ignored)
         short = [joint for joint in counted if self._is_short(joint)]
+        soft = [worst.time for tool in report.tools for worst in tool.worst.values()]
         refused = self._refused_between(fix)
-        if report.self_check.passed and not short and not refused.size:
+        if report.self_check.passed and not short and not soft and not refused.size:
             return None
-        worst = [time for joint in short for time in (joint.margin_time, *_violation_times(joint))]
+        worst = soft + [time for joint in short for time in (joint.margin_time, *_violation_times(joint))]
         elapsed = (np.array(worst) - fix.trajectory.start) / (1 + fix.longer)
         return np.union1d(elapsed[np.isfinite(elapsed)], refused)
 

@@ -84,10 +84,19 @@ class ClosedForm(ABC):
     def raised(self, by: Sequence[float]) -> Self:
         """Return the profile with a constant added to each component."""
 
+    @abstractmethod
+    def scaled(self, by: Sequence[float]) -> Self:
+        """Return the profile with each component multiplied by a constant."""
+
 
 def add_constants(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
     """Return the sums of two values for each component."""
     return tuple(value + constant for value, constant in zip(values, by, strict=True))
+
+
+def multiply_constants(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
+    """Return the products of two values for each component."""
+    return tuple(value * constant for value, constant in zip(values, by, strict=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,3 +119,7 @@ class ConstantProfile(ClosedForm):
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
         return replace(self, value=add_constants(self.value, by))
+
+    def scaled(self, by: Sequence[float]) -> Self:
+        """See `ClosedForm.scaled`."""
+        return replace(self, value=multiply_constants(self.value, by))

@@ -16,7 +16,13 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, WRENCH
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.documents.fields import integer
-from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile, add_constants
+from vsacli.trajectory.curves.closed_form import (
+    DEGREES,
+    ClosedForm,
+    ConstantProfile,
+    add_constants,
+    multiply_constants,
+)
 from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
 
@@ -65,6 +71,10 @@ class RestToRest(ClosedForm):
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
         return replace(self, start=add_constants(self.start, by), end=add_constants(self.end, by))
+
+    def scaled(self, by: Sequence[float]) -> Self:
+        """See `ClosedForm.scaled`."""
+        return replace(self, start=multiply_constants(self.start, by), end=multiply_constants(self.end, by))
 
 
 def _rise(u: FloatArray, degree: int) -> FloatArray:

@@ -14,7 +14,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, number, value
-from vsacli.trajectory.curves.closed_form import ClosedForm, add_constants
+from vsacli.trajectory.curves.closed_form import ClosedForm, add_constants, multiply_constants
 from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.times import MAX_STEPS
@@ -144,6 +144,14 @@ class Sinusoids(ClosedForm):
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
         return replace(self, offset=add_constants(self.offset, by))
+
+    def scaled(self, by: Sequence[float]) -> Self:
+        """See `ClosedForm.scaled`."""
+        sine, cosine = (
+            tuple(multiply_constants(harmonic, by) for harmonic in harmonics)
+            for harmonics in (self.sine, self.cosine)
+        )
+        return replace(self, offset=multiply_constants(self.offset, by), sine=sine, cosine=cosine)
 
     def _series(self, time: FloatArray) -> FloatArray:
         first, last = self.span

@@ -99,6 +99,10 @@ class PiecewiseProfile(ClosedForm):
         """See `ClosedForm.raised`."""
         return replace(self, parts=tuple(part.raised(by) for part in self.parts))
 
+    def scaled(self, by: Sequence[float]) -> Self:
+        """See `ClosedForm.scaled`."""
+        return replace(self, parts=tuple(part.scaled(by) for part in self.parts))
+
     def jumps(self, orders: int) -> Iterator[Jump]:
         """Yield the jumps between parts, of the value and derivatives of order below `orders`."""
         for index, (before, after) in enumerate(pairwise(self.parts), start=1):

@@ -17,7 +17,7 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, Items, NumberWithUnit, integer, value
-from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, add_constants
+from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, add_constants, multiply_constants
 from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
 SEAM = 1e-9
@@ -131,6 +131,10 @@ class ViaPoints(ClosedForm):
     def raised(self, by: Sequence[float]) -> Self:
         """See `ClosedForm.raised`."""
         return replace(self, points=tuple(add_constants(point, by) for point in self.points))
+
+    def scaled(self, by: Sequence[float]) -> Self:
+        """See `ClosedForm.scaled`."""
+        return replace(self, points=tuple(multiply_constants(point, by) for point in self.points))
 
     def extremes(self) -> ProfileExtremes:
         """Return the smallest and largest values, from the zeros of the first derivative.

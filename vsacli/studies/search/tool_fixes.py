@@ -1,0 +1,226 @@
+"""Fixes of tools that are too soft: one factor on the stiffness of the joints that move a tool.
+
+The factor is added to each fix of the joints, or replaces them if that is enough. Loads do not depend on the
+stiffness, so that the admissible range of each joint bounds the factor on both sides.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vsacli.analysis.run import Run
+from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import STIFFNESS
+from vsacli.base.texts import joined, significant
+from vsacli.base.units import LINEAR_STIFFNESS
+from vsacli.base.wrench import Wrench
+from vsacli.dynamics.inverse import usual_block
+from vsacli.robot.compliance import HeldPose, softest_direction
+from vsacli.robot.model import Robot
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range
+from vsacli.studies.search.changed_motion import with_scaled_stiffness
+from vsacli.studies.search.fix_report import (
+    NOT_CONFIRMED,
+    Fix,
+    Fixes,
+    NotPossible,
+    StifferTools,
+    StiffnessFactor,
+)
+from vsacli.studies.search.loads import joint_loads
+from vsacli.studies.search.recorded_limits import RecordedLimits
+from vsacli.studies.search.task import RELATIVE_CHANGE, Task
+from vsacli.trajectory.trajectory import Trajectory
+
+LARGEST_FACTOR = 1e3
+"""Largest factor that is tried where springs have no largest stiffness."""
+
+BISECTIONS = 20
+"""Halvings of the range of a factor: at most 1e-5 of it remains, less than its four digits."""
+
+
+def without_limits(robot: Robot, names: Collection[str] | None = None) -> Robot:
+    """Return the robot without the limits of some of its tools, by default of all."""
+    tools = (
+        replace(tool, min_stiffness=None) if names is None or tool.name in names else tool
+        for tool in robot.tools
+    )
+    return replace(robot, tools=tuple(tools))
+
+
+def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> Fixes:
+    """Return the fixes of a robot whose tools have limits.
+
+    Tools that no factor makes stiff enough are left out, and their findings have the reason.
+
+    Args:
+        robot: Robot, with limits of tools.
+        trajectory: Commanded motion.
+        of_joints: Fixes of the robot without these limits.
+    """
+    findings = _HeldRun(robot, trajectory).findings
+    if not findings:
+        return of_joints
+    rule = Acceptance(robot, of_joints.min_margin, RecordedLimits(trajectory))
+    candidates = [Fix(0.0, robot, trajectory, asked=trajectory), *of_joints.fixes]
+    chosen, hopeless = _confirmed(Task(rule, trajectory), candidates)
+    if hopeless:
+        limited = replace(rule, robot=without_limits(robot, hopeless))
+        chosen, _ = _confirmed(Task(limited, trajectory), candidates)
+    alone = next((fix.stiffness_factor for fix in chosen if fix.kinds == {"stiffness_factor"}), None)
+    causes = (
+        replace(finding, fixable=bool(chosen) and not advice, advice=advice)
+        for finding in findings
+        for advice in [hopeless.get(finding.tool, "")]
+    )
+    return replace(
+        of_joints,
+        stiffness_factor=alone or NotPossible(tuple(hopeless.values()) or (NOT_CONFIRMED,)),
+        causes=(*of_joints.causes, *causes),
+        fixes=tuple(sorted(chosen, key=lambda fix: (fix.branch is not None, fix.size))),
+    )
+
+
+def _confirmed(task: Task, candidates: Sequence[Fix]) -> tuple[list[Fix], dict[str, str]]:
+    """Return the fixes with factors that a run confirms, and that no simpler one replaces.
+
+    Without any, the tools that no factor makes stiff enough, whatever the fix, follow with the reason.
+    """
+    robot, chosen = task.acceptance.robot, list[Fix]()
+    hopeless: list[dict[str, str]] = []
+    for fix in candidates:
+        factors, too_soft = _stiffened(replace(fix, robot=replace(fix.robot, tools=robot.tools)), task)
+        hopeless.append(too_soft)
+        replaced = any(factors.kinds >= simpler.kinds for simpler in chosen)
+        if factors.kinds and not too_soft and not replaced and task.falls_short(factors) is None:
+            chosen.append(factors)
+    common = {} if chosen else hopeless[0]
+    return chosen, {name: common[name] for name in common if all(name in each for each in hopeless)}
+
+
+class _HeldRun:
+    """A run of a motion, at whose samples motors may be held with another stiffness of the joints."""
+
+    def __init__(self, robot: Robot, trajectory: Trajectory) -> None:
+        self._robot = robot
+        run = Run(robot, trajectory)
+        blocks = [(block.q, block.stiffness, block.wrench) for block in run]
+        q, stiffness, wrench = zip(*blocks, strict=True)
+        self._q, self._stiffness = np.concatenate(q), np.concatenate(stiffness)
+        frame = None if trajectory.wrench is None else trajectory.wrench.frame
+        self._wrench = None if frame is None else Wrench.constant(np.concatenate(wrench), frame)
+        self.findings = [worst for tool in run.report().tools for worst in tool.worst.values()]
+
+    def least_stiffness(self, tool: int, scales: FloatArray) -> float:
+        """Return the smallest stiffness of a tool with scaled joint stiffness, (joints,); 0 if unstable."""
+        least, samples = math.inf, usual_block(len(self._robot.joints))
+        for start in range(0, len(self._q), samples):
+            part = slice(start, start + samples)
+            wrench = self._wrench and self._wrench.mapped(lambda array, _, part=part: array[part])
+            pose = HeldPose(self._robot, self._q[part], scales * self._stiffness[part], wrench)
+            stiffness, _ = softest_direction(pose.compliance(tool)[0])
+            least = min(least, float(np.nan_to_num(stiffness, nan=0.0, posinf=np.inf).min()))
+        return least
+
+    def lacks(self, tool: int, scales: FloatArray) -> bool:
+        """Return whether a tool is softer than it may be."""
+        required = self._robot.end_effectors[tool].min_stiffness
+        return required is not None and self.least_stiffness(tool, scales) < required
+
+
+def _stiffened(fix: Fix, task: Task) -> tuple[Fix, dict[str, str]]:
+    """Return a fix with the smallest factors that make its tools stiff enough, and why some stay too soft."""
+    trajectory, robot = fix.trajectory, fix.robot
+    acceptance, held = replace(task.acceptance, robot=robot), _HeldRun(robot, trajectory)
+    scales, parts, too_soft = np.ones(len(robot.joints)), list[StiffnessFactor](), dict[str, str]()
+    soft = [tool for tool in range(len(robot.tools)) if held.lacks(tool, scales)]
+    for tools, joints in _sets_of_joints(robot, soft):
+        try:
+            factor = _smallest_factor(
+                robot, held, tools, joints, _range_of_factor(acceptance, trajectory, joints)
+            )
+        except ImpossibleError as error:
+            too_soft |= dict.fromkeys((robot.tool_names[tool] for tool in tools), str(error))
+            continue
+        scales[joints] = factor
+        parts.append(StiffnessFactor(factor, tuple(robot.joint_names[joint] for joint in joints)))
+    asked = trajectory.block(0, trajectory.samples).commanded[STIFFNESS.key]
+    factors = {joint: float(scales[joint]) for joint in np.flatnonzero(scales != 1).tolist()}
+    sizes = [
+        RELATIVE_CHANGE.of_stiffness(asked[:, joint], (factor - 1) * asked[:, joint])
+        for joint, factor in factors.items()
+    ]
+    stiffened = replace(
+        fix,
+        size=math.hypot(fix.size, *sizes),
+        declared=with_scaled_stiffness(fix.declared, factors) if factors else fix.declared,
+        stiffness_factor=StifferTools(tuple(parts)) if parts else None,
+    )
+    return stiffened, too_soft
+
+
+def _sets_of_joints(robot: Robot, tools: Sequence[int]) -> list[tuple[list[int], list[int]]]:
+    """Return tools with the joints that move them and have a commanded stiffness; the sets are disjoint."""
+    sets: list[tuple[list[int], list[int]]] = []
+    for tool in tools:
+        path = robot.paths[robot.tool_joints[tool]]
+        joints = {joint for joint in path if STIFFNESS.key in robot.joints[joint].actuator.commanded}
+        shared = [entry for entry in sets if joints & {*entry[1]}]
+        sets = [entry for entry in sets if entry not in shared]
+        of_tools = [tool, *(other for entry in shared for other in entry[0])]
+        sets.append((of_tools, sorted(joints.union(*(entry[1] for entry in shared)))))
+    return sets
+
+
+def _range_of_factor(
+    acceptance: Acceptance, trajectory: Trajectory, joints: Sequence[int]
+) -> tuple[float, float]:
+    """Return the smallest and largest factor, from 1 on, that margins and limits of joints admit."""
+    low, high = 1.0, LARGEST_FACTOR
+    for joint, load in zip(joints, joint_loads(acceptance.robot, trajectory, list(joints)), strict=True):
+        admissible = checked_range(acceptance, acceptance.robot.joints[joint], load)
+        asked = load.command.commanded[STIFFNESS.key]
+        low = max(low, float((admissible.low / asked).max()))
+        high = min(high, float((admissible.high / asked).min()))
+    return low, high
+
+
+def _smallest_factor(
+    robot: Robot,
+    held: _HeldRun,
+    tools: Sequence[int],
+    joints: Sequence[int],
+    allowed: tuple[float, float],
+) -> float:
+    """Return the smallest factor in a range with which no tool is too soft, rounded up to four digits."""
+    scales, (low, high) = np.ones(len(robot.joints)), allowed
+
+    def lacking(factor: float) -> list[int]:
+        scales[list(joints)] = factor
+        return [tool for tool in tools if held.lacks(tool, scales)]
+
+    if not joints or high < low or lacking(high):
+        tool = tools[0] if not joints or high < low else lacking(high)[0]
+        raise ImpossibleError(_too_soft(robot, tool, joints, high, held.least_stiffness(tool, scales)))
+    for _ in range(BISECTIONS if lacking(low) else 0):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if lacking(middle) else (low, middle)
+    smallest = high if lacking(low) else low
+    rounded = float(significant(smallest, toward=math.inf))
+    return rounded if smallest <= rounded <= high or not lacking(rounded) else smallest
+
+
+def _too_soft(robot: Robot, tool: int, joints: Sequence[int], high: float, stiffness: float) -> str:
+    """Return why no factor makes a tool stiff enough, as a clause."""
+    name, unit = robot.tool_names[tool], LINEAR_STIFFNESS.unit("")
+    if not joints:
+        return f"no joint that moves {name} has a stiffness to choose"
+    names = joined([robot.joint_names[joint] for joint in joints])
+    return (
+        f"with {high:.4g} times their stiffness, the most that {names} may have, the stiffness of {name} is "
+        f"{significant(stiffness)} {unit}"
+    )
