@@ -10,8 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FLAG_TYPE
 from vsacli.base.flags import Flag
 from vsacli.base.units import Quantity, WrenchQuantity
-from vsacli.base.variables import MOTORS, Variable
-from vsacli.base.wrench import WRENCH_AXES
+from vsacli.base.variables import Variable
 
 EXISTING = "existing"
 """Attribute of variables that depend on devices of the joints: 1 for each column that a joint has."""
@@ -61,12 +60,6 @@ def storage_type(variable: Variable, precision: str = DOUBLE) -> np.dtype[Any]:
     if variable.name == "flags":
         return np.dtype(FLAG_TYPE).newbyteorder("<")
     return FLOATS[precision if variable.dims else DOUBLE]
-
-
-def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:
-    """Return the lengths of the axes after time."""
-    lengths = {"joint": joints, "motor": len(MOTORS), "wrench_axis": len(WRENCH_AXES)}
-    return tuple(lengths[dim] for dim in variable.dims)
 
 
 def storable(text: str) -> str:
