@@ -17,6 +17,7 @@ from samples.command_line import WITHOUT_BYTECODE
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
+from vsacli.base.flags import FLAG_BITS
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import WRENCH
 from vsacli.base.variables import OF_ANY_ROBOT, UNCERTAIN, VARIABLES, Block
@@ -81,9 +82,9 @@ def random_block(samples: int, joints: int, rate: float = 1000.0) -> Block:
 
     def values(name: str) -> np.ndarray:
         dims = VARIABLES[name].dims
-        if name == "flags":
-            return generator.integers(0, 1024, (joints, samples)).astype(np.uint32).T
-        length = {"joint": joints, "motor": 2, "wrench_axis": 6}
+        length = {"joint": joints, "motor": 2, "tool": 1, "wrench_axis": 6, "displacement_axis": 6}
+        if name in FLAG_BITS:
+            return generator.integers(0, 1024, (length[dims[0]], samples)).astype(np.uint32).T
         shape = (*(length[dim] for dim in dims), samples)
         return np.moveaxis(generator.standard_normal(shape), -1, 0)
 

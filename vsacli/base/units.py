@@ -51,8 +51,13 @@ class WrenchQuantity(Quantity):
         return self.of_axis(index)
 
     def of_axis(self, axis: int) -> str:
-        """Return the unit of a component: three forces, then three moments."""
-        return self.prismatic if axis < 3 else self.revolute
+        """Return the unit of a component: three forces, then three moments, for each tool in turn."""
+        return self.prismatic if axis % 6 < 3 else self.revolute
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Units in files, by attribute."""
+        return {"units": "see wrench_axis", "units_force": self.prismatic, "units_moment": self.revolute}
 
     def __str__(self) -> str:
         return f"{self.prismatic} (forces), {self.revolute} (moments)"
@@ -66,6 +71,18 @@ class ComplianceQuantity(WrenchQuantity):
         row, column = divmod(axis % 36, 6)
         displacement, wrench = "m" if row < 3 else "rad", "N" if column < 3 else "(N m)"
         return f"{displacement}/{wrench}"
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """See `WrenchQuantity.attributes`."""
+        corners = {
+            "translation_force": 0,
+            "translation_moment": 3,
+            "rotation_force": 18,
+            "rotation_moment": 21,
+        }
+        units = {f"units_{name}": self.of_axis(axis) for name, axis in corners.items()}
+        return {"units": "see displacement_axis and wrench_axis", **units}
 
     def __str__(self) -> str:
         return "m/N and m/(N m) (translation), rad/N and rad/(N m) (rotation)"

@@ -13,7 +13,16 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_type
 from vsacli.base.signals import COMMANDED, Signal
 from vsacli.base.tables import aligned, html_table
-from vsacli.base.variables import LOSSES, MIN_STIFFNESS, OF_ANY_ROBOT, TOOLS, VARIABLES, Variable
+from vsacli.base.variables import (
+    LOSSES,
+    MIN_STIFFNESS,
+    OF_ANY_ROBOT,
+    TOOLS,
+    VARIABLES,
+    Labels,
+    Variable,
+    dimension_labels,
+)
 from vsacli.documents.fields import (
     Items,
     ItemsByName,
@@ -170,6 +179,12 @@ class Robot(DeclaredRecord):
         return tuple(paths)
 
     @property
+    def is_plain_chain(self) -> bool:
+        """Whether each link carries the next joint at its frame, and the tool is not one of `tools`."""
+        mounted = any(joint.mount is not None for joint in self.joints)
+        return not (mounted or self.tools) and self.parents == tuple(range(-1, len(self.joints) - 1))
+
+    @property
     def tips(self) -> tuple[int, ...]:
         """Joints whose links carry no other joint."""
         return tuple(sorted(set(range(len(self.joints))) - set(self.parents)))
@@ -191,6 +206,11 @@ class Robot(DeclaredRecord):
     def tool_names(self) -> tuple[str, ...]:
         """Names of `end_effectors`."""
         return tuple(tool.name for tool in self.end_effectors)
+
+    @property
+    def labels(self) -> Labels:
+        """Labels along each dimension of the variables of results."""
+        return dimension_labels(self.joint_names, self.tool_names)
 
     def end_effector(self, name: str | None = None) -> int:
         """Return the index of a tool among `end_effectors`; None stands for the only one.

@@ -272,7 +272,8 @@ def test_a_result_reads_its_geometry(feasible_result: Path) -> None:
     with StoredResult.open(feasible_result) as result:
         geometry = result.geometry()
     assert [row.dh for row in geometry.joints] == [joint.dh for joint in robot.joints]
-    assert (geometry.base, geometry.tool) == (robot.base, robot.tool)
+    assert (geometry.base, geometry.end_effectors) == (robot.base, (robot.tool,))
+    assert (geometry.parents, geometry.tool_joints) == (robot.parents, robot.tool_joints)
 
 
 @pytest.mark.slow

@@ -10,8 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FLAG_TYPE
 from vsacli.base.flags import FLAG_BITS
 from vsacli.base.units import Quantity, WrenchQuantity
-from vsacli.base.variables import MOTORS, Variable
-from vsacli.base.wrench import WRENCH_AXES
+from vsacli.base.variables import Variable
 
 EXISTING = "existing"
 """Attribute of variables that depend on devices of the joints: 1 for each column that a joint has."""
@@ -29,11 +28,7 @@ PRECISION = "precision"
 def unit_attributes(quantity: Quantity, joint_types: tuple[str, ...]) -> dict[str, str]:
     """Return `units`; if joints differ in it, or forces and moments, also an attribute for each unit."""
     if isinstance(quantity, WrenchQuantity):
-        return {
-            "units": "see wrench_axis",
-            "units_force": quantity.prismatic,
-            "units_moment": quantity.revolute,
-        }
+        return quantity.attributes
     found = sorted({quantity.unit(joint_type) for joint_type in joint_types})
     if len(found) == 1:
         return {"units": found[0]}
@@ -61,12 +56,6 @@ def storage_type(variable: Variable, precision: str = DOUBLE) -> np.dtype[Any]:
     if variable.name in FLAG_BITS:
         return np.dtype(FLAG_TYPE).newbyteorder("<")
     return FLOATS[precision if variable.dims else DOUBLE]
-
-
-def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:
-    """Return the lengths of the axes after time."""
-    lengths = {"joint": joints, "motor": len(MOTORS), "wrench_axis": len(WRENCH_AXES)}
-    return tuple(lengths[dim] for dim in variable.dims)
 
 
 def storable(text: str) -> str:

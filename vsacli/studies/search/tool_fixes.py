@@ -67,10 +67,10 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
         return of_joints
     rule = Acceptance(robot, of_joints.min_margin, RecordedLimits(trajectory))
     candidates = [Fix(0.0, robot, trajectory, asked=trajectory), *of_joints.fixes]
-    chosen, hopeless = _confirmed(Task(rule, trajectory), candidates)
+    chosen, hopeless = _confirmed_fixes(Task(rule, trajectory), candidates)
     if hopeless:
         limited = replace(rule, robot=without_limits(robot, hopeless))
-        chosen, _ = _confirmed(Task(limited, trajectory), candidates)
+        chosen, _ = _confirmed_fixes(Task(limited, trajectory), candidates)
     alone = next((fix.stiffness_factor for fix in chosen if fix.kinds == {"stiffness_factor"}), None)
     causes = (
         replace(finding, fixable=bool(chosen) and not advice, advice=advice)
@@ -85,7 +85,7 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
     )
 
 
-def _confirmed(task: Task, candidates: Sequence[Fix]) -> tuple[list[Fix], dict[str, str]]:
+def _confirmed_fixes(task: Task, candidates: Sequence[Fix]) -> tuple[list[Fix], dict[str, str]]:
     """Return the fixes with factors that a run confirms, and that no simpler one replaces.
 
     Without any, the tools that no factor makes stiff enough, whatever the fix, follow with the reason.
