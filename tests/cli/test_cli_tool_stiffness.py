@@ -1,0 +1,182 @@
+"""The stiffness of tools with motors held: a variable on request, report, limit, flags and fixes."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+from samples.trees import SWING, torso_text
+
+from vsacli import inverse_dynamics, load_robot, load_trajectory, open_result, tip_compliance
+from vsacli.analysis.report import Report
+
+TOOLS = ("left_hand", "right_hand", "lamp")
+ASKED = ("--variables", "all,tip_compliance")
+
+
+@pytest.fixture
+def torso(own_folder):
+    """The paths of the torso and a swing of it; the left hand is pushed where wrenches have a frame."""
+    (own_folder / "torso.yaml").write_text(torso_text())
+    (own_folder / "swing.yaml").write_text(SWING)
+    return "torso.yaml", "swing.yaml"
+
+
+@pytest.fixture
+def rod(own_folder):
+    """An upright rod of 2 kg m on an elastic joint, a chain; it buckles below m g l = 19.62 N m/rad."""
+    (own_folder / "rod.yaml").write_text(
+        "format: vsacli-robot/1\nname: rod\ngravity: [0, -9.81, 0]\njoints:\n"
+        "  - {name: hinge, type: revolute, dh: {a: 1, alpha: 0},\n"
+        "     link: {mass: 2, com: [0, 0, 0], inertia: {xx: 0.1, yy: 0.1, zz: 0.1}},\n"
+        "     actuator: {type: elastic, motor: {inertia: 0.1}, stiffness: 30}}\n"
+    )
+    (own_folder / "lean.yaml").write_text(
+        "format: vsacli-trajectory/1\nname: lean\nduration: 1\nrate: 40\n"
+        "position: {type: polynomial, degree: 7, start: 90 deg, end: 150 deg}\n"
+    )
+    return "rod.yaml", "lean.yaml"
+
+
+def test_compliance_is_computed_when_asked_for(vsacli, torso):
+    outcome = vsacli("invdyn", *torso, *ASKED, "-o", "swing.h5")
+    assert outcome.code == 0
+    assert "smallest stiffness of tools: left_hand" in outcome.out
+    robot = load_robot("torso.yaml")
+    with open_result("swing.h5") as result:
+        assert result.tip_compliance.shape == (41, 3, 6, 6)
+        for index, name in enumerate(TOOLS):
+            expected = tip_compliance(robot, result.q, result.stiffness, name)
+            np.testing.assert_array_equal(result.tip_compliance[:, index], expected)
+            block = expected[:, :3, :3]
+            least = 1 / np.linalg.eigvalsh(block)[:, -1]
+            report = result.report.tools[index]
+            assert (report.name, report.required) == (name, None)
+            assert report.stiffness == pytest.approx(least.min(), rel=1e-12)
+            assert report.time == result.time[least.argmin()]
+            along = block[least.argmin()] @ report.direction * report.stiffness
+            np.testing.assert_allclose(along, report.direction, rtol=0, atol=1e-9)
+        assert not result.tool_flags.any()
+        kept = inverse_dynamics(robot, load_trajectory("swing.yaml", robot), tip_compliance=True)
+        np.testing.assert_array_equal(result.tip_compliance, kept.tip_compliance)
+        kept.save("kept.h5")
+        assert result.to_xarray().identical(kept.to_xarray())
+        assert Report.from_json(result.report.as_json()) == result.report
+    with open_result("kept.h5") as again:
+        assert set(again.variables) == set(result.variables)
+
+
+def test_exports_have_a_column_for_each_entry(vsacli, torso):
+    vsacli("invdyn", *torso, "--variables", "tip_compliance,tool_flags", "-o", "swing.h5")
+    outcome = vsacli("export", "swing.h5", "--variables", "tip_compliance,tool_flags", "-o", "swing.csv")
+    assert outcome.code == 0
+    with open("swing.csv") as lines:
+        header, first = (line.strip().split(",") for line in list(lines)[:2])
+    assert len(header) == 1 + 3 * 36 + 3
+    place = header.index("right_hand.tip_compliance_ry_fx")
+    with open_result("swing.h5") as result:
+        assert float(first[place]) == result.tip_compliance[0, 1, 4, 0]
+    for ending in ("mat", "parquet"):
+        assert (
+            vsacli("export", "swing.h5", "--variables", "tip_compliance", "-o", f"swing.{ending}").code == 0
+        )
+
+
+def test_other_results_do_not_have_it(vsacli, torso):
+    assert "smallest stiffness" not in vsacli("invdyn", *torso, "-o", "swing.h5").out
+    with open_result("swing.h5") as result:
+        assert not {"tip_compliance", "tool_flags"} & {*result.variables}
+        assert "tools" not in result.report.as_json()
+    refused = vsacli("invdyn", *torso, "--variables", "tool_flags", "-o", "flags.h5")
+    assert (refused.code, "no tool of torso has a min_stiffness" in refused.err) == (2, True)
+
+
+def test_a_tool_below_its_limit_is_found_and_fixed(vsacli, torso):
+    limits = {tool.name: tool.stiffness for tool in report_of(torso).tools}
+    robot = yaml.safe_load(torso_text())
+    robot["tools"]["left_hand"]["min_stiffness"] = bound = 1.2 * limits["left_hand"]
+    robot["tools"]["lamp"]["min_stiffness"] = 0.9 * limits["lamp"]
+    with open("torso.yaml", "w") as stream:
+        yaml.safe_dump(robot, stream, sort_keys=False)
+    outcome = vsacli("invdyn", *torso, "-o", "swing.h5")
+    assert outcome.code == 3
+    assert "OVER LIMIT" in outcome.out
+    assert "1 of 3 tools over a limit" in outcome.out
+    assert "left_hand: stiffness in the softest direction is" in outcome.out
+    with open_result("swing.h5") as result:
+        least = 1 / np.linalg.eigvalsh(inverse(torso).tip_compliance[:, 0, :3, :3])[:, -1]
+        np.testing.assert_array_equal(result.tool_flags, np.outer(2 * (least < bound), (1, 0, 0)))
+        finding = result.report.tools[0].worst["tool_stiffness_limit"]
+        assert (finding.time, finding.bound) == (result.time[least.argmin()], bound)
+        assert result.report.as_json()["tools"][0]["samples"]["over_limit"] == (least < bound).sum()
+
+    outcome = vsacli("check-feasibility", *torso, "--write-fix", 1, "-o", "fixed.yaml", "--json")
+    (fix,) = json.loads(outcome.out)["fixes"]["fixes"]
+    (part,) = fix["stiffness_factor"]["factors"]
+    assert part["joints"] == ["waist", "left_shoulder", "left_arm", "left_elbow"]
+    with open("fixed.yaml") as stream:
+        values = yaml.safe_load(stream)["stiffness"]["value"]
+    assert values == pytest.approx([900 * part["factor"]] * 4 + [900] * 4)
+    fixed = report_of(("torso.yaml", "fixed.yaml"))
+    assert fixed.verdict == "ok"
+    assert bound <= fixed.tools[0].stiffness <= 1.001 * bound  # a factor of four digits
+
+
+def test_a_tool_that_no_stiffness_helps_is_left_out_of_fixes(vsacli, torso):
+    limits = ("--set", "tools.left_hand.min_stiffness=1e7", "--set", "tools.lamp.min_stiffness=1.2e5")
+    stiff = ("--set", "joints.left_elbow.limits.stiffness=1000")
+    outcome = vsacli("check-feasibility", *torso, *limits, *stiff, "--fixes")
+    assert outcome.code == 3
+    assert "the most that waist, left_shoulder, left_arm and left_elbow may have" in outcome.out
+    assert "every sample of all joints and tools but left_hand" in outcome.out
+    assert "1. multiply the stiffness of pole by" in outcome.out
+
+
+@pytest.mark.slow
+def test_factors_come_on_top_of_the_fixes_of_joints(vsacli, torso):
+    limit = 1.5 * report_of(torso).tools[2].stiffness
+    soft = ("--set", "stiffness.value=[900, 900, 900, 900, 900, 900, 790, 900]")
+    outcome = vsacli(
+        "check-feasibility", *torso, *soft, "--set", f"tools.lamp.min_stiffness={limit}", "--fixes"
+    )
+    assert outcome.code == 3
+    assert "right_elbow: stiffness is 790 N m/rad" in outcome.out
+    assert "lamp: stiffness in the softest direction is" in outcome.out
+    assert "raise the stiffness of right_elbow" in outcome.out
+    assert ", and multiply the stiffness of pole by" in outcome.out
+
+
+def test_samples_of_infeasible_joints_have_no_compliance(torso):
+    robot = load_robot(torso[0])
+    soft = {"stiffness.value": [900, 900, 900, 900, 900, 900, 790, 900]}
+    result = inverse_dynamics(robot, load_trajectory("swing.yaml", robot, soft), tip_compliance=True)
+    assert np.isnan(result.tip_compliance[:, 1]).all()
+    assert np.isfinite(result.tip_compliance[:, [0, 2]]).all()
+    assert np.isnan(result.report.tools[1].stiffness)
+    assert not result.tool_flags.any()
+
+
+def test_a_pose_that_buckles_is_a_finding(vsacli, rod):
+    outcome = vsacli("invdyn", *rod, *ASKED, "-o", "rod.h5")
+    assert outcome.code == 0
+    soft = ("--set", "joints.hinge.actuator.stiffness=15")
+    outcome = vsacli("invdyn", *rod, *soft, *ASKED, "-o", "soft.h5")
+    assert outcome.code == 3
+    assert "end_effector: its pose is statically unstable at t = 0.000 s" in outcome.out
+    with open_result("soft.h5") as result:
+        unstable = 2 * 9.81 * np.sin(result.q[:, 0]) >= 15
+        np.testing.assert_array_equal(result.tool_flags[:, 0], unstable)
+        np.testing.assert_array_equal(np.isnan(result.tip_compliance[:, 0, 0, 0]), unstable)
+        assert result.report.verdict == "singular"
+    assert vsacli("check-feasibility", *rod, *soft).code == 0  # not asked for
+
+
+def inverse(files):
+    robot = load_robot(files[0])
+    return inverse_dynamics(robot, load_trajectory(files[1], robot), tip_compliance=True)
+
+
+def report_of(files):
+    return inverse(files).report
