@@ -89,7 +89,7 @@ def softest_direction(compliance: FloatArray) -> tuple[FloatArray, FloatArray]:
         both NaN where C is. Where the tool does not yield, the stiffness is infinite, the direction NaN.
     """
     block = compliance[..., :3, :3]
-    known = np.isfinite(block).all(axis=(-2, -1))
+    known: BoolArray = np.isfinite(block).all(axis=(-2, -1))
     values, vectors = np.linalg.eigh(
         np.where(known[..., None, None], block + np.swapaxes(block, -1, -2), 0.0) / 2
     )

@@ -19,6 +19,7 @@ from vsacli.base.variables import (
     MOTOR_CONSTANTS,
     MOTORS,
     OF_ANY_ROBOT,
+    TIP_COMPLIANCE,
     VARIABLES,
     Variable,
     deviation,
@@ -26,6 +27,7 @@ from vsacli.base.variables import (
 )
 from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Legend, Row, Sheet
 from vsacli.results.charts.stored import StoredCharts, compliant_joints
+from vsacli.results.charts.tool_charts import AXES, tool_charts
 from vsacli.results.store.reader import StoredResult
 
 JOINTS_PER_PANEL = 7
@@ -271,10 +273,22 @@ def _simulated_motion(charts: StoredCharts) -> Sheet:
     return Sheet(result_title(first), size, _ROLES, [block])
 
 
+def _tool_stiffness(charts: StoredCharts) -> Sheet:
+    """Return the stiffness of each tool in its softest direction, and below it these directions."""
+    stiffness, *directions = tool_charts(charts.files)
+    tools = {name: index for index, name in enumerate(charts.first.tool_names)}
+    beside: list[Legend] = [tools, *({axis: look for look, axis in enumerate(AXES)} for _ in directions)]
+    rows = [[chart] for chart in (stiffness, *directions)]
+    heights = (GROUP_HEIGHT, *(UTILIZATION * GROUP_HEIGHT for _ in directions))
+    block = Block(charts.first.time, rows, heights, beside=beside)
+    return Sheet(result_title(charts.first), (2 * PANEL_WIDTH + LEGEND_WIDTH, block.height + 1), {}, [block])
+
+
 RESULT_DRAWINGS: dict[str, Drawing] = {
     "motion": Drawing(("q", "stiffness"), _motion),
     **{name: _of_parts(*parts) for name, parts in _PARTS.items()},
     "energy": Drawing(tuple(name for name, _ in _PARTS["energy"]), _energy),
+    "tool-stiffness": Drawing((TIP_COMPLIANCE,), _tool_stiffness),
 }
 """Figures of a result of `invdyn`, by name."""
 

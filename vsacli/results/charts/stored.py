@@ -17,7 +17,15 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.simulation_variables import COMMANDS, SIMULATED, measured
 from vsacli.base.units import WrenchQuantity
-from vsacli.base.variables import MOTORS, VARIABLES, Variable, column_names, deviation
+from vsacli.base.variables import (
+    MOTORS,
+    TIP_COMPLIANCE,
+    TOOL_FLAGS,
+    VARIABLES,
+    Variable,
+    column_names,
+    deviation,
+)
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Band, Chart, Failures, Limit, Line
 from vsacli.results.charts.reduction import (
@@ -29,6 +37,7 @@ from vsacli.results.charts.reduction import (
     read_curves,
     visible_range,
 )
+from vsacli.results.charts.tool_charts import tool_charts
 from vsacli.results.store.reader import StoredResult
 from vsacli.robot.joint import existing_columns
 
@@ -300,6 +309,8 @@ class StoredCharts:
     def charts_of(self, name: str) -> list[Chart]:
         """Return all charts of a variable: by motor and type of joint, of simulations with the command."""
         variable = self.first.declared[name]
+        if name in (TIP_COMPLIANCE, TOOL_FLAGS):
+            return list(tool_charts(self.files)) if name == TIP_COMPLIANCE else []
         if "joint" not in variable.dims:
             return list(self._of_wrench(variable))
         columns = list(self._columns(variable))

@@ -14,7 +14,7 @@ import numpy as np
 
 from vsacli.base.arrays import FLAG_TYPE, evenly
 from vsacli.base.errors import InputError
-from vsacli.base.flags import LIMITS, Flag, has_flag
+from vsacli.base.flags import FLAG_BITS, LIMITS, Flag, has_flag
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.simulation_variables import ERRORS, SIMULATED_NAMES, error
 from vsacli.base.tables import ReportText
@@ -138,7 +138,7 @@ def sections_of(variables: Collection[str]) -> Iterator[Section]:
 
     Standard deviations and bounds of the stiffness are drawn with their variable, flags as time intervals.
     """
-    with_others = {"flags", *BOUNDS, *map(deviation, variables)}
+    with_others = {*FLAG_BITS, *BOUNDS, *map(deviation, variables)}
     own = dict.fromkeys(SIMULATED_NAMES.get(name, name) for name in variables if name not in with_others)
     for section in SECTIONS:
         names = tuple(name for name in section.names if name in own)

@@ -62,6 +62,9 @@ OF_ROBOT = "inputs/robot"
 OF_JOINTS = f"{OF_ROBOT}/joints/{{}}"
 """Dataset of a parameter of all joints: path in the robot file with underscores in place of dots."""
 
+OF_MIN_STIFFNESS = f"{OF_ROBOT}/tools/min_stiffness"
+"""Dataset of the limits of the tools."""
+
 BLOCK_SAMPLES = 8192
 """Number of samples read at a time to check a file."""
 
@@ -244,6 +247,18 @@ class StoredResult(StoredFile):
             bounds = np.full((len(self.actuators), 1, 2), np.nan)
             if name in RANGES and OF_JOINTS.format(RANGES[name]) in self._file:
                 bounds[:, 0] = self._dataset(OF_JOINTS.format(RANGES[name]))[...]
+        return bounds
+
+    def min_stiffness(self) -> FloatArray:
+        """Return the smallest stiffness that each tool may have, (tools,), N/m; NaN without this limit.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        bounds = np.full(len(self.tool_names), np.nan)
+        if OF_MIN_STIFFNESS in self._file:
+            with reporting_damage(self.path):
+                bounds[:] = self._dataset(OF_MIN_STIFFNESS)[...]
         return bounds
 
     def geometry(self) -> StoredGeometry:
