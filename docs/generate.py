@@ -28,7 +28,7 @@ from vsacli.actuators.kinds import ACTUATORS
 from vsacli.actuators.laws import LAWS
 from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.serial import Serial
-from vsacli.base.flags import Flag
+from vsacli.base.flags import FLAG_BITS
 from vsacli.base.renamed import RENAMINGS
 from vsacli.base.signals import COMMANDED, POSITION
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
@@ -192,10 +192,11 @@ def _variables(declared: Mapping[str, Variable]) -> str:
     )
 
 
-def flags() -> str:
-    """Bits of the variable `flags`."""
+def flags(variable: str = "flags") -> str:
+    """Bits of a variable of flags."""
     return table(
-        ("bit", "name", "meaning"), ((str(flag.value), f"`{flag.label}`", flag.meaning) for flag in Flag)
+        ("bit", "name", "meaning"),
+        ((str(flag.value), f"`{flag.label}`", flag.meaning) for flag in FLAG_BITS[variable]),
     )
 
 
@@ -305,6 +306,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "public-names": public_names,
     "variables": variables,
     "flags": flags,
+    "tool-flags": lambda: flags("tool_flags"),
     "renamings": renamings,
     **{f"commands/{name}": page for name, page in command_pages().items()},
 }

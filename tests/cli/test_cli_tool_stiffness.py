@@ -9,8 +9,16 @@ import pytest
 import yaml
 from samples.trees import SWING, torso_text
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory, open_result, tip_compliance
+from vsacli import (
+    forward_kinematics,
+    inverse_dynamics,
+    load_robot,
+    load_trajectory,
+    open_result,
+    tip_compliance,
+)
 from vsacli.analysis.report import Report
+from vsacli.results.charts.tool_path import LARGEST_ELLIPSE, tool_path
 
 TOOLS = ("left_hand", "right_hand", "lamp")
 ASKED = ("--variables", "all,tip_compliance")
@@ -180,3 +188,39 @@ def inverse(files):
 
 def report_of(files):
     return inverse(files).report
+
+
+def test_figures_show_stiffness_and_path_of_tools(vsacli, torso):
+    names = ["motion", "motor-torque", "elastic-torque", "energy", "tool-stiffness", "tool-path"]
+    outcome = vsacli("invdyn", *torso, *ASKED, "-o", "swing.h5", "--plot", "drawn")
+    assert outcome.err.split() == [
+        "wrote",
+        "swing.h5",
+        *(word for name in names for word in ("wrote", f"drawn/swing-{name}.png")),
+    ]
+    with open_result("swing.h5") as result:
+        figures = result.plot()
+    lines = {line.get_label(): line for line in figures["tool-stiffness"].axes[0].lines}
+    assert list(figures) == names
+    assert [axes.get_title(loc="left") for axes in figures["tool-stiffness"].axes] == [
+        "stiffness in the softest direction",
+        *(f"softest direction of {tool}" for tool in TOOLS),
+    ]
+    assert lines
+    of_elbow = vsacli("plot", "swing.h5", "--joints", "left_elbow", "-o", "elbow")
+    assert "tool" not in of_elbow.err
+    assert vsacli("plot", "swing.h5", "--variables", "tip_compliance", "-o", "elbow").code == 2
+
+
+def test_ellipses_are_displacements_by_a_force(torso):
+    result = inverse(torso)
+    result.save("swing.h5")
+    with open_result("swing.h5") as stored:
+        path = tool_path(stored, "swing")
+    force = path.force / np.array([1, 2, 5])
+    assert np.any(np.log10(force) == np.round(np.log10(force)))
+    np.testing.assert_allclose(path.displacements[1, 0], path.force * result.tip_compliance[0, 1, :3, :3])
+    largest = np.linalg.norm(path.displacements, ord=2, axis=(-2, -1)).max() / path.size
+    assert LARGEST_ELLIPSE / 2.5 < largest <= LARGEST_ELLIPSE
+    poses = forward_kinematics(load_robot("torso.yaml"), result.q)
+    np.testing.assert_allclose(path.paths["lamp"], poses[:, -1, :3, 3], rtol=0, atol=1e-15)

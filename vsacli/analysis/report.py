@@ -79,7 +79,7 @@ class Report(Stored):
         """Verdict: the worst of `VERDICTS` that applies."""
         if not self.self_check.passed:
             return VERDICTS[-1]
-        places = (*self.joints, *self.tools)
+        places: tuple[JointReport | ToolReport, ...] = (*self.joints, *self.tools)
         applies = (each for each in reversed(VERDICTS) if any(place.shows(each) for place in places))
         return next(applies, "ok")
 

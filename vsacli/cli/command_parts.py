@@ -44,13 +44,13 @@ def words_of(example: str) -> Callable[..., tuple[str, ...] | None]:
     return words
 
 
-def variables_option(default: str) -> Callable[[Any], Any]:
-    """Return the option `--variables`; the help text gives `default` as its default."""
+def variables_option(default: str, further: str = "") -> Callable[[Any], Any]:
+    """Return the option `--variables`; its help gives `default` as its default, and a `further` clause."""
     return click.option(
         "--variables",
         metavar="NAMES",
         callback=words_of("tau_motor,flags"),
-        help="Write only these variables, e.g. tau_motor,flags.",
+        help=f"Write only these variables, e.g. tau_motor,flags{further}.",
         show_default=default,
     )
 

@@ -89,10 +89,9 @@ def softest_direction(compliance: FloatArray) -> tuple[FloatArray, FloatArray]:
         both NaN where C is. Where the tool does not yield, the stiffness is infinite, the direction NaN.
     """
     block = compliance[..., :3, :3]
-    known: BoolArray = np.isfinite(block).all(axis=(-2, -1))
-    values, vectors = np.linalg.eigh(
-        np.where(known[..., None, None], block + np.swapaxes(block, -1, -2), 0.0) / 2
-    )
+    known: BoolArray = np.isfinite(np.sum(block, axis=(-2, -1)))
+    symmetric: FloatArray = np.where(known[..., None, None], block + np.swapaxes(block, -1, -2), 0.0) / 2
+    values, vectors = np.linalg.eigh(symmetric)
     largest, direction = values[..., -1], vectors[..., -1]
     yields = known & (largest > 0)
     stiffness = np.divide(1.0, largest, out=np.where(known, np.inf, np.nan), where=yields)

@@ -175,7 +175,7 @@ def arm_chart(robot: Robot) -> ArmChart:
     drawn = np.concatenate((corners, centers))
     middle = (drawn.max(axis=0) + drawn.min(axis=0)) / 2
     title = f"{robot.name}: arm at {_configuration(robot, q)}"
-    views = _views(down, extents, size)
+    views = views_of(down, extents, size)
     size = max(size, float(np.ptp(drawn, axis=0).max()))
     tools = robot.tool_names if len(robot.tool_names) > 1 else ()
     return ArmChart(title, robot.joints, q, tools, points, lines, centers, down, size, length, middle, views)
@@ -214,7 +214,7 @@ def _centers(points: ArmPoints, length: float) -> FloatArray:
     return centers
 
 
-def _views(down: FloatArray, extents: FloatArray, size: float) -> tuple[View, ...]:
+def views_of(down: FloatArray, extents: FloatArray, size: float) -> tuple[View, ...]:
     """Return an isometric view, a side view, and a top view of an arm that is not flat.
 
     Their axes are those of the base frame: up is the one most opposite to gravity, and the longer extent of

@@ -28,6 +28,7 @@ from vsacli.base.variables import (
 from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Legend, Row, Sheet
 from vsacli.results.charts.stored import StoredCharts, compliant_joints
 from vsacli.results.charts.tool_charts import AXES, tool_charts
+from vsacli.results.charts.tool_path import ToolPath, tool_path
 from vsacli.results.store.reader import StoredResult
 
 JOINTS_PER_PANEL = 7
@@ -59,10 +60,10 @@ motor."""
 
 
 class Drawing(NamedTuple):
-    """A figure: the variables that it needs, and the function that declares its sheet."""
+    """A figure: the variables that it needs, and the function that declares its sheet, or a path of tools."""
 
     needs: tuple[str, ...]
-    sheet: Callable[[StoredCharts], Sheet]
+    sheet: Callable[[StoredCharts], Sheet | ToolPath]
 
 
 def panel_groups(joint_types: Sequence[str]) -> list[list[int]]:
@@ -289,6 +290,9 @@ RESULT_DRAWINGS: dict[str, Drawing] = {
     **{name: _of_parts(*parts) for name, parts in _PARTS.items()},
     "energy": Drawing(tuple(name for name, _ in _PARTS["energy"]), _energy),
     "tool-stiffness": Drawing((TIP_COMPLIANCE,), _tool_stiffness),
+    "tool-path": Drawing(
+        (TIP_COMPLIANCE, "q"), lambda charts: tool_path(charts.first, result_title(charts.first))
+    ),
 }
 """Figures of a result of `invdyn`, by name."""
 
@@ -362,7 +366,9 @@ def chosen_figures(stored: StoredResult, variables: Sequence[str] | None) -> lis
     return [variable.name for variable in drawable_variables(stored, variables)]
 
 
-def sheets_of(stored: StoredResult, variables: Sequence[str] | None = None) -> Iterator[tuple[str, Sheet]]:
+def sheets_of(
+    stored: StoredResult, variables: Sequence[str] | None = None
+) -> Iterator[tuple[str, Sheet | ToolPath]]:
     """Yield the chosen figures by name; each is declared only when needed, since its curves take memory."""
     charts, drawings = StoredCharts([stored]), drawings_of(stored)
     for name in chosen_figures(stored, variables):

@@ -22,6 +22,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.results.charts.arm_chart import ROOM, ArmChart, View
 from vsacli.results.charts.chart import PANEL_WIDTH
 from vsacli.results.charts.look import current_look
+from vsacli.results.charts.tool_path import ToolPath
 from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.long_texts import POINTS_PER_INCH
 from vsacli.results.plots.panels import add_title
@@ -88,15 +89,15 @@ def arm_figure(chart: ArmChart) -> Figure:
 
     columns = columns_of_panels(len(widths), natural, NARROWEST_VIEW * sum(widths) / len(widths))
     with new_figure(natural(columns)) as figure:
-        panels = _panels(figure, widths, stacked=columns < len(widths))
+        panels = panels_of_views(figure, widths, stacked=columns < len(widths))
         for axes, view in zip(panels, chart.views, strict=True):
-            _frame_panel(axes, chart, view, named=view is chart.views[0])
+            frame_view(axes, chart, view, named=view is chart.views[0])
             _draw_arm(axes, chart, view)
         _name_joints(panels[0], chart, chart.views[0])
         return complete(figure, chart.title, _handles(chart))
 
 
-def _panels(figure: Figure, widths: Sequence[float], *, stacked: bool) -> list[Axes]:
+def panels_of_views(figure: Figure, widths: Sequence[float], *, stacked: bool) -> list[Axes]:
     """Return panels of these widths side by side, or the first one above the others."""
     if not stacked:
         return list(figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0])
@@ -105,7 +106,7 @@ def _panels(figure: Figure, widths: Sequence[float], *, stacked: bool) -> list[A
     return [first, *(figure.add_subplot(places[1, column]) for column in range(len(widths) - 1))]
 
 
-def _frame_panel(axes: Axes, chart: ArmChart, view: View, *, named: bool) -> None:
+def frame_view(axes: Axes, chart: ArmChart | ToolPath, view: View, *, named: bool = False) -> None:
     """Set limits of equal scale, and labels and ticks where lengths are not foreshortened."""
     half = ROOM / 2 * chart.size
     x, y = view.project(chart.middle)

@@ -19,6 +19,7 @@ from vsacli.results.charts.comparison import comparison_sheets
 from vsacli.results.charts.figures import sheets_of
 from vsacli.results.plots.sheets import drawn
 from vsacli.results.plots.styles import house_style
+from vsacli.results.plots.tool_path_figure import tool_path_figure
 from vsacli.results.store.reader import StoredResult
 
 Figures: TypeAlias = dict[str, Figure]
@@ -46,8 +47,8 @@ _METADATA: dict[str, dict[str, str | None]] = {
 def draw_stored(stored: StoredResult, variables: Sequence[str] | None = None) -> Iterator[tuple[str, Figure]]:
     """Draw the figures of `plot_stored` lazily, since those of many joints are large."""
     for name, sheet in sheets_of(stored, variables):
-        figure = drawn(sheet)
-        large = np.prod(sheet.size) > LARGE
+        figure = drawn(sheet) if isinstance(sheet, Sheet) else tool_path_figure(sheet)
+        large = np.prod(figure.get_size_inches()) > LARGE
         yield name, figure
         del figure, sheet  # frees memory before the next one is drawn
         if large:

@@ -75,6 +75,8 @@ class Excerpt(StoredResult):
 
     def has_variable(self, variable: Variable) -> bool:
         """Return whether these joints have the variable, as far as that depends on the robot file."""
+        if "tool" in variable.dims:  # tools are moved by all joints
+            return len(self._joints) == len(self._original.joint_names) and super().has_variable(variable)
         one_of_them = variable.requires in OF_ANY_ROBOT or bool(self.existing(variable).any())
         return one_of_them and super().has_variable(variable)
 

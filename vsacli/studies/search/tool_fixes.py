@@ -111,8 +111,8 @@ class _HeldRun:
         blocks = [(block.q, block.stiffness, block.wrench) for block in run]
         q, stiffness, wrench = zip(*blocks, strict=True)
         self._q, self._stiffness = np.concatenate(q), np.concatenate(stiffness)
-        frame = None if trajectory.wrench is None else trajectory.wrench.frame
-        self._wrench = None if frame is None else Wrench.constant(np.concatenate(wrench), frame)
+        self._frame = None if trajectory.wrench is None else trajectory.wrench.frame
+        self._components = None if self._frame is None else np.concatenate(wrench)
         self.findings = [worst for tool in run.report().tools for worst in tool.worst.values()]
 
     def least_stiffness(self, tool: int, scales: FloatArray) -> float:
@@ -120,7 +120,9 @@ class _HeldRun:
         least, samples = math.inf, usual_block(len(self._robot.joints))
         for start in range(0, len(self._q), samples):
             part = slice(start, start + samples)
-            wrench = self._wrench and self._wrench.mapped(lambda array, _, part=part: array[part])
+            wrench = None
+            if self._frame is not None and self._components is not None:
+                wrench = Wrench.constant(self._components[part], self._frame)
             pose = HeldPose(self._robot, self._q[part], scales * self._stiffness[part], wrench)
             stiffness, _ = softest_direction(pose.compliance(tool)[0])
             least = min(least, float(np.nan_to_num(stiffness, nan=0.0, posinf=np.inf).min()))
