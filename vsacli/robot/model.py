@@ -115,7 +115,7 @@ class Robot(DeclaredRecord):
 
     def _joint_rows(self) -> list[tuple[str, ...]]:
         joints = [(joint.name, joint.type, joint.actuator_type) for joint in self.joints]
-        rows = [("joint", "type", "actuator"), *joints]
+        rows: list[tuple[str, ...]] = [("joint", "type", "actuator"), *joints]
         if self.is_plain_chain:
             return rows
         carriers = [FRAME_0 if parent < 0 else self.joint_names[parent] for parent in self.parents]

@@ -301,7 +301,7 @@ class StoredCharts:
         """Return all charts of a variable: by motor and type of joint, of simulations with the command."""
         variable = self.first.declared[name]
         if "joint" not in variable.dims:
-            return list(self._of_wrench(variable))
+            return list(self._of_wrench(variable)) if isinstance(variable.quantity, WrenchQuantity) else []
         columns = list(self._columns(variable))
         if name == "stiffness" and set(BOUNDS) <= set(self.common) and len(self.files) == 1:
             return [replace(each, title=f"{variable.long_name}, {each.title}") for each in self.corridors()]

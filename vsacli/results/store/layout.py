@@ -34,6 +34,7 @@ from vsacli.results.store.schema import (
     DOUBLE,
     EXISTING,
     TEXT,
+    holds_flags,
     storable,
     storage_type,
     unit_attributes,
@@ -186,7 +187,7 @@ def _create_variable(
         maxshape=(samples, *row),
         dtype=storage_type(variable, precision),
         chunks=(chunk_rows(samples, row_bytes(variable, robot.labels, precision)), *row),
-        compression=GZIP_LEVEL if variable.name == "flags" else None,
+        compression=GZIP_LEVEL if holds_flags(variable) else None,
         track_order=True,
     )
     dataset.attrs.update(variable_attributes(variable, robot.joint_types))

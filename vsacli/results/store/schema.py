@@ -49,15 +49,20 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
     attributes |= {"long_name": variable.long_name, "equation": variable.equation}
     if "joint" in variable.dims:
         attributes["coordinates"] = "joint_type"
-    if variable.name == "flags":
+    if holds_flags(variable):
         attributes["flag_masks"] = np.array([int(flag) for flag in Flag], dtype=FLAG_TYPE)
         attributes["flag_meanings"] = " ".join(flag.label for flag in Flag)
     return attributes
 
 
+def holds_flags(variable: Variable) -> bool:
+    """Return whether the values of a variable are flags: integers, of which each bit is a finding."""
+    return variable.name.endswith("flags")
+
+
 def storage_type(variable: Variable, precision: str = DOUBLE) -> np.dtype[Any]:
     """Return the little-endian type of a variable in a file of some precision; times are always double."""
-    if variable.name == "flags":
+    if holds_flags(variable):
         return np.dtype(FLAG_TYPE).newbyteorder("<")
     return FLOATS[precision if variable.dims else DOUBLE]
 
