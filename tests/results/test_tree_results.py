@@ -5,20 +5,25 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 import scipy.io
 import xarray
+from samples.results import REPORT, PlannedTrajectory, robot
 from samples.trees import FRAMES, hand_text, torso_result, written
 
 from vsacli import InputError, Pose, Result, load_robot, open_result
+from vsacli.base.outputs import Outputs
+from vsacli.base.units import DIMENSIONLESS
 from vsacli.base.variables import VARIABLES, Variable, column_names, row_shape
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.results.charts.stored import StoredCharts
 from vsacli.results.store.excerpt import Excerpt
-from vsacli.results.store.reader import open_stored
+from vsacli.results.store.reader import StoredResult, open_stored
+from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.kinematics import Geometry, frames_in_base
 
 TOOLS = ("left_hand", "right_hand", "lamp")
@@ -139,6 +144,56 @@ def test_a_tool_of_a_chain_needs_no_dimension(tmp_path):
     robot = load_robot(written(tmp_path, hand_text(fingers=1)))
     assert robot.labels["tool"] == ("tip_0",)
     assert not robot.is_plain_chain
+
+
+COMPLIANCE = Variable(
+    "tip_compliance", ("tool", "displacement_axis", "wrench_axis"), DIMENSIONLESS, "compliance", "test"
+)
+TOOL_FLAGS = Variable("tool_flags", ("tool",), DIMENSIONLESS, "flags of tools", "test")
+FURTHER = {**VARIABLES, "tip_compliance": COMPLIANCE, "tool_flags": TOOL_FLAGS}
+"""Variables with declarations that have a dimension of tools for any robot."""
+
+
+class FurtherWriter(ResultWriter):
+    """A writer of results with these variables."""
+
+    _declared = FURTHER
+
+
+@pytest.mark.parametrize("shape", ["tree", "chain"])
+def test_variables_of_tools_are_stored_and_exported(result, tmp_path, monkeypatch, vsacli, shape):
+    monkeypatch.setattr(StoredResult, "declared", FURTHER)
+    of = robot() if shape == "chain" else result.robot
+    tools, rng = len(of.tool_names), np.random.default_rng(1)
+    compliance = rng.normal(size=(5, tools, 6, 6))
+    flags = rng.integers(0, 4, (5, tools)).astype(np.uint32)
+    samples = SimpleNamespace(time=np.arange(5.0), tip_compliance=compliance, tool_flags=flags)
+    with (
+        Outputs() as outputs,
+        FurtherWriter(
+            outputs.file(tmp_path / "further.h5"), of, PlannedTrajectory(5), ("tip_compliance", "tool_flags")
+        ) as writer,
+    ):
+        writer.write(samples)
+        writer.finish(REPORT)
+    with open_stored(tmp_path / "further.h5") as stored:
+        stored.check()
+        assert np.array_equal(stored.read("tip_compliance"), compliance)
+        assert np.array_equal(stored.read("tool_flags"), flags)
+        assert stored.tool_names == (("end_effector",) if shape == "chain" else TOOLS)
+        assert stored.attributes["format"] == f"vsacli-result/{2 if shape == 'chain' else 3}"
+    assert vsacli("export", "further.h5", "--variables", "tip_compliance,tool_flags", "-o", "f.csv").code == 0
+    with open("f.csv", newline="") as file:
+        header, first, *_ = csv.reader(file)
+    assert header[1] == f"{of.tool_names[0]}.tip_compliance_x_fx"
+    assert header[-1] == f"{of.tool_names[-1]}.tool_flags"
+    assert [float(value) for value in first[1:-tools]] == compliance[0].ravel().tolist()
+    assert vsacli("export", "further.h5", "--variables", "tip_compliance", "-o", "f.mat").code == 0
+    exported = scipy.io.loadmat("f.mat")
+    assert np.array_equal(exported["tip_compliance"], compliance)
+    assert exported["units"]["tip_compliance"][0, 0].shape == (tools, 6, 6)
+    described = json.loads(vsacli("info", "further.h5", "--json").out)["variables"]
+    assert described[0]["dims"] == ["time", "tool", "displacement_axis", "wrench_axis"]
 
 
 def test_variables_with_any_dimensions():

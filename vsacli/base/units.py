@@ -21,6 +21,10 @@ class Quantity:
         """Return the unit at a joint, or along an axis of a wrench."""
         return self.unit(joint_types[index])
 
+    def of_axis(self, _column: int) -> str:
+        """Return the unit of a column of a variable that is not one of joints."""
+        return self.revolute
+
     def inside(self, variant: str | None) -> Quantity:
         """Return the quantity in a record with a unit variant of its own; None is that of the joint."""
         return self if variant is None else constant(self.unit(variant))
@@ -50,9 +54,9 @@ class WrenchQuantity(Quantity):
         """See `Quantity.of_component`."""
         return self.of_axis(index)
 
-    def of_axis(self, axis: int) -> str:
-        """Return the unit of a component: three forces, then three moments, for each tool in turn."""
-        return self.prismatic if axis % 6 < 3 else self.revolute
+    def of_axis(self, column: int) -> str:
+        """Return the unit of a component: three forces, then three moments, of each tool in turn."""
+        return self.prismatic if column % 6 < 3 else self.revolute
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -66,10 +70,10 @@ class WrenchQuantity(Quantity):
 class ComplianceQuantity(WrenchQuantity):
     """A compliance: translation and rotation, each per force and moment, in the order of its 36 entries."""
 
-    def of_axis(self, axis: int) -> str:
+    def of_axis(self, column: int) -> str:
         """Return the unit of an entry, row by row."""
-        row, column = divmod(axis % 36, 6)
-        displacement, wrench = "m" if row < 3 else "rad", "N" if column < 3 else "(N m)"
+        row, axis = divmod(column % 36, 6)
+        displacement, wrench = "m" if row < 3 else "rad", "N" if axis < 3 else "(N m)"
         return f"{displacement}/{wrench}"
 
     @property

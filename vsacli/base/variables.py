@@ -254,9 +254,9 @@ class Block:
     """Variables over consecutive samples, as attributes of shape (samples, joints[, 2]).
 
     A value that cannot be computed is NaN, and `flags` gives the reason; a variable that the joint's actuator
-    does not have is NaN throughout. Missing variables are None: the wrench, (samples, 6), of a trajectory
-    without one; `motor_energy`, an integral over all earlier samples, and standard deviations until the block
-    has its place in a run; standard deviations if no signal was recorded.
+    does not have is NaN throughout. Missing variables are None: the wrench, (samples, 6 tools), of a
+    trajectory without one; `motor_energy`, an integral over all earlier samples, and standard deviations
+    until the block has its place in a run; standard deviations if no signal was recorded.
 
     Attributes:
         declared: variables that a block may have, by name.

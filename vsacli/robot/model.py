@@ -123,8 +123,18 @@ class Robot(DeclaredRecord):
         return html_table(f"Robot {self.name}", self._joint_rows())
 
     def _joint_rows(self) -> list[tuple[str, ...]]:
-        joints = ((joint.name, joint.type, joint.actuator_type) for joint in self.joints)
-        return [("joint", "type", "actuator"), *joints]
+        joints = [(joint.name, joint.type, joint.actuator_type) for joint in self.joints]
+        rows: list[tuple[str, ...]] = [("joint", "type", "actuator"), *joints]
+        if self.is_plain_chain:
+            return rows
+        carriers = [FRAME_0 if parent < 0 else self.joint_names[parent] for parent in self.parents]
+        tools = [
+            ", ".join(tool.name for tool in self.end_effectors if tool.joint == name) or "-"
+            for name in self.joint_names
+        ]
+        return [
+            (*row, *further) for row, *further in zip(rows, ["on", *carriers], ["tools", *tools], strict=True)
+        ]
 
     def replace(self, path: str | Mapping[str, Any], value: Any = None) -> Self:
         """Return a robot with another value at a path; the original is unchanged.

@@ -204,7 +204,7 @@ def _centers(points: ArmPoints, length: float) -> FloatArray:
     """
     seats, elbows, axes = points.seats[0], points.elbows[0], points.axes[0]
     far = np.linalg.norm(elbows - seats, axis=1) > 2 * length
-    centers = np.where(far[:, None], (seats + elbows) / 2, seats)
+    centers: FloatArray = np.where(far[:, None], (seats + elbows) / 2, seats)
     for index in range(1, len(centers)):
         near = np.flatnonzero(np.linalg.norm(centers[:index] - centers[index], axis=1) < length)
         if near.tolist() == [0]:

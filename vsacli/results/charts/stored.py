@@ -312,7 +312,7 @@ class StoredCharts:
         if name in (TIP_COMPLIANCE, TOOL_FLAGS):
             return list(tool_charts(self.files)) if name == TIP_COMPLIANCE else []
         if "joint" not in variable.dims:
-            return list(self._of_wrench(variable))
+            return list(self._of_wrench(variable)) if isinstance(variable.quantity, WrenchQuantity) else []
         columns = list(self._columns(variable))
         if name == "stiffness" and set(BOUNDS) <= set(self.common) and len(self.files) == 1:
             return [replace(each, title=f"{variable.long_name}, {each.title}") for each in self.corridors()]

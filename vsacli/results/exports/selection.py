@@ -14,7 +14,7 @@ import numpy.typing as npt
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import joined
-from vsacli.base.units import WrenchQuantity, time_text
+from vsacli.base.units import time_text
 from vsacli.base.variables import VARIABLES, Labels, Variable, column_names, select_variables
 from vsacli.results.store.reader import StoredResult
 
@@ -69,12 +69,10 @@ class Chosen:
         return compress(column_names(self.variable, labels), self.there.flat)
 
     def units(self, joint_types: Iterable[str]) -> list[str]:
-        """Return the unit at each joint, or of each column of a variable of tools."""
+        """Return the unit at each joint, or of each column of another variable."""
         quantity = self.variable.quantity
-        if isinstance(quantity, WrenchQuantity):
-            return [quantity.of_axis(column) for column in range(len(self.there))]
         if "joint" not in self.variable.dims:
-            return [str(quantity)] * len(self.there)
+            return [quantity.of_axis(column) for column in range(len(self.there))]
         return [quantity.unit("revolute" if self.on_shaft else each) for each in joint_types]
 
     def of_columns(self, values: FloatArray | FlagArray) -> npt.NDArray[Any]:

@@ -118,7 +118,8 @@ def result_page(
             for name in section.names:
                 drawn += [packed.chart(chart, start) for chart in charts.charts_of(name)]
                 bar.update(1)
-            sections.append({"heading": section.heading, "shown": section.shown, "charts": drawn})
+            if drawn:
+                sections.append({"heading": section.heading, "shown": section.shown, "charts": drawn})
     joints = zip(files[0].joint_names, files[0].joint_types, strict=True)
     data = {
         "kind": "over time",

@@ -228,7 +228,7 @@ def _draw_arrow(
     if np.linalg.norm(tip - tail) <= SHORTEST_ARROW * np.linalg.norm(arrow):
         return
     drawn = axes.annotate("", tuple(tip), tuple(tail), arrowprops=_ARROW, zorder=5)
-    drawn.set_fontsize(share * drawn.get_fontsize())  # the size of its head
+    drawn.set_fontsize(share * float(drawn.get_fontsize()))  # the size of its head
     x, y = tail + 1.25 * (tip - tail)
     size = current_look().points(ARROW_SIZE * share**0.5)
     axes.text(x, y, name, fontsize=size, ha="center", va="center", zorder=5)
