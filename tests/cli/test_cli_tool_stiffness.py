@@ -18,7 +18,7 @@ from vsacli import (
     tip_compliance,
 )
 from vsacli.analysis.report import Report
-from vsacli.results.charts.tool_path import LARGEST_ELLIPSE, tool_path
+from vsacli.results.charts.tool_charts import LARGEST_ELLIPSE, tool_path
 
 TOOLS = ("left_hand", "right_hand", "lamp")
 ASKED = ("--variables", "all,tip_compliance")

@@ -108,7 +108,7 @@ class Run:
         self._summaries = [JointSummary(joint, index) for index, joint in enumerate(robot.joints)]
         self._drifts = _drift_summaries(robot, self._dynamics.deflections)
         self._energy = RunEnergy(robot, self.choice.engine)
-        self._tools = _tool_stiffness(robot, trajectory, asked)
+        self._tools = _prepare_tools(robot, trajectory, asked)
         self._samples = 0
         self._stopped = False
 
@@ -297,7 +297,7 @@ def inverse_dynamics(
     return Result(**_concatenate_blocks(list(run)), report=run.report(), robot=robot, trajectory=trajectory)
 
 
-def _tool_stiffness(robot: Robot, trajectory: Trajectory, asked: Collection[str]) -> ToolStiffness | None:
+def _prepare_tools(robot: Robot, trajectory: Trajectory, asked: Collection[str]) -> ToolStiffness | None:
     """Return the compliance of the tools along the run; None if neither a request nor a limit needs it."""
     stored = TIP_COMPLIANCE in asked
     if not stored and not any(tool.min_stiffness for tool in robot.tools):

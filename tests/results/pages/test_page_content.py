@@ -19,6 +19,7 @@ from samples.marks import slow_but
 from samples.pages import Page
 from samples.wicked import TEXTS, clean
 
+from vsacli.base.flags import FLAG_BITS
 from vsacli.base.simulation_variables import SIMULATED_NAMES, SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES
 from vsacli.cli.main import run
@@ -114,7 +115,7 @@ def test_every_variable_has_a_place_on_pages() -> None:
         names = [name for section in sections_of(list(declared)) for name in section.names]
         assert len(names) == len(set(names))
         own = {SIMULATED_NAMES.get(name, name) for name in declared if not name.endswith("_std")}
-        assert set(names) == own - {"flags", *BOUNDS}
+        assert set(names) == own - {*FLAG_BITS, *BOUNDS}
 
 
 def test_stiffness_is_drawn_inside_what_can_be_reached(page: Page, feasible_result: Path) -> None:

@@ -27,8 +27,7 @@ from vsacli.base.variables import (
 )
 from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Legend, Row, Sheet
 from vsacli.results.charts.stored import StoredCharts, compliant_joints
-from vsacli.results.charts.tool_charts import AXES, tool_charts
-from vsacli.results.charts.tool_path import ToolPath, tool_path
+from vsacli.results.charts.tool_charts import AXES, ToolPath, tool_charts, tool_path
 from vsacli.results.store.reader import StoredResult
 
 JOINTS_PER_PANEL = 7

@@ -20,7 +20,6 @@ from vsacli.base.units import WrenchQuantity
 from vsacli.base.variables import (
     MOTORS,
     TIP_COMPLIANCE,
-    TOOL_FLAGS,
     VARIABLES,
     Variable,
     column_names,
@@ -309,8 +308,8 @@ class StoredCharts:
     def charts_of(self, name: str) -> list[Chart]:
         """Return all charts of a variable: by motor and type of joint, of simulations with the command."""
         variable = self.first.declared[name]
-        if name in (TIP_COMPLIANCE, TOOL_FLAGS):
-            return list(tool_charts(self.files)) if name == TIP_COMPLIANCE else []
+        if name == TIP_COMPLIANCE:
+            return list(tool_charts(self.files))
         if "joint" not in variable.dims:
             return list(self._of_wrench(variable)) if isinstance(variable.quantity, WrenchQuantity) else []
         columns = list(self._columns(variable))

@@ -1,20 +1,29 @@
-"""Charts of the stiffness of tools in their softest directions over time, and of these directions."""
+"""Charts of the compliance of tools: stiffness and softest direction over time, ellipses along the path."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.units import DIMENSIONLESS, LINEAR_STIFFNESS
 from vsacli.base.variables import TIP_COMPLIANCE
+from vsacli.results.charts.arm_chart import SMALLEST_SIZE, ArmPoints, View, direction_of, views_of
 from vsacli.results.charts.chart import Chart, Limit, Line
 from vsacli.results.charts.reduction import read_curves
 from vsacli.results.store.reader import StoredResult
 from vsacli.robot.compliance import softest_direction
 
 AXES = ("x", "y", "z")
+
+POINTS, ELLIPSES = 400, 7
+"""Number of points of a path, and of ellipses along it."""
+
+LARGEST_ELLIPSE = 0.1
+"""Largest semi-axis of an ellipse at most, relative to the size of the drawing."""
 
 
 class _SoftestDirections:
@@ -53,3 +62,70 @@ def tool_charts(files: Sequence[StoredResult]) -> Iterator[Chart]:
         ]
         words = f"softest direction of {name}"
         yield Chart(words, DIMENSIONLESS.unit(""), lines, "direction", TIP_COMPLIANCE, shown=(-1.05, 1.05))
+
+
+class ToolPath(NamedTuple):
+    """Paths of tools in the base frame, m.
+
+    Attributes:
+        title: title of the figure.
+        links: corners of the links at the start and at the end, (corners, 3) each.
+        paths: origins of each tool over time, (points, 3), by name.
+        displacements: matrices from unit vectors of force to the displacement by a force of `force`,
+            (tools, ellipses, 3, 3); NaN where there is no compliance.
+        places: origins of the tools there, (tools, ellipses, 3).
+        force: force, N.
+        size: size of the drawing.
+        middle: middle of the drawing, (3,).
+        views: views that show it.
+    """
+
+    title: str
+    links: list[FloatArray]
+    paths: Mapping[str, FloatArray]
+    displacements: FloatArray
+    places: FloatArray
+    force: float
+    size: float
+    middle: FloatArray
+    views: tuple[View, ...]
+
+
+def tool_path(result: StoredResult, title: str) -> ToolPath:
+    """Return the paths of the tools of a result with `q` and `tip_compliance`."""
+    steps = evenly(result.samples, POINTS)
+    geometry, q = result.geometry(), np.asarray(result.read("q"), dtype=np.float64)[steps]
+    points = ArmPoints.of(geometry, q)
+    at = _even_along(points.tools)
+    links = [line for end in (0, -1) for line in ArmPoints.of(geometry, q[[end]]).lines()]
+    corners = np.concatenate([*links, points.tools.reshape(-1, 3)])
+    extents = np.ptp(corners, axis=0)
+    size = max(float(extents.max()), SMALLEST_SIZE)
+    compliance = np.concatenate([result.read(TIP_COMPLIANCE, step, step + 1) for step in steps[at].tolist()])
+    blocks = np.swapaxes(compliance[..., :3, :3], 0, 1).astype(np.float64)
+    largest = float(np.nanmax(np.linalg.norm(np.nan_to_num(blocks), ord=2, axis=(-2, -1))))
+    force = _round_number(LARGEST_ELLIPSE * size / largest) if largest > 0 else 1.0
+    return ToolPath(
+        f"{title}: compliance along the path",
+        links,
+        dict(zip(result.tool_names, np.swapaxes(points.tools, 0, 1), strict=True)),
+        force * blocks,
+        np.swapaxes(points.tools[at], 0, 1),
+        force,
+        size,
+        (corners.max(axis=0) + corners.min(axis=0)) / 2,
+        views_of(direction_of(result.gravity()), extents, size),
+    )
+
+
+def _even_along(places: FloatArray) -> IndexArray:
+    """Return the indices of `ELLIPSES` points at even distances along the paths, (points, tools, 3)."""
+    lengths = np.linalg.norm(np.diff(places, axis=0), axis=-1).sum(axis=-1).cumsum()
+    wanted = np.linspace(0, lengths[-1] if len(lengths) else 0.0, ELLIPSES)
+    return np.unique(np.searchsorted(lengths, wanted))
+
+
+def _round_number(value: float) -> float:
+    """Return 1, 2 or 5 times a power of ten, at most a positive value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return power * max(factor for factor in (1, 2, 5) if factor * power <= value)

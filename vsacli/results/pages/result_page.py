@@ -19,7 +19,7 @@ from vsacli.base.progress import Progress, unseen
 from vsacli.base.simulation_variables import ERRORS, SIMULATED_NAMES, error
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import counted, one_line
-from vsacli.base.variables import deviation
+from vsacli.base.variables import TIP_COMPLIANCE, deviation
 from vsacli.results.charts.arm_chart import ArmPoints, direction_of
 from vsacli.results.charts.comparison import check_comparable, distinct_labels
 from vsacli.results.charts.figures import result_title
@@ -72,6 +72,7 @@ class Section(NamedTuple):
 SECTIONS = (
     Section("Tracking errors", tuple(map(error, ERRORS)), shown=True),
     Section("Position and stiffness", ("q", "stiffness"), shown=True),
+    Section("Stiffness of tools", (TIP_COMPLIANCE,), shown=True),
     Section("Motor torque", ("tau_motor",), shown=True),
     Section("Elastic torque", ("tau_e",), shown=True),
     Section("Springs", ("phi", "tau_transmission", "elastic_energy", "det_A")),

@@ -22,12 +22,12 @@ from vsacli.base.arrays import FloatArray
 from vsacli.results.charts.arm_chart import ROOM, ArmChart, View
 from vsacli.results.charts.chart import PANEL_WIDTH
 from vsacli.results.charts.look import current_look
-from vsacli.results.charts.tool_path import ToolPath
+from vsacli.results.charts.tool_charts import ToolPath
 from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.long_texts import POINTS_PER_INCH
 from vsacli.results.plots.panels import add_title
 from vsacli.results.plots.sheets import complete
-from vsacli.results.plots.styles import new_figure, scaled, shortened
+from vsacli.results.plots.styles import line_style, new_figure, scaled, shortened
 
 LABEL_WIDTH = 0.55
 """Width of the column of names, relative to a view."""
@@ -74,6 +74,10 @@ FILLS = {"antagonistic": "#8fb8de", "serial": "#f0b27a", "elastic": "#c8e6c0", "
 _OTHER_FILL, _MOTOR_FILL, _BASE_FILL = "white", "0.35", "0.6"
 _LINK: dict[str, Any] = {"color": "0.55", "linewidth": 4.5, "solid_capstyle": "round"}
 _AXIS: dict[str, Any] = {"color": "#d8261c", "linewidth": 0.9, "linestyle": (0, (8, 2, 1.5, 2))}
+_PATH_LINK: dict[str, Any] = {"color": "0.75", "linewidth": 3, "solid_capstyle": "round"}
+_PATH: dict[str, Any] = {"linewidth": 1.2}
+_ELLIPSE: dict[str, Any] = {"linewidth": 0.9, "linestyle": "-"}
+CIRCLE = np.stack((np.cos(np.linspace(0, 2 * np.pi, 73)), np.sin(np.linspace(0, 2 * np.pi, 73))))
 _LEADER: dict[str, Any] = {"color": "0.5", "linewidth": 0.6}
 _ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.1, "shrinkA": 0, "shrinkB": 0}
 
@@ -299,4 +303,49 @@ def _handles(chart: ArmChart) -> list[Artist]:
         Line2D([], [], **scaled(_AXIS), label="joint axis"),
         Line2D([], [], **scaled(_LINK), label="link"),
         Patch(facecolor=_BASE_FILL, edgecolor="black", linewidth=EDGE, label="base"),
+    ]
+
+
+def tool_path_figure(path: ToolPath) -> Figure:
+    """Draw the views of the paths at one scale."""
+    views = len(path.views)
+
+    def natural(columns: int) -> tuple[float, float]:
+        return PANEL_WIDTH * columns, (PANEL_WIDTH if columns == views else 2 * VIEW_HEIGHT) + 1.4
+
+    stacked = columns_of_panels(views, natural, NARROWEST_VIEW) < views
+    with new_figure(natural(2 if stacked else views)) as figure:
+        panels = panels_of_views(figure, [1.0] * views, stacked=stacked)
+        for axes, view in zip(panels, path.views, strict=True):
+            frame_view(axes, path, view)
+            for line in path.links:
+                axes.plot(*view.project(line).T, **scaled(_PATH_LINK), zorder=1)
+            for look, points in enumerate(path.paths.values()):
+                axes.plot(*view.project(points).T, **scaled(_PATH), color=line_style(look).color, zorder=2)
+                _draw_ellipses(axes, path, look, np.stack((view.right, view.up)))
+        return complete(figure, path.title, _path_handles(path))
+
+
+def _draw_ellipses(axes: Axes, path: ToolPath, tool: int, projection: FloatArray) -> None:
+    """Draw the outlines of the displacements of a tool in a view, a projection (2, 3)."""
+    for place, displacement in zip(path.places[tool], path.displacements[tool], strict=True):
+        if np.isfinite(displacement).all():
+            seen = projection @ displacement
+            squares, directions = np.linalg.eigh(seen @ seen.T)
+            outline = directions @ (np.sqrt(np.maximum(squares, 0.0))[:, None] * CIRCLE)
+            corners = (projection @ place)[:, None] + outline
+            axes.plot(*corners, **scaled(_ELLIPSE), color=line_style(tool).color, zorder=3)
+
+
+def _path_handles(path: ToolPath) -> list[Artist]:
+    """Return the legend: tools, links, and the force that the ellipses are for."""
+    tools = [
+        Line2D([], [], **scaled(_PATH), color=line_style(look).color, label=f"path of {name}")
+        for look, name in enumerate(path.paths)
+    ]
+    ellipse = f"ellipses: displacement by {path.force:g} N"
+    return [
+        *tools,
+        Line2D([], [], **scaled(_ELLIPSE), color="black", label=ellipse),
+        Line2D([], [], **scaled(_PATH_LINK), label="links at start and end"),
     ]

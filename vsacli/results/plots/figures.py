@@ -17,9 +17,9 @@ from vsacli.base.outputs import Outputs
 from vsacli.results.charts.chart import Sheet
 from vsacli.results.charts.comparison import comparison_sheets
 from vsacli.results.charts.figures import sheets_of
+from vsacli.results.plots.arm_figure import tool_path_figure
 from vsacli.results.plots.sheets import drawn
 from vsacli.results.plots.styles import house_style
-from vsacli.results.plots.tool_path_figure import tool_path_figure
 from vsacli.results.store.reader import StoredResult
 
 Figures: TypeAlias = dict[str, Figure]
