@@ -12,7 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from oracles.jets import Scalar, leibniz, matrix_product
+from oracles.kinematics import transform
 from oracles.lagrange import Array, Chain, Derivatives
+from vsacli.base.wrench import Wrench
+from vsacli.robot.model import Robot
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,24 @@ class Contact:
     point: Array
     in_base: bool
     link: int = -1
+
+
+def contacts_of(robot: Robot, wrench: Wrench) -> list[Contact]:
+    """The contacts at the tools of a robot on which a wrench, with derivatives (samples, 6 tools), acts."""
+    frames = (wrench.frame,) if isinstance(wrench.frame, str) else wrench.frame
+    names = [joint.name for joint in robot.joints]
+    contacts = []
+    for index, (tool, frame) in enumerate(zip(robot.end_effectors, frames, strict=True)):
+        turn = np.eye(3) if frame == "base" else transform(tool).real[:3, :3]
+        # A wrench is exerted by the environment, a contact by the tool.
+        by_order = [
+            -rows[:, 6 * index : 6 * index + 6] for rows in (wrench.wrench, wrench.dwrench, wrench.ddwrench)
+        ]
+        force, moment = ([rows[:, half] @ turn.T for rows in by_order] for half in (slice(3), slice(3, 6)))
+        if frame is not None:
+            point, link = np.array(tool.xyz), names.index(tool.joint)
+            contacts.append(Contact(force, moment, point, frame == "base", link))
+    return contacts
 
 
 def contact_torques(chain: Chain, contact: Contact, order: int) -> list[Scalar]:

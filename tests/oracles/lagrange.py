@@ -16,13 +16,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from oracles.jets import Scalar, circle, leibniz, matrix_product
+from oracles.kinematics import transform
+from vsacli.robot.joint import FRAME_0, Pose
 from vsacli.robot.model import Robot
 
 Array = npt.NDArray[Any]
@@ -152,8 +154,11 @@ class Chain:
         return (pose @ link.pseudo_inertia[:, 3]) @ self.gravity
 
 
-def chain_of(robot: Robot, motion: Sequence[Array]) -> Chain:
-    """The chain of a robot at q, dq, ddq, d3q, d4q, each (samples, joints)."""
+def chain_of(robot: Robot, motion: Sequence[Array], *, modified: bool = False) -> Chain:
+    """The links of a robot at q, dq, ddq, d3q, d4q, each (samples, joints).
+
+    `modified` says that its rows and link frames are meant in the modified Denavit-Hartenberg convention.
+    """
     q, *rates = (np.moveaxis(np.asarray(array), -1, 0) for array in motion)
     links, states = [], []
     for index, joint in enumerate(robot.joints):
@@ -164,16 +169,30 @@ def chain_of(robot: Robot, motion: Sequence[Array]) -> Chain:
         links.append(
             Link(
                 revolute=joint.type == "revolute",
-                a=joint.dh.a,
-                cos_alpha=math.cos(joint.dh.alpha),
-                sin_alpha=math.sin(joint.dh.alpha),
+                a=0 if modified else joint.dh.a,
+                cos_alpha=1 if modified else math.cos(joint.dh.alpha),
+                sin_alpha=0 if modified else math.sin(joint.dh.alpha),
                 mass=joint.link.mass,
                 com=np.array(joint.link.com),
                 inertia=joint.link.inertia.tensor,
                 damping=joint.damping,
             )
         )
-    return Chain(links, states, np.array(robot.gravity))
+    return Chain(links, states, np.array(robot.gravity), _places(robot, modified))
+
+
+def _places(robot: Robot, modified: bool) -> list[Place]:
+    """Where the joints stand: on the base behind its pose, or on a link, behind the mount."""
+    names, places = [joint.name for joint in robot.joints], list[Place]()
+    for index, joint in enumerate(robot.joints):
+        on_base = index == 0 if joint.parent is None else joint.parent == FRAME_0
+        before = [robot.base] if on_base else []
+        poses = [transform(pose).real for pose in (*before, *([joint.mount] if joint.mount else []))]
+        if modified:
+            poses.append(transform(Pose(xyz=(joint.dh.a, 0, 0), rpy=(joint.dh.alpha, 0, 0))).real)
+        parent = index - 1 if joint.parent in (None, FRAME_0) else names.index(joint.parent)
+        places.append(Place(-1 if on_base else parent, reduce(np.matmul, poses) if poses else None))
+    return places
 
 
 def _behind(carrying: Derivatives | None, seat: Array | None, step: Derivatives) -> Derivatives:
