@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from samples.robots import ODD_GRAVITY, random_actuator, random_joint
 from samples.springs import SPRINGS
 from samples.term_mutations import mutated_run
 from samples.wrenches import SCALES
-from vsacli import Trajectory, inverse_dynamics
+from vsacli import Trajectory, inverse_dynamics, load_robot
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.motor import Motor
@@ -49,6 +50,12 @@ def random_tree(seed: int, joints: int | None = None) -> Robot:
         members.append(_random_drive(rng, replace(joint, parent=parent, mount=mount)))
     robot = Robot(name=f"tree-{seed}", gravity=ODD_GRAVITY, base=random_pose(rng), joints=tuple(members))
     return replace(robot, tools=_random_tools(rng, robot))
+
+
+def without_resistance(robot: Robot) -> Robot:
+    """The robot without friction and dampers between the links, which references of the links leave out."""
+    joints = tuple(replace(joint, friction=None, damper=None) for joint in robot.joints)
+    return replace(robot, joints=joints)
 
 
 def _random_parent(rng: np.random.Generator, before: list[Joint]) -> str | None:
@@ -187,6 +194,13 @@ class TreeMotion(NamedTuple):
         span = (float(TIME[0]), float(TIME[-1]))
         course = RestToRest(signal=WRENCH, span=span, degree=5, start=tuple(start), end=tuple(end))
         return WrenchProfile(course, frames if len(frames) > 1 else str(frames[0]))
+
+
+def read_tree(robot: Robot, folder: Path, convention: str = "standard") -> Robot:
+    """The robot as the file `tree_text` is read."""
+    path = folder / f"{robot.name}_{convention}.yaml"
+    path.write_text(tree_text(robot, convention))
+    return load_robot(path)
 
 
 def tree_run(seed: int, joints: int | None = None) -> tuple[Robot, TreeMotion]:
