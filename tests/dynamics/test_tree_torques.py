@@ -12,7 +12,7 @@ from oracles.lagrange import chain_of
 from oracles.modified_dh import in_modified_rows
 from samples.marks import slow_but
 from samples.robots import MotionArrays, random_motion
-from samples.trees import random_tree, random_wrenches, read_tree, without_resistance
+from samples.trees import SMALL, random_tree, random_wrenches, read_tree, without_resistance
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.wrench import Wrench, frames_by_tool
@@ -28,8 +28,8 @@ EQUAL = 1e-13
 
 SAMPLES = 10
 
-trees = pytest.mark.parametrize("seed", slow_but(range(4), range(100)))
-some_trees = pytest.mark.parametrize("seed", slow_but(range(3), range(30)))
+trees = pytest.mark.parametrize("seed", slow_but((1, *SMALL), range(100)))
+some_trees = pytest.mark.parametrize("seed", slow_but(SMALL, range(50)))
 
 
 def assert_same(actual: FloatArray, expected: FloatArray, rounding: float = ROUNDING) -> None:

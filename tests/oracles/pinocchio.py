@@ -54,6 +54,19 @@ def torques(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> Flo
     return np.array(rows) + damping * dq
 
 
+def mass_matrices(robot: Robot, q: FloatArray) -> FloatArray:
+    """M(q), (samples, joints, joints), column by column.
+
+    Pinocchio's own composition of M takes the joints of each subtree to have adjacent numbers.
+    """
+    model = build(robot)
+    model.gravity.linear = np.zeros(3)
+    data, still = model.createData(), np.zeros(model.nv)
+    units = np.eye(model.nv)
+    rows = [[pin.rnea(model, data, row, still, unit).copy() for unit in units] for row in q]
+    return np.array(rows).swapaxes(1, 2)
+
+
 def torque_regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
     """Derivatives of tau_e, (samples, joints, 10 joints), by inertial parameters in Pinocchio's frames."""
     model = build(robot)

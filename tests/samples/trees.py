@@ -34,6 +34,9 @@ MOST_TOOLS = 3
 _LOSSY = [joint for run in ("pair", "serial", "spring") for joint in mutated_run(run)[0].joints]
 """Joints with friction, a damper, windings, gears, coupled springs or rotors."""
 
+SMALL = (11, 38, 49)
+"""Seeds of trees of at most 8 joints, for quick tests."""
+
 TIME = np.linspace(0, 1, 41)
 """s; samples of the motions."""
 
@@ -126,6 +129,23 @@ def random_wrenches(robot: Robot, samples: int, seed: int) -> Wrench:
     by_tool = tuple(None if rests else str(frame) for frame, rests in zip(frames, idle, strict=True))
     frame: WrenchFrame = by_tool if len(by_tool) > 1 else str(by_tool[0])
     return Wrench(*arrays, frame=frame)
+
+
+def hand(fingers: int, joints: int, *, palm: bool = True) -> Robot:
+    """Equal fingers with a tool each, on seats of a palm that turns, or of the base."""
+    rng = np.random.default_rng(1)
+    members = [random_joint(rng, "palm", "R")] if palm else []
+    phalanges = [random_joint(rng, f"joint_{number}", "R") for number in range(joints)]
+    tools = []
+    for number in range(fingers):
+        x, y, z, roll, pitch, yaw = rng.uniform(-0.5, 0.5, 6).tolist()
+        seat = {"parent": "palm" if palm else FRAME_0, "mount": Pose(xyz=(x, y, z), rpy=(roll, pitch, yaw))}
+        for place, joint in enumerate(phalanges):
+            name = f"finger_{number}_{joint.name}"
+            members.append(replace(joint, name=name, **({} if place else seat)))
+        tools.append(Tool(name=f"tip_{number}", joint=members[-1].name, xyz=(0.0, 0.1, 0.2)))
+    name = f"hand-{fingers}x{joints}"
+    return Robot(name=name, gravity=ODD_GRAVITY, joints=tuple(members), tools=tuple(tools))
 
 
 def reordered(robot: Robot, seed: int) -> Robot:
