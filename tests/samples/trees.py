@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,12 +24,13 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.motor import Motor
 from vsacli.base import file_formats
 from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import WRENCH
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.wrench import Wrench, WrenchFrame, frames_by_tool
 from vsacli.robot.joint import FRAME_0, Joint, Pose, Tool
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.profile import WrenchProfile
+from vsacli.trajectory.times import UniformTimes
 
 MOST_TOOLS = 3
 _LOSSY = [joint for run in ("pair", "serial", "spring") for joint in mutated_run(run)[0].joints]
@@ -36,9 +38,6 @@ _LOSSY = [joint for run in ("pair", "serial", "spring") for joint in mutated_run
 
 SMALL = (11, 38, 49)
 """Seeds of trees of at most 8 joints, for quick tests."""
-
-TIME = np.linspace(0, 1, 41)
-"""s; samples of the motions."""
 
 
 def random_tree(seed: int, joints: int | None = None) -> Robot:
@@ -149,21 +148,26 @@ def hand(fingers: int, joints: int, *, palm: bool = True) -> Robot:
 
 
 def reordered(robot: Robot, seed: int) -> Robot:
-    """The same tree with its branches in another order, each joint after the one that carries it."""
-    rng = np.random.default_rng(seed)
-    parents, order = robot.parents, list[int]()
+    """The same tree with its branches in another order, each joint after the one that carries it.
+
+    There is no other order of a chain.
+    """
+    rng, joints, parents = np.random.default_rng(seed), robot.joints, robot.parents
+    order = list(range(len(joints)))
+    while order == sorted(order) and len(robot.tips) > 1:
+        order = _random_order(rng, parents)
+    names = {-1: FRAME_0, **dict(enumerate(robot.joint_names))}
+    members = (replace(joints[index], parent=names[parents[index]]) for index in order)
+    return replace(robot, joints=tuple(members))
+
+
+def _random_order(rng: np.random.Generator, parents: Sequence[int]) -> list[int]:
+    order = list[int]()
     ready = [joint for joint, parent in enumerate(parents) if parent < 0]
     while ready:
         order.append(ready.pop(rng.integers(len(ready))))
         ready += [joint for joint, parent in enumerate(parents) if parent == order[-1]]
-    joints = robot.joints
-    return replace(
-        robot,
-        joints=tuple(
-            replace(joints[index], parent=joints[parents[index]].name if parents[index] >= 0 else FRAME_0)
-            for index in order
-        ),
-    )
+    return order
 
 
 def finger(robot: Robot, root: int) -> Robot:
@@ -188,32 +192,34 @@ def tree_text(robot: Robot, convention: str = "standard") -> str:
 
 
 class TreeMotion(NamedTuple):
-    """Motion and stiffness by joint, wrenches by tool: of all joints and tools of a tree, or of some."""
+    """First and last position and stiffness by joint, and wrench by tool, of a tree or more.
+
+    Between them everything moves along polynomials, for a second.
+    """
 
     q: dict[str, FloatArray]
     stiffness: dict[str, FloatArray]
-    wrenches: dict[str, tuple[FloatArray, FloatArray]]
+    wrenches: dict[str, FloatArray]
     frames: dict[str, str | None]
 
     def trajectory(self, robot: Robot) -> Trajectory:
         """The trajectory of a robot with some of these joints and tools, in its order."""
-        q, stiffness = (
-            np.column_stack([by_name[name] for name in robot.joint_names])
-            for by_name in (self.q, self.stiffness)
-        )
-        sampled = Trajectory.from_samples(TIME, q, stiffness, fit="interpolate")
+        position = _polynomial(POSITION, 9, [self.q[name] for name in robot.joint_names])
+        stiffness = _polynomial(STIFFNESS, 5, [self.stiffness[name] for name in robot.joint_names])
+        frames, wrench = tuple(self.frames.get(name) for name in robot.tool_names), None
+        if any(frames):
+            course = _polynomial(
+                WRENCH, 5, [each for name in robot.tool_names for each in self.wrenches[name]]
+            )
+            wrench = WrenchProfile(course, frames if len(frames) > 1 else str(frames[0]))
         return Trajectory(
-            sampled.times, sampled.position, sampled.commanded, wrench=self._wrench(robot), name="swinging"
+            UniformTimes(1, 40), position, {"stiffness": stiffness}, wrench=wrench, name="polynomials"
         )
 
-    def _wrench(self, robot: Robot) -> WrenchProfile | None:
-        frames = tuple(self.frames.get(name) for name in robot.tool_names)
-        if not any(frames):
-            return None
-        start, end = np.concatenate([self.wrenches[name] for name in robot.tool_names], axis=1)
-        span = (float(TIME[0]), float(TIME[-1]))
-        course = RestToRest(signal=WRENCH, span=span, degree=5, start=tuple(start), end=tuple(end))
-        return WrenchProfile(course, frames if len(frames) > 1 else str(frames[0]))
+
+def _polynomial(signal: Signal, degree: int, ends: Sequence[FloatArray]) -> RestToRest:
+    start, end = (tuple(each) for each in np.array(ends).T.tolist())
+    return RestToRest(signal=signal, span=(0, 1), degree=degree, start=start, end=end)
 
 
 def read_tree(robot: Robot, folder: Path, convention: str = "standard") -> Robot:
@@ -224,27 +230,25 @@ def read_tree(robot: Robot, folder: Path, convention: str = "standard") -> Robot
 
 
 def tree_run(seed: int, joints: int | None = None) -> tuple[Robot, TreeMotion]:
-    """A tree of light links, and a motion under small wrenches whose stiffness most of its joints attain."""
+    """A tree of light links, and a motion under small wrenches, too soft for some of its joints."""
     robot = random_tree(seed, joints)
     light = [replace(joint, link=replace(joint.link, mass=0.05 * joint.link.mass)) for joint in robot.joints]
     robot = replace(robot, joints=tuple(light))
-    trial = _swinging(robot, np.full(len(light), 1e9), seed).trajectory(robot)
+    trial = _motion(robot, np.full(len(light), 1e9), seed).trajectory(robot)
     least = np.fmax.reduce(inverse_dynamics(robot, trial).stiffness_min, axis=0)
-    factor = np.random.default_rng(seed).uniform(1.1, 3, len(least))
-    return robot, _swinging(robot, np.where(least > 0, least, 300) * factor, seed)
+    factor = np.random.default_rng(seed).uniform(0.7, 3, len(least))
+    return robot, _motion(robot, np.where(least > 0, least, 300) * factor, seed)
 
 
-def _swinging(robot: Robot, stiffness: FloatArray, seed: int) -> TreeMotion:
-    """Sines of a size that mechanisms bear, while small wrenches grow or fall."""
-    rng = np.random.default_rng(seed)
-    phase = 4 * TIME[:, None] + rng.uniform(0, 6, len(robot.joints))
+def _motion(robot: Robot, stiffness: FloatArray, seed: int) -> TreeMotion:
+    rng, joints = np.random.default_rng(seed), robot.joint_names
     commanded = ["stiffness" in joint.commanded for joint in robot.joints]
-    varied = np.where(commanded, stiffness, math.nan) * (1 + 0.05 * np.sin(phase + 1))
+    levels = np.where(commanded, stiffness, math.nan)
     wrench = random_wrenches(robot, 2, seed)
-    by_tool = np.split(0.02 * wrench.wrench, len(robot.tool_names), axis=1)
+    by_tool = np.split(0.02 * wrench.wrench.T, len(robot.tool_names))
     return TreeMotion(
-        dict(zip(robot.joint_names, 0.3 * np.sin(phase).T, strict=True)),
-        dict(zip(robot.joint_names, varied.T, strict=True)),
+        dict(zip(joints, rng.uniform(-0.3, 0.3, (len(joints), 2)), strict=True)),
+        dict(zip(joints, levels[:, None] * rng.uniform(1, 1.1, (len(joints), 2)), strict=True)),
         dict(zip(robot.tool_names, by_tool, strict=True)),
         dict(zip(robot.tool_names, frames_by_tool(wrench.frame), strict=True)),
     )
