@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pytest
-from samples.marks import slow_but
-from samples.trees import finger, reordered, tree_run
+from samples.trees import finger, reordered, tree_cases, tree_run
 
 from vsacli import Result, inverse_dynamics
 from vsacli.base.arrays import AnyArray
@@ -16,10 +15,7 @@ from vsacli.base.variables import VARIABLES
 ROUNDING = 1e-12
 """Of the peak of each joint: forces of several branches are added in another order; 1e-14 is seen."""
 
-QUICK = (3, 4)
-"""Seed and number of joints."""
-
-trees = pytest.mark.parametrize("case", slow_but([QUICK], [QUICK, *((seed, None) for seed in range(50))]))
+trees = pytest.mark.parametrize("case", tree_cases(50))
 
 
 def of_joints(result: Result, places: Sequence[int]) -> Iterator[tuple[str, AnyArray]]:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from samples.marks import slow_but
 from samples.mechanisms import DEVICES
 from samples.random_arms import random_drive
 from samples.robot_files import fields, tables
@@ -52,6 +53,12 @@ def random_tree(seed: int, joints: int | None = None) -> Robot:
         members.append(_random_drive(rng, replace(joint, parent=parent, mount=mount)))
     robot = Robot(name=f"tree-{seed}", gravity=ODD_GRAVITY, base=random_pose(rng), joints=tuple(members))
     return replace(robot, tools=_random_tools(rng, robot))
+
+
+def tree_cases(count: int) -> list[Any]:
+    """Seeds and numbers of joints, None for any: a small tree of two fingers, and slow cases of all sizes."""
+    quick = (0, 4)
+    return slow_but([quick], [quick, *((seed, None) for seed in range(count))])
 
 
 def without_resistance(robot: Robot) -> Robot:
