@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from samples.trees import finger, reordered, tree_cases, tree_run
 
-from vsacli import Result, inverse_dynamics
+from vsacli import Result, inverse_dynamics, motor_torques
 from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import VARIABLES
 
@@ -50,6 +50,8 @@ def test_the_order_of_the_branches_is_that_of_the_results_alone(case: tuple[int,
     assert one.report.verdict == two.report.verdict
     assert one.report.self_check.passed
     assert two.report.self_check.passed
+    assert sorted(one.report.warnings) == sorted(two.report.warnings)
+    assert sorted(other.warnings) == sorted(robot.warnings)
 
 
 @trees
@@ -60,3 +62,17 @@ def test_a_finger_on_the_base_gives_what_it_gives_alone(case: tuple[int, int | N
         alone = finger(robot, root)
         places = [robot.joint_names.index(name) for name in alone.joint_names]
         assert_equal(inverse_dynamics(alone, motion.trajectory(alone)), whole, places)
+
+
+@trees
+def test_single_calls_give_what_a_run_gives(case: tuple[int, int | None]) -> None:
+    robot, motion = tree_run(*case)
+    trajectory = motion.trajectory(robot)
+    result = inverse_dynamics(robot, trajectory)
+    for sample in (0, 17, 40):
+        once = motor_torques(robot, trajectory.at(result.time[sample]))
+        np.testing.assert_array_equal(once.flags, result.flags[sample])
+        peak = np.max(np.abs(result.tau_motor), axis=0, initial=0, where=np.isfinite(result.tau_motor))
+        np.testing.assert_array_equal(np.isnan(once.tau_motor), np.isnan(result.tau_motor[sample]))
+        gap = np.nan_to_num(once.tau_motor - result.tau_motor[sample])
+        assert (np.abs(gap) <= ROUNDING * peak).all()

@@ -15,7 +15,8 @@ from samples.robots import MotionArrays, random_motion
 from samples.trees import SMALL, random_tree, random_wrenches, read_tree, without_resistance
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.wrench import Wrench, frames_by_tool
+from vsacli.base.errors import InputError
+from vsacli.base.wrench import Wrench, WrenchFrame, frames_by_tool
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.kinematics import forward_kinematics
 from vsacli.robot.model import Robot
@@ -105,3 +106,35 @@ def test_a_tree_with_one_tip_without_mounts_is_the_chain_that_it_is() -> None:
         link_torques(tree, *motion, wrench), link_torques(chain, *motion, wrench), strict=True
     ):
         np.testing.assert_array_equal(array, expected)
+
+
+@pytest.mark.parametrize(
+    ("components", "frame", "message"),
+    [
+        (
+            6,
+            "base",
+            "the wrench is for 1 tool, the robot has 2: tool_0, tool_1; for several tools give a tuple as "
+            "frame, None for a tool on which nothing acts",
+        ),
+        (6, ("base", None), f"wrench must have the shape ({SAMPLES}, 12), not ({SAMPLES}, 6)"),
+    ],
+)
+def test_a_wrench_for_other_tools_is_refused(components: int, frame: WrenchFrame, message: str) -> None:
+    robot = random_tree(0, joints=4)
+    wrench = Wrench.constant(np.ones((SAMPLES, components)), frame=frame)
+    with pytest.raises(InputError) as refusal:
+        link_torques(robot, *random_motion(robot, SAMPLES, 1), wrench)
+    assert str(refusal.value) == message
+
+
+def test_a_tool_on_which_nothing_acts_changes_nothing() -> None:
+    robot = random_tree(0, joints=4)
+    motion, wrench = random_motion(robot, SAMPLES, 1), random_wrenches(robot, SAMPLES, 1)
+    both = Wrench(wrench.wrench, wrench.dwrench, wrench.ddwrench, frame=("base", "end_effector"))
+    first = Wrench(wrench.wrench, wrench.dwrench, wrench.ddwrench, frame=("base", None))
+    none_on_second = both.mapped(lambda rows, _: rows * np.repeat([1, 0], 6))
+    for array, expected in zip(
+        link_torques(robot, *motion, first), link_torques(robot, *motion, none_on_second), strict=True
+    ):
+        assert_same(array, expected)
