@@ -90,9 +90,8 @@ class Robot(DeclaredRecord):
                     "(a cycle has no such order)"
                 )
             else:
-                earlier = names[:number]
-                hint = did_you_mean(str(joint.parent), earlier) if earlier else ""
-                reason = f"no earlier joint is called {joint.parent!r}{hint or '; null is the base'}"
+                hint = did_you_mean(str(joint.parent), names[:number]) if number else ""
+                reason = f"no earlier joint is called {joint.parent!r} (null stands for the base){hint}"
             yield FieldProblem(("joints", number, "parent"), reason)
 
     def _tool_problems(self) -> Iterator[FieldProblem]:
