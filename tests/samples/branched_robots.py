@@ -1,0 +1,77 @@
+"""Robots with branches, and a motion of all their joints."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from samples.robots import ODD_GRAVITY, random_joint, vsa_3r
+from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.robot.joint import FRAME_0, Joint, Pose, Tool
+from vsacli.robot.model import Robot
+from vsacli.trajectory.curves import RestToRest
+from vsacli.trajectory.times import UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
+
+
+def random_pose(rng: np.random.Generator) -> Pose:
+    """A frame up to half a meter away, turned about all axes."""
+    (x, y, z), (roll, pitch, yaw) = rng.uniform(-0.5, 0.5, 3).tolist(), rng.uniform(-3, 3, 3).tolist()
+    return Pose(xyz=(x, y, z), rpy=(roll, pitch, yaw))
+
+
+def random_tree(types: str, seed: int) -> Robot:
+    """A tree of joints such as "RPRR", each on any earlier link or the base, mostly mounted; three tools."""
+    rng = np.random.default_rng(seed)
+    names = [f"joint_{number}" for number in range(1, 1 + len(types))]
+    joints = []
+    for number, (name, letter) in enumerate(zip(names, types, strict=True)):
+        joint = random_joint(rng, name, letter)
+        parent = str(rng.choice([FRAME_0, *names[:number]]))
+        mount = random_pose(rng) if rng.random() < 0.7 else None
+        joints.append(dataclasses.replace(joint, parent=parent, mount=mount))
+    tools = []
+    for name, carrier in zip(("left", "middle", "right"), rng.choice(names, 3), strict=True):
+        pose = random_pose(rng)
+        tools.append(Tool(name=name, joint=str(carrier), xyz=pose.xyz, rpy=pose.rpy))
+    return Robot(
+        name=f"tree-{types}-{seed}",
+        gravity=ODD_GRAVITY,
+        base=random_pose(rng),
+        joints=tuple(joints),
+        tools=tuple(tools),
+    )
+
+
+def torso() -> Robot:
+    """A waist with two arms of two joints, all antagonistic; the arms are mounted on both sides of it."""
+    waist, upper, lower = vsa_3r().joints
+
+    def arm(side: str, mount: Pose) -> tuple[Joint, Joint]:
+        shoulder = dataclasses.replace(upper, name=f"{side}_shoulder", parent="waist", mount=mount)
+        return shoulder, dataclasses.replace(lower, name=f"{side}_elbow")
+
+    left = arm("left", Pose(xyz=(0.1, 0.3, 0.2), rpy=(0.4, 0, 0.2)))
+    right = arm("right", Pose(xyz=(0.1, 0.3, -0.2), rpy=(-0.4, 0.3, 0)))
+    return Robot(
+        name="torso",
+        joints=(dataclasses.replace(waist, name="waist"), *left, *right),
+        tools=(
+            Tool(name="left_hand", joint="left_elbow", xyz=(0.1, 0, 0)),
+            Tool(name="right_hand", joint="right_elbow", xyz=(0.1, 0, 0), rpy=(0, 0.5, 0)),
+        ),
+    )
+
+
+def rest_to_rest(stiffness: list[tuple[float, float]], duration: float, rate: float) -> Trajectory:
+    """A motion of joints by half a radian or meter in turn; stiffness from one to another, NaN if none."""
+    span, count = (0.0, duration), len(stiffness)
+    start = tuple(np.linspace(0.2, -0.3, count).tolist())
+    end = tuple(position + (-1) ** index / 2 for index, position in enumerate(start))
+    (start_stiffness, end_stiffness) = zip(*stiffness, strict=True)
+    position = RestToRest(signal=POSITION, span=span, degree=11, start=start, end=end)
+    commanded = RestToRest(
+        signal=STIFFNESS, span=span, degree=7, start=tuple(start_stiffness), end=tuple(end_stiffness)
+    )
+    return Trajectory(UniformTimes(duration, rate), position, {STIFFNESS.key: commanded}, name="move")
