@@ -86,6 +86,7 @@ def run_of_all_drives():
     return robot, inverse_dynamics(robot, rest_to_rest(stiffness, 1.0, 20))
 
 
+@pytest.mark.slow
 def test_motor_torques_of_a_tree_with_all_kinds_of_drives():
     robot, result = run_of_all_drives()
     assert not result.flags.any(), result.report

@@ -64,6 +64,18 @@ def torso() -> Robot:
     )
 
 
+def hand(fingers: int, seed: int = 2) -> Robot:
+    """A wrist that carries equal fingers of four joints at various mounts, each with a tool."""
+    rng = np.random.default_rng(seed)
+    wrist, *finger = (random_joint(rng, name, "R") for name in ("wrist", "spread", "bend", "curl", "tip"))
+    joints, tools = [wrist], []
+    for number in range(fingers):
+        first, *others = (dataclasses.replace(each, name=f"{each.name}_{number}") for each in finger)
+        joints += [dataclasses.replace(first, parent="wrist", mount=random_pose(rng)), *others]
+        tools.append(Tool(name=f"tool_{number}", joint=joints[-1].name, xyz=(0.1, 0, 0)))
+    return Robot(name=f"hand-{fingers}", joints=tuple(joints), tools=tuple(tools))
+
+
 def rest_to_rest(stiffness: list[tuple[float, float]], duration: float, rate: float) -> Trajectory:
     """A motion of joints by half a radian or meter in turn; stiffness from one to another, NaN if none."""
     span, count = (0.0, duration), len(stiffness)
