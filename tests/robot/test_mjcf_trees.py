@@ -1,14 +1,15 @@
-"""Exported trees in MuJoCo: its inverse dynamics, motions that torques drive, and names."""
+"""Exported trees in MuJoCo: its inverse dynamics, key frames, tools and names."""
 
 from __future__ import annotations
 
 import dataclasses
 import xml.etree.ElementTree as ElementTree
+from typing import Any
 
 import numpy as np
 import pytest
-from samples.branched_robots import random_tree, rest_to_rest, torso
-from samples.mujoco_models import compiled, coordinates, driven, inverse_error, mujoco
+from samples.branched_robots import random_tree, rest_to_rest
+from samples.mujoco_models import compiled, coordinates, driven, forces_of_tools, inverse_error, mujoco
 from samples.robots import random_motion, random_robot
 from samples.shipped import shipped_robot
 
@@ -29,18 +30,6 @@ NAN = (np.nan, np.nan)
 TREES = ("RRRR", "RPRRP", "PRRPRR", "RRPRRPRR", "RPRRRRPRRRRR")
 
 
-def applied_forces(model, data, robot, wrench, frames):
-    """Forces on MuJoCo's coordinates of wrenches on the tools, along their axes or those of the base."""
-    total = np.zeros(model.nv)
-    for tool, frame, components in zip(robot.tools, frames, wrench.reshape(-1, 6), strict=True):
-        site = data.site(tool.name)
-        axes = site.xmat.reshape(3, 3) if frame == "end_effector" else np.eye(3)
-        force, moment = axes @ components[:3], axes @ components[3:]
-        body = model.site(tool.name).bodyid[0]
-        mujoco.mj_applyFT(model, data, force, moment, site.xpos, body, total)
-    return total
-
-
 @pytest.mark.parametrize("seed", range(len(TREES)))
 def test_link_torques_of_random_trees_under_wrenches(seed):
     """Motors stand where they do not load their cubic springs, so that MuJoCo finds tau_e at the joints."""
@@ -57,7 +46,7 @@ def test_link_torques_of_random_trees_under_wrenches(seed):
                 for name in (joint.name, f"{joint.name}.motor_1", f"{joint.name}.motor_2"):
                     data.joint(name).qpos[0] = position
             mujoco.mj_inverse(model, data)
-            loads = applied_forces(model, data, robot, wrenches[sample], frames)
+            loads = forces_of_tools(robot, frames, wrenches[sample], model, data)
             torques[sample] = (data.qfrc_inverse - loads)[places]
     np.testing.assert_allclose(torques, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
 
@@ -93,16 +82,24 @@ def test_motor_torques_of_a_tree_with_all_kinds_of_drives():
     assert inverse_error(robot, result) < ROUNDING
 
 
-def test_torques_drive_a_torso():
+PUSHED: dict[str, Any] = {
+    "wrench": (-6, 8, 2, 0.3, 0, -0.2, 5, 0, -4, 0, 0.2, 0.1),
+    "frame": ("base", "end_effector"),
+}
+"""Wrenches on both hands of a torso, N and N m."""
+
+
+@pytest.mark.slow
+def test_torques_drive_a_torso_whose_hands_are_pushed():
     """Half the step, a sixteenth of the error: only that of the integrator is left."""
+    robot, stiffness = shipped_robot("torso_2x3r"), [NAN, *[(120, 220), (120, 220), (70, 130)] * 2]
     coarse, fine = (
-        np.abs(driven(robot, inverse_dynamics(robot, trajectory))).max()
-        for robot, trajectory in (
-            (torso(), rest_to_rest([(900, 1400)] * 5, 1.6, 2 / step)) for step in (0.016, 0.008)
-        )
+        inverse_dynamics(robot, rest_to_rest(stiffness, 1.6, 2 / step, **PUSHED)) for step in (0.008, 0.004)
     )
-    assert coarse < 1e-6
-    assert 12 < coarse / fine < 22
+    assert inverse_error(robot, coarse, PUSHED["frame"]) < ROUNDING
+    errors = [np.abs(driven(robot, result, PUSHED["frame"])).max() for result in (coarse, fine)]
+    assert errors[0] < 1e-6
+    assert 12 < errors[0] / errors[1] < 22
 
 
 def test_a_key_frame_has_the_start_of_a_run():
@@ -157,17 +154,15 @@ def test_branches_in_another_order_are_the_same_model():
 
 
 def test_names_and_shapes_of_bodies():
-    """A rod leads to each mount; the site of a chain is called tool, whatever its entry of `tools` is."""
-    robot = torso()
+    """A rod leads to each mount; the site of a robot without `tools` is called tool."""
+    robot = shipped_robot("torso_2x3r")
     root = ElementTree.fromstring(mjcf_model(robot).text)
-    bodies = {body.get("name"): body for body in root.iter("body")}
-    assert [each.get("name") for each in bodies["waist.link"].findall("body")] == [
-        "left_shoulder.mount",
-        "right_shoulder.mount",
-    ]
-    assert len(bodies["waist.link"].findall("geom")) == 1 + 2
+    (waist,) = (body for body in root.iter("body") if body.get("name") == "waist.link")
+    mounts = [body.get("name") for body in waist.findall("body")]
+    assert mounts == ["left_shoulder_lift.mount", "right_shoulder_lift.mount"]
+    assert len(waist.findall("geom")) == 1 + len(mounts)
     assert [site.get("name") for site in root.iter("site")] == ["left_hand", "right_hand"]
-    bare = dataclasses.replace(robot, tools=())
-    assert not list(ElementTree.fromstring(mjcf_model(bare).text).iter("site"))
+    without = mjcf_model(dataclasses.replace(robot, tools=()))
+    assert not list(ElementTree.fromstring(without.text).iter("site"))
     (tool,) = ElementTree.fromstring(mjcf_model(random_robot("RR", 1)).text).iter("site")
     assert tool.get("name") == "tool"

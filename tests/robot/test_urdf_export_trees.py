@@ -8,8 +8,9 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pinocchio as pin
 import pytest
-from samples.branched_robots import random_tree, torso
+from samples.branched_robots import random_tree
 from samples.robots import ODD_GRAVITY, random_motion
+from samples.shipped import shipped_robot
 
 from vsacli import forward_kinematics
 from vsacli.dynamics.elastic_torques import link_torques
@@ -49,7 +50,7 @@ def test_pinocchio_reads_a_tree(seed, tmp_path):
 
 def test_links_of_tools_have_names_of_their_own():
     """A tool may be called as the root or a link of a joint is."""
-    robot = torso()
+    robot = shipped_robot("torso_2x3r")
     tools = (
         Tool(name="world", joint="left_elbow"),
         Tool(name="waist_link", joint="waist"),
@@ -65,11 +66,11 @@ def test_links_of_tools_have_names_of_their_own():
 
 def test_rods_lead_to_the_mounts():
     """The links that carry them draw both; their ends are the frame of the link and the mount."""
-    robot = torso()
+    robot = shipped_robot("torso_2x3r")
     root = ElementTree.fromstring(urdf_model(robot).text)
     (waist,) = (link for link in root.iter("link") if link.get("name") == "waist_link")
     rods = waist.findall("visual")[1:]
-    for rod, name in zip(rods, ("left_shoulder", "right_shoulder"), strict=True):
+    for rod, name in zip(rods, ("left_shoulder_lift", "right_shoulder_lift"), strict=True):
         origin = rod.find("origin")
         xyz, (roll, pitch, yaw) = (np.array(origin.get(key).split(), float) for key in ("xyz", "rpy"))
         axis = pin.rpy.rpyToMatrix(roll, pitch, yaw)[:, 2]
@@ -79,5 +80,5 @@ def test_rods_lead_to_the_mounts():
             for joint in root.iter("joint")
             if joint.get("name") == name
         )
-        np.testing.assert_allclose(xyz - half, 0, atol=1e-15)  # lengths of 0.3 m
+        np.testing.assert_allclose(xyz - half, 0, atol=1e-15)  # lengths of 0.2 m
         np.testing.assert_allclose(xyz + half, seat, atol=1e-15)

@@ -6,11 +6,13 @@ import dataclasses
 
 import numpy as np
 
-from samples.robots import ODD_GRAVITY, random_joint, vsa_3r
-from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.robot.joint import FRAME_0, Joint, Pose, Tool
+from samples.robots import ODD_GRAVITY, random_joint
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
+from vsacli.base.wrench import WrenchFrame
+from vsacli.robot.joint import FRAME_0, Pose, Tool
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
+from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -44,30 +46,11 @@ def random_tree(types: str, seed: int) -> Robot:
     )
 
 
-def torso() -> Robot:
-    """A waist with two arms of two joints, all antagonistic; the arms are mounted on both sides of it."""
-    waist, upper, lower = vsa_3r().joints
-
-    def arm(side: str, mount: Pose) -> tuple[Joint, Joint]:
-        shoulder = dataclasses.replace(upper, name=f"{side}_shoulder", parent="waist", mount=mount)
-        return shoulder, dataclasses.replace(lower, name=f"{side}_elbow")
-
-    left = arm("left", Pose(xyz=(0.1, 0.3, 0.2), rpy=(0.4, 0, 0.2)))
-    right = arm("right", Pose(xyz=(0.1, 0.3, -0.2), rpy=(-0.4, 0.3, 0)))
-    return Robot(
-        name="torso",
-        joints=(dataclasses.replace(waist, name="waist"), *left, *right),
-        tools=(
-            Tool(name="left_hand", joint="left_elbow", xyz=(0.1, 0, 0)),
-            Tool(name="right_hand", joint="right_elbow", xyz=(0.1, 0, 0), rpy=(0, 0.5, 0)),
-        ),
-    )
-
-
-def hand(fingers: int, seed: int = 2) -> Robot:
-    """A wrist that carries equal fingers of four joints at various mounts, each with a tool."""
+def hand(fingers: int, joints_each: int = 4, seed: int = 2) -> Robot:
+    """A wrist that carries equal fingers of up to four joints at various mounts, each with a tool."""
     rng = np.random.default_rng(seed)
-    wrist, *finger = (random_joint(rng, name, "R") for name in ("wrist", "spread", "bend", "curl", "tip"))
+    names = ("wrist", "spread", "bend", "curl", "tip")[: 1 + joints_each]
+    wrist, *finger = (random_joint(rng, name, "R") for name in names)
     joints, tools = [wrist], []
     for number in range(fingers):
         first, *others = (dataclasses.replace(each, name=f"{each.name}_{number}") for each in finger)
@@ -76,8 +59,17 @@ def hand(fingers: int, seed: int = 2) -> Robot:
     return Robot(name=f"hand-{fingers}", joints=tuple(joints), tools=tuple(tools))
 
 
-def rest_to_rest(stiffness: list[tuple[float, float]], duration: float, rate: float) -> Trajectory:
-    """A motion of joints by half a radian or meter in turn; stiffness from one to another, NaN if none."""
+def rest_to_rest(
+    stiffness: list[tuple[float, float]],
+    duration: float,
+    rate: float,
+    wrench: tuple[float, ...] = (),
+    frame: WrenchFrame = (),
+) -> Trajectory:
+    """A motion of joints by half a radian or meter in turn; stiffness from one to another, NaN if none.
+
+    Wrenches on the tools, six components each, rise from zero.
+    """
     span, count = (0.0, duration), len(stiffness)
     start = tuple(np.linspace(0.2, -0.3, count).tolist())
     end = tuple(position + (-1) ** index / 2 for index, position in enumerate(start))
@@ -86,4 +78,7 @@ def rest_to_rest(stiffness: list[tuple[float, float]], duration: float, rate: fl
     commanded = RestToRest(
         signal=STIFFNESS, span=span, degree=7, start=tuple(start_stiffness), end=tuple(end_stiffness)
     )
-    return Trajectory(UniformTimes(duration, rate), position, {STIFFNESS.key: commanded}, name="move")
+    rising = RestToRest(signal=WRENCH, span=span, degree=7, start=(0.0,) * len(wrench), end=wrench)
+    exerted = WrenchProfile(rising, frame) if wrench else None
+    times = UniformTimes(duration, rate)
+    return Trajectory(times, position, {STIFFNESS.key: commanded}, wrench=exerted, name="move")
