@@ -54,7 +54,7 @@ def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     for index, (joint, parent) in enumerate(zip(robot.joints, robot.parents, strict=True)):
         dh, seat = joint.dh, _seat_pose(frames[parent], joint)
         if math.dist(seat[:3, 3], frames[parent][:3, 3]) > radius:
-            _draw_rod(links[parent], frames[parent][:3, 3], seat[:3, 3], radius)
+            _add_rod(links[parent], frames[parent][:3, 3], seat[:3, 3], radius)
         links[index] = _add_link(root, joint, radius)
         moving = _add_joint(root, joint.name, _urdf_joint_type(joint), links[parent], links[index])
         _add_origin(moving, seat @ pose_matrix((0, 0, dh.d), (0, 0, dh.theta)))
@@ -97,11 +97,11 @@ def _add_link(root: Element, joint: Joint, radius: float) -> Element:
     inertia = link.inertia
     entries = {f"i{name}": getattr(inertia, name) for name in ("xx", "xy", "xz", "yy", "yz", "zz")}
     add_element(body, "inertia", **entries)
-    _draw_rod(whole, np.array([0, 0, -joint.dh.d]), np.array([joint.dh.a, 0, 0]), radius)
+    _add_rod(whole, np.array([0, 0, -joint.dh.d]), np.array([joint.dh.a, 0, 0]), radius)
     return whole
 
 
-def _draw_rod(link: Element, start: FloatArray, end: FloatArray, radius: float) -> None:
+def _add_rod(link: Element, start: FloatArray, end: FloatArray, radius: float) -> None:
     """Draw a rod from point to point, a ball if they are close, without collision geometry."""
     x, y, z = map(float, end - start)
     visual = add_element(link, "visual")
