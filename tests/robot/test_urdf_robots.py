@@ -51,12 +51,12 @@ def oracle(path: Path) -> UrdfOracle:
 def check(path: Path, conversion: Conversion, held: Mapping[str, float] | None = None) -> None:
     """Compare tips and torques at random states with those of Pinocchio."""
     held = held or {}
-    chain, robot = conversion.chain, conversion.robot
+    chain, robot = conversion.tree, conversion.robot
     joints = [joint.urdf.name for joint in chain.joints]
     q, dq, ddq = np.random.default_rng(len(joints)).uniform(-2, 2, (3, SAMPLES, len(joints)))
     for position in q:
         found = tool_pose(robot, position).real
-        expected = oracle(path).tip_pose(joints, chain.base, chain.tip, position, held)
+        expected = oracle(path).tip_pose(joints, chain.base, chain.tips[0].link, position, held)
         np.testing.assert_allclose(found, expected, rtol=0, atol=BOUND)
     found = link_torques(robot, q, dq, ddq, 0 * q, 0 * q)[0] - dq * [joint.damping for joint in robot.joints]
     expected = np.array([oracle(path).torques(joints, *row, held) for row in zip(q, dq, ddq, strict=True)])
@@ -112,8 +112,8 @@ def test_every_chain_from_the_root_is_exact_or_refused_for_a_listed_reason(path)
 def held_anywhere(conversion: Conversion) -> dict[str, float]:
     """A random position, within the limits if there are any, of each joint that can be held."""
     rng = np.random.default_rng(3)
-    leaders = {held.leader for held in conversion.chain.held if held.urdf.type in MOVING}
-    limits = {held.urdf.name: held.urdf.limit.position or (-2.0, 2.0) for held in conversion.chain.held}
+    leaders = {held.leader for held in conversion.tree.held if held.urdf.type in MOVING}
+    limits = {held.urdf.name: held.urdf.limit.position or (-2.0, 2.0) for held in conversion.tree.held}
     return {name: float(rng.uniform(*limits.get(name, (-2.0, 2.0)))) for name in sorted(leaders)}
 
 
