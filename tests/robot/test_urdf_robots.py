@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.metadata
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from oracles.kinematics import tool_pose
 from oracles.urdf_pinocchio import UrdfOracle
-from samples.urdf_chains import ARMS, REFUSED, WITHOUT_ARMS
+from samples.urdf_chains import ARMS, REFUSED, WHOLE_REFUSED, WITHOUT_ARMS
 
 from vsacli import load_trajectory
 from vsacli.analysis.run import inverse_dynamics
@@ -132,6 +133,30 @@ def test_an_arm_can_execute_its_new_trajectory(name, base, tip, tmp_path):
     path = tmp_path / "move.yaml"
     path.write_text(trajectory_template(robot).replace("rate: 1000", "rate: 50  "))
     assert inverse_dynamics(robot, load_trajectory(path, robot)).report.verdict == "ok"
+
+
+def whole_robot(path: Path) -> tuple[Conversion | None, dict[str, float], str]:
+    """All of a robot, with joints held as the message of a refusal advises, and this message."""
+    try:
+        return import_urdf(path), {}, ""
+    except InputError as error:
+        held = dict.fromkeys(re.findall(r"or both by --hold (\S+)=0", str(error)), 0.0)
+        return (import_urdf(path, hold=held) if held else None), held, str(error)
+
+
+@pytest.mark.cases(14)
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parts[-3]}-{path.stem}")
+def test_every_whole_robot_is_exact_or_refused_for_a_listed_reason(path):
+    conversion, held, refusal = whole_robot(path)
+    reason = dict(WHOLE_REFUSED).get(path.name, "")
+    assert (reason in refusal, bool(reason)) == (True, bool(refusal))
+    if conversion is not None:
+        assert max(oracle(path).deviations(conversion, 100, held)) < BOUND
+        assert max(conversion.residual) < BOUND
+        tips = len(conversion.tree.tips)
+        assert (conversion.tree.shape, len(conversion.robot.tools)) == (
+            ("chain", 0) if tips == 1 else ("tree", tips)
+        )
 
 
 def test_every_file_is_listed():

@@ -56,7 +56,7 @@ EXACT_RESIDUAL = 1e-9
 SMALLEST_RESIDUAL = 1e-12
 """Smallest residual reported, m and rad; smaller ones differ between machines."""
 
-MOST_ENDS = 4
+MOST_ENDS = 12
 """Most links that a note names as other possible tools."""
 
 _HEADER = ("joint", "a/m", "alpha/rad", "d/m", "theta/rad", "mass/kg", "links")
