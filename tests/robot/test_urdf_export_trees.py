@@ -1,4 +1,4 @@
-"""Trees exported as URDF: Pinocchio reads them with the same kinematics and link torques; names and rods."""
+"""Trees exported as URDF: Pinocchio and `import-urdf` find the same kinematics and torques; names, rods."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ from samples.branched_robots import random_tree
 from samples.robots import ODD_GRAVITY, random_motion
 from samples.shipped import shipped_robot
 
-from vsacli import forward_kinematics
+from vsacli import Placeholders, forward_kinematics, import_urdf
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.joint import Limits, Tool
 from vsacli.robot.models.urdf import urdf_model
+
+ROUNDING = 1e-9
+"""Of torques, relative to the largest: angles in text are exact, but frames are turned to them and back, and
+almost parallel axes are told apart by 1e-4 rad, which divides the digits of a length."""
 
 
 def bounded(robot):
@@ -46,6 +50,41 @@ def test_pinocchio_reads_a_tree(seed, tmp_path):
         for tool, pose in zip(robot.tools, poses, strict=True):
             reached = data.oMf[model.getFrameId(tool.name)].homogeneous
             np.testing.assert_allclose(reached, pose, atol=1e-13)  # m; products of up to twelve rotations
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        shipped_robot("torso_2x3r"),
+        shipped_robot("hand_3x2r"),
+        random_tree("RRPRR", 6),
+        random_tree("PRRPRR", 2),
+    ],
+    ids=lambda robot: robot.name,
+)
+def test_trees_come_back(robot, tmp_path):
+    """Torques and tools by name, since the file is read depth first; a tool of an inner link is no tip."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf_model(robot).text)
+    found = import_urdf(path, placeholders=Placeholders("rigid")).robot
+    found = dataclasses.replace(found, gravity=robot.gravity)
+    order = [robot.joint_names.index(name) for name in found.joint_names]
+    assert sorted(order) == list(range(len(robot.joints)))
+    motion = random_motion(robot, 10, seed=3)
+    in_order = [values[:, order] for values in motion]
+    for torques, expected in zip(link_torques(found, *in_order), link_torques(robot, *motion), strict=True):
+        rounding = ROUNDING * np.abs(expected).max()
+        np.testing.assert_allclose(torques, expected[:, order], rtol=0, atol=rounding)
+    poses = tools_by_name(robot, motion[0])
+    reached = tools_by_name(found, in_order[0])
+    at_tips = {tool.name for tool in robot.tools if robot.joint_names.index(tool.joint) in robot.tips}
+    for name in at_tips:
+        np.testing.assert_allclose(reached[name], poses[name], atol=ROUNDING)  # of lengths of about 1 m
+
+
+def tools_by_name(robot, q):
+    poses = forward_kinematics(robot, q)[:, len(robot.joints) :]
+    return {name: poses[:, index] for index, name in enumerate(robot.tool_names)}
 
 
 def test_links_of_tools_have_names_of_their_own():
