@@ -82,12 +82,11 @@ def _name_in_c(name: str, tool: str) -> str:
 
 def wrench_by_tool(robot: Robot, arrays: Mapping[str, Any]) -> dict[str, list[Any]]:
     """Return wrench and derivatives of each tool from the arrays of a `wrench_structure`, zero if idle."""
-    idle, tools = np.zeros(len(WRENCH_AXES)), robot.tool_names
+    idle = np.zeros(len(WRENCH_AXES))
+    if WRENCH_NAMES[0] in arrays:
+        return {name: [arrays[name]] for name in WRENCH_NAMES}
     return {
-        name: [arrays[name]]
-        if name in arrays
-        else [arrays.get(_name_in_c(name, tool), idle) for tool in tools]
-        for name in WRENCH_NAMES
+        name: [arrays.get(_name_in_c(name, tool), idle) for tool in robot.tool_names] for name in WRENCH_NAMES
     }
 
 
