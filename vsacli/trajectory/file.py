@@ -182,7 +182,7 @@ def trajectory_file_class(
         fields[key] = value(declared_as(Use(signal)), meaning, default=REQUIRED if needed else None)
     fields[WRENCH.key] = value(declared_as(Use(WRENCH)), WRENCH.meaning, default=None)
     by_tool = ItemsByName(declared_as(Use(WRENCH, by_tool=True)))
-    meaning = "the same by tool, for a robot with several: each as `wrench`, with its own frame"
+    meaning = "wrenches by tool, for a robot with several: each as `wrench`, with its own frame"
     fields[WRENCHES] = value(by_tool, meaning, default=None)
     signals = [(name, Any, field) for name, field in fields.items()]
     further = {"__doc__": TrajectoryFile.__doc__, "untaken": untaken, "tools": tools}
