@@ -22,7 +22,7 @@ from samples.serial_links import serial_links
 from vsacli.compute.vector import SymmetricTensor, Vector
 from vsacli.dynamics import recursion as recursion_module
 from vsacli.dynamics.recursion import recursion
-from vsacli.dynamics.tree import JointState, LinkConstants, ToolLoad
+from vsacli.dynamics.recursion_inputs import JointState, LinkConstants, ToolLoad
 
 type_chains = pytest.mark.parametrize("types", ["R", "P", "RR", "RP", "PR", "PP", "RPR", "RRP"])
 contacts = pytest.mark.parametrize(

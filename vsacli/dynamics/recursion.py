@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeAlias
 
 from vsacli.compute.control_flow import call
 from vsacli.compute.vector import ZERO, Matrix, Rotation, Scalar, SymmetricTensor, Vector, add, cross, mul
-from vsacli.dynamics.tree import (
+from vsacli.dynamics.recursion_inputs import (
     Carrier,
     JointState,
     LinkConstants,

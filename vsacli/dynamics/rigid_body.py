@@ -23,7 +23,7 @@ from vsacli.compute.tracing.python_functions import StateFunction
 from vsacli.compute.vector import ZERO, Scalar, Vector
 from vsacli.dynamics.elastic_torques import carriers, joint_state, link_constants, tool_loads
 from vsacli.dynamics.recursion import recursion
-from vsacli.dynamics.tree import RecursionInputs, ToolLoad, TorqueDerivatives
+from vsacli.dynamics.recursion_inputs import RecursionInputs, ToolLoad, TorqueDerivatives
 from vsacli.robot.joint import Limits
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot

@@ -56,11 +56,11 @@ class Robot(DeclaredRecord):
     )
     base: Pose = value(RecordOf(Pose), "DH frame 0 in the base frame", default=Pose())
     tool: Pose = value(RecordOf(Pose), "end effector in the last DH frame (frame N)", default=Pose())
-    joints: tuple[Joint, ...] = value(
-        Items(RecordOf(Joint), unique="name"), "joints from the base to the tips"
-    )
     tools: tuple[Tool, ...] = value(
         ItemsByName(RecordOf(Tool)), "end effectors by name, instead of `tool`", default=()
+    )
+    joints: tuple[Joint, ...] = value(
+        Items(RecordOf(Joint), unique="name"), "joints from the base to the tips"
     )
     sources: tuple[Source, ...] = field(default=(), kw_only=True, repr=False, compare=False)
 
