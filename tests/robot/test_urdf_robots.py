@@ -1,4 +1,4 @@
-"""Every serial chain, and the whole, of the robots in `example-robot-data`, against Pinocchio's own reading."""
+"""Every chain, and the whole, of the robots in `example-robot-data`, against Pinocchio's own reading."""
 
 from __future__ import annotations
 

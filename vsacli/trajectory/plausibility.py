@@ -80,7 +80,7 @@ def trajectory_findings(
     """
     with np.errstate(all="ignore"):  # extreme values may be infinite in between
         sampled = None if motion is None else motion.at(np.linspace(*times.span, INSTANTS))
-    file_lines, findings = ValuesInFile(source), []
+    file_lines, findings = ValuesInFile(source), list[Problem]()
     for subtree in robot.checked_subtrees:
         checked = CheckedTrajectory(robot, subtree, numbers, times, sampled)
         robot_rules = robot_rules_with_findings(robot, subtree)
