@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import xml.etree.ElementTree as ElementTree
-from typing import Any
 
 import numpy as np
 import pytest
 from samples.branched_robots import random_tree, rest_to_rest
-from samples.mujoco_models import compiled, coordinates, driven, forces_of_tools, inverse_error, mujoco
+from samples.mujoco_models import compiled, coordinates, forces_of_tools, inverse_error, mujoco
 from samples.robots import random_motion, random_robot
 from samples.shipped import shipped_robot
 
@@ -81,26 +80,6 @@ def test_motor_torques_of_a_tree_with_all_kinds_of_drives():
     robot, result = run_of_all_drives()
     assert not result.flags.any(), result.report
     assert inverse_error(robot, result) < ROUNDING
-
-
-PUSHED: dict[str, Any] = {
-    "wrench": (-6, 8, 2, 0.3, 0, -0.2, 5, 0, -4, 0, 0.2, 0.1),
-    "frame": ("base", "end_effector"),
-}
-"""Wrenches on both hands of a torso, N and N m."""
-
-
-@pytest.mark.slow
-def test_torques_drive_a_torso_whose_hands_are_pushed():
-    """Half the step, a sixteenth of the error: only that of the integrator is left."""
-    robot, stiffness = shipped_robot("torso_2x3r"), [NAN, *[(120, 220), (120, 220), (70, 130)] * 2]
-    coarse, fine = (
-        inverse_dynamics(robot, rest_to_rest(stiffness, 1.6, 2 / step, **PUSHED)) for step in (0.008, 0.004)
-    )
-    assert inverse_error(robot, coarse, PUSHED["frame"]) < ROUNDING
-    errors = [np.abs(driven(robot, result, PUSHED["frame"])).max() for result in (coarse, fine)]
-    assert errors[0] < 1e-6
-    assert 12 < errors[0] / errors[1] < 22
 
 
 @pytest.mark.slow

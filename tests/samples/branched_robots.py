@@ -7,12 +7,10 @@ import dataclasses
 import numpy as np
 
 from samples.robots import ODD_GRAVITY, random_joint
-from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.base.wrench import WrenchFrame
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.robot.joint import FRAME_0, Pose, Tool
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -59,17 +57,8 @@ def hand(fingers: int, joints_each: int = 4, seed: int = 2) -> Robot:
     return Robot(name=f"hand-{fingers}", joints=tuple(joints), tools=tuple(tools))
 
 
-def rest_to_rest(
-    stiffness: list[tuple[float, float]],
-    duration: float,
-    rate: float,
-    wrench: tuple[float, ...] = (),
-    frame: WrenchFrame = (),
-) -> Trajectory:
-    """A motion of joints by half a radian or meter in turn; stiffness from one to another, NaN if none.
-
-    Wrenches on the tools, six components each, rise from zero.
-    """
+def rest_to_rest(stiffness: list[tuple[float, float]], duration: float, rate: float) -> Trajectory:
+    """A motion of joints by half a radian or meter in turn; stiffness from one to another, NaN if none."""
     span, count = (0.0, duration), len(stiffness)
     start = tuple(np.linspace(0.2, -0.3, count).tolist())
     end = tuple(position + (-1) ** index / 2 for index, position in enumerate(start))
@@ -78,7 +67,4 @@ def rest_to_rest(
     commanded = RestToRest(
         signal=STIFFNESS, span=span, degree=7, start=tuple(start_stiffness), end=tuple(end_stiffness)
     )
-    rising = RestToRest(signal=WRENCH, span=span, degree=7, start=(0.0,) * len(wrench), end=wrench)
-    exerted = WrenchProfile(rising, frame) if wrench else None
-    times = UniformTimes(duration, rate)
-    return Trajectory(times, position, {STIFFNESS.key: commanded}, wrench=exerted, name="move")
+    return Trajectory(UniformTimes(duration, rate), position, {STIFFNESS.key: commanded}, name="move")
