@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from samples.branched_robots import hand
 from samples.engines import demands, random_wrench
 from samples.generated_code import compile_c
 from samples.long_chains import mixed_chain, random_chain
 from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
+from samples.trees import hand
 
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.control_flow import Keyed, call, repeat
@@ -256,7 +256,7 @@ def links_of_hand(fingers: int, frame: str | None, joints: int = 4) -> LinkTorqu
 
 
 def run_of_hand(fingers: int, _frame: None) -> BalancedDynamics:
-    return BalancedDynamics(InverseDynamics(hand(fingers)))
+    return BalancedDynamics(InverseDynamics(hand(fingers, 4)))
 
 
 def test_a_second_finger_adds_no_code_but_the_signs_of_its_wrench():

@@ -4,40 +4,51 @@ from __future__ import annotations
 
 import dataclasses
 import xml.etree.ElementTree as ElementTree
-from typing import Any
 
 import numpy as np
 import pytest
-from samples.branched_robots import random_tree, rest_to_rest
-from samples.mujoco_models import compiled, coordinates, driven, forces_of_tools, inverse_error, mujoco
-from samples.robots import random_motion, random_robot
+from samples.mujoco_models import compiled, coordinates, forces_of_tools, inverse_error, mujoco
+from samples.robots import random_actuator, random_motion, random_robot
 from samples.shipped import shipped_robot
+from samples.trees import random_tree, random_wrenches, reordered, without_resistance
 
 from vsacli import forward_kinematics, inverse_dynamics
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
-from vsacli.base.wrench import Wrench
+from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_drives import Start
+from vsacli.trajectory.curves import RestToRest
+from vsacli.trajectory.times import UniformTimes
+from vsacli.trajectory.trajectory import Trajectory
 
 ROUNDING = 1e-12
 """Of inverse dynamics, relative to the largest torque: sums of some hundred terms, each good to 1e-16, and
 bodies of 1e-14 kg where a motor has none."""
 
 NAN = (np.nan, np.nan)
-TREES = (("RRRRR", 1), ("RPRRP", 2), ("PRRPRR", 3), ("RRPRRPRR", 4), ("RPRRRRPRRRRR", 5))
+SIZES = {0: 5, 1: 6, 3: 8, 4: 12, 7: 20}
+"""Numbers of joints of five random trees, by seed."""
 
 
-@pytest.mark.parametrize(("types", "seed"), TREES)
-def test_link_torques_of_random_trees_under_wrenches(types, seed):
+def with_cubic_pairs(robot):
+    """The robot with two motors behind cubic springs at each joint, without friction and dampers."""
+    rng = np.random.default_rng(len(robot.joints))
+    bare = without_resistance(robot)
+    joints = (dataclasses.replace(joint, actuator=random_actuator(rng)) for joint in bare.joints)
+    return dataclasses.replace(bare, joints=tuple(joints))
+
+
+@pytest.mark.parametrize("seed", SIZES)
+def test_link_torques_of_random_trees_under_wrenches(seed):
     """Motors stand where they do not load their cubic springs, so that MuJoCo finds tau_e at the joints."""
-    robot, rng = random_tree(types, seed), np.random.default_rng(seed)
+    robot = with_cubic_pairs(random_tree(seed, SIZES[seed]))
     assert len(robot.tips) > 1
-    frames, wrenches = ("end_effector", "base", "base"), rng.uniform(-40, 40, (4, 18))
-    motion = random_motion(robot, len(wrenches), seed)
-    expected = link_torques(robot, *motion, wrench=Wrench.constant(wrenches, frame=frames)).tau_e
+    assert "prismatic" in robot.joint_types
+    motion, wrenches = random_motion(robot, 4, seed), random_wrenches(robot, 4, seed)
+    expected = link_torques(robot, *motion, wrench=wrenches).tau_e
     torques = np.empty_like(expected)
     with compiled(robot) as (model, data):
         places = [model.joint(name).dofadr[0] for name in robot.joint_names]
@@ -47,9 +58,22 @@ def test_link_torques_of_random_trees_under_wrenches(types, seed):
                 for name in (joint.name, f"{joint.name}.motor_1", f"{joint.name}.motor_2"):
                     data.joint(name).qpos[0] = position
             mujoco.mj_inverse(model, data)
-            loads = forces_of_tools(robot, frames, wrenches[sample], model, data)
+            loads = forces_of_tools(robot, wrenches.frame, wrenches.wrench[sample], model, data)
             torques[sample] = (data.qfrc_inverse - loads)[places]
     np.testing.assert_allclose(torques, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
+
+
+def rest_to_rest(stiffness: list[tuple[float, float]], duration: float, rate: float) -> Trajectory:
+    """A motion of joints by half a radian or meter in turn; stiffness from one to another, NaN if none."""
+    span, count = (0.0, duration), len(stiffness)
+    start = tuple(np.linspace(0.2, -0.3, count).tolist())
+    end = tuple(position + (-1) ** index / 2 for index, position in enumerate(start))
+    (start_stiffness, end_stiffness) = zip(*stiffness, strict=True)
+    position = RestToRest(signal=POSITION, span=span, degree=11, start=start, end=end)
+    commanded = RestToRest(
+        signal=STIFFNESS, span=span, degree=7, start=tuple(start_stiffness), end=tuple(end_stiffness)
+    )
+    return Trajectory(UniformTimes(duration, rate), position, {STIFFNESS.key: commanded}, name="move")
 
 
 def run_of_all_drives():
@@ -57,7 +81,7 @@ def run_of_all_drives():
     maccepa = shipped_robot("maccepa_1r").joints[0].actuator
     strong = dataclasses.replace(maccepa.mechanism, k=1000 * maccepa.mechanism.k)
     motor = Motor(inertia=1.5, damping=0.1)
-    robot = random_tree("RPRRRR", 3)
+    robot = with_cubic_pairs(random_tree(9, 6))
     actuators = (
         Rigid(motor=motor),
         Elastic(motor=motor, stiffness=5000),
@@ -83,26 +107,6 @@ def test_motor_torques_of_a_tree_with_all_kinds_of_drives():
     assert inverse_error(robot, result) < ROUNDING
 
 
-PUSHED: dict[str, Any] = {
-    "wrench": (-6, 8, 2, 0.3, 0, -0.2, 5, 0, -4, 0, 0.2, 0.1),
-    "frame": ("base", "end_effector"),
-}
-"""Wrenches on both hands of a torso, N and N m."""
-
-
-@pytest.mark.slow
-def test_torques_drive_a_torso_whose_hands_are_pushed():
-    """Half the step, a sixteenth of the error: only that of the integrator is left."""
-    robot, stiffness = shipped_robot("torso_2x3r"), [NAN, *[(120, 220), (120, 220), (70, 130)] * 2]
-    coarse, fine = (
-        inverse_dynamics(robot, rest_to_rest(stiffness, 1.6, 2 / step, **PUSHED)) for step in (0.008, 0.004)
-    )
-    assert inverse_error(robot, coarse, PUSHED["frame"]) < ROUNDING
-    errors = [np.abs(driven(robot, result, PUSHED["frame"])).max() for result in (coarse, fine)]
-    assert errors[0] < 1e-6
-    assert 12 < errors[0] / errors[1] < 22
-
-
 @pytest.mark.slow
 def test_a_key_frame_has_the_start_of_a_run():
     """MuJoCo lists coordinates depth first, the file by its own order."""
@@ -118,7 +122,7 @@ def test_a_key_frame_has_the_start_of_a_run():
 
 def test_every_tool_is_where_the_forward_kinematics_say():
     """A site may be called as a joint is."""
-    robot = random_tree("RPRRP", 5)
+    robot = with_cubic_pairs(random_tree(4, 8))
     renamed = dataclasses.replace(robot.tools[0], name=robot.joint_names[0])
     robot = dataclasses.replace(robot, tools=(renamed, *robot.tools[1:]))
     q = np.random.default_rng(5).uniform(-1, 1, len(robot.joints))
@@ -144,10 +148,9 @@ def forces_by_name(robot, q, dq, ddq):
 
 
 def test_branches_in_another_order_are_the_same_model():
-    robot = random_tree("RPRRP", 8)
-    assert robot.parents == (-1, -1, 0, 1, 0)
-    order = [1, 3, 0, 4, 2]
-    other = dataclasses.replace(robot, joints=tuple(robot.joints[index] for index in order))
+    robot = with_cubic_pairs(random_tree(4, 8))
+    other = reordered(robot, seed=1)
+    order = [robot.joint_names.index(name) for name in other.joint_names]
     state = np.random.default_rng(8).uniform(-1, 1, (3, len(order)))
     expected = forces_by_name(robot, *state)
     forces = forces_by_name(other, *state[:, order])

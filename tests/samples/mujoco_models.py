@@ -17,6 +17,7 @@ from vsacli.robot.model import Robot
 from vsacli.robot.models.exported_model import exported_tool_names
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_drives import Start, motor_name
+from vsacli.trajectory.trajectory import Trajectory
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -99,6 +100,11 @@ def forces_of_tools(
             force, moment = axes @ components[:3], axes @ components[3:]
             mujoco.mj_applyFT(model, data, force, moment, site.xpos, body, total)
     return total
+
+
+def frame_of_wrenches(trajectory: Trajectory) -> WrenchFrame:
+    """Frame of the wrenches of a trajectory on the tools; empty without any."""
+    return () if trajectory.wrench is None else trajectory.wrench.frame
 
 
 def inverse_error(robot: Robot, result: Any, frame: WrenchFrame = ()) -> float:
