@@ -18,6 +18,7 @@ from vsacli.documents.fields import (
     Integer,
     Interval,
     Items,
+    ItemsByName,
     Name,
     NamedNumbers,
     NumberList,
@@ -129,6 +130,8 @@ def words_of(kind: ValueKind) -> str:
             return f"mapping; `type`: {' or '.join(f'`{name}`' for name in variants)}"
         case OneOrMore(item=item):
             return f"{words_of(item)}; or a list of these"
+        case ItemsByName():
+            return "mapping by name"
         case Items(item=item):
             return "list" if kind.records else f"list, each {words_of(item)}"
         case PairOf(item):
@@ -179,7 +182,10 @@ def _summary(cls: type) -> str:
 
 def _fields(cls: type, prefix: str) -> Iterator[Row | Choices]:
     for name, (field, default) in declared_fields(cls).items():
-        key = f"{prefix}{name}{'[]' if isinstance(field.kind, Items) else ''}"
+        if name == getattr(cls, "keyed_by", None):
+            continue
+        entries = ".NAME" if isinstance(field.kind, ItemsByName) else "[]"
+        key = f"{prefix}{name}{entries if isinstance(field.kind, Items) else ''}"
         yield Row(f"{prefix}{name}", _value(field), _default(default), field.doc)
         records = field.kind.records
         if "" in records:

@@ -22,7 +22,14 @@ from samples.marks import slow, slow_but
 from vsacli.compute.vector import Matrix, SymmetricTensor, Vector
 from vsacli.dynamics import recursion as recursion_module
 from vsacli.dynamics.recursion import recursion
-from vsacli.dynamics.tree import Carrier, JointState, LinkConstants, RecursionInputs, Seat, ToolLoad
+from vsacli.dynamics.recursion_inputs import (
+    Carrier,
+    JointState,
+    LinkConstants,
+    RecursionInputs,
+    Seat,
+    ToolLoad,
+)
 
 type_chains = pytest.mark.parametrize("types", ["R", "P", "RR", "RP", "PR", "PP", "RPR", "RRP"])
 contacts = pytest.mark.parametrize(

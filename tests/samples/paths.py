@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from vsacli.dynamics.elastic_torques import carriers, link_constants, tool_loads
 from vsacli.dynamics.recursion import recursion
-from vsacli.dynamics.tree import JointState, RecursionInputs
+from vsacli.dynamics.recursion_inputs import JointState, RecursionInputs
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot

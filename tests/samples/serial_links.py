@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vsacli.compute.vector import Vector
-from vsacli.dynamics.tree import Carrier, JointState, LinkConstants, RecursionInputs
+from vsacli.dynamics.recursion_inputs import Carrier, JointState, LinkConstants, RecursionInputs
 
 
 def serial_links(

@@ -29,7 +29,7 @@ from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
 from vsacli.dynamics.dampers import joints_with_parallel_damper, parallel_damper_torques
 from vsacli.dynamics.elastic_torques import carriers, link_constants
 from vsacli.dynamics.inverse import BlockKernel, InverseDynamics, call_at_joints, rows_of_joints
-from vsacli.dynamics.tree import Seat
+from vsacli.dynamics.recursion_inputs import Seat
 from vsacli.robot.joint import Joint, Tool
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot
@@ -366,7 +366,7 @@ class _FrameVelocity(NamedTuple):
             velocity=into_seat(self.velocity + cross(self.omega, lever)),
             omega=into_seat(self.omega),
             gravity=into_seat(self.gravity),
-            base=_mapped(into_seat, self.base),
+            base=_rotate_axes(into_seat, self.base),
         )
 
     def behind(self, joint: Joint, q: FloatArray, dq: FloatArray) -> _FrameVelocity:
@@ -385,13 +385,13 @@ class _FrameVelocity(NamedTuple):
             velocity=into_link(self.velocity) + cross(omega, step) + slide,
             omega=omega,
             gravity=into_link(self.gravity),
-            base=_mapped(into_link, self.base),
+            base=_rotate_axes(into_link, self.base),
         )
 
 
-def _mapped(function: Callable[[Vector], Vector], axes: Sequence[Vector]) -> _Axes:
-    x, y, z = map(function, axes)
-    return x, y, z
+def _rotate_axes(into: Callable[[Vector], Vector], axes: _Axes) -> _Axes:
+    x, y, z = axes
+    return into(x), into(y), into(z)
 
 
 def link_energy(robot: Robot, block: Block) -> FloatArray:

@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.compute.vector import Scalar, add, mul
-from vsacli.dynamics.tree import TorqueDerivatives
+from vsacli.dynamics.recursion_inputs import TorqueDerivatives
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 

@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.actuators.friction import Friction, FrictionLaws, sign_of_motion
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.vector import Scalar, exact, mul, sub
-from vsacli.dynamics.tree import TorqueDerivatives
+from vsacli.dynamics.recursion_inputs import TorqueDerivatives
 
 
 def joint_friction(friction: Friction | None, rates: Sequence[Scalar]) -> TorqueDerivatives:

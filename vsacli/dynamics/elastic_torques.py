@@ -40,7 +40,7 @@ from vsacli.compute.vector import (
 from vsacli.dynamics.dampers import damper_torque
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.dynamics.recursion import recursion
-from vsacli.dynamics.tree import (
+from vsacli.dynamics.recursion_inputs import (
     Carrier,
     JointState,
     LinkConstants,
@@ -86,7 +86,7 @@ def carriers(robot: Robot) -> list[Carrier]:
 
 
 def _seat(mount: Pose) -> Seat:
-    return Seat(rotation_matrix(mount), _position(mount))
+    return Seat(rotation_matrix(mount), _exact_position(mount))
 
 
 def tool_loads(robot: Robot, frame: WrenchFrame, wrench: Sequence[Sequence[Scalar]]) -> list[ToolLoad]:
@@ -119,12 +119,12 @@ def _tool_load(
         joint=carrier,
         force=[rotation.times(force) for force, _ in exerted],
         moment=[rotation.times(moment) for _, moment in exerted],
-        point=_position(tool),
+        point=_exact_position(tool),
         in_base=in_base,
     )
 
 
-def _position(pose: Pose) -> Vector:
+def _exact_position(pose: Pose) -> Vector:
     return Vector(*map(exact, pose.xyz))
 
 

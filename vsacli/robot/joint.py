@@ -109,6 +109,11 @@ class Tool(Pose):
 
     keyed_by = "name"
 
+    @staticmethod
+    def example(_joint_type: str) -> dict[str, Any]:
+        """Return plausible values of the fields, for a new robot file."""
+        return {"name": "hand", "joint": "wrist", "xyz": [0.0, 0.0, 0.1]}
+
 
 @dataclass(frozen=True)
 class Inertia(DeclaredRecord):

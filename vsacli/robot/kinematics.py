@@ -27,7 +27,7 @@ class DhJoint(Protocol):
 
     @property
     def mount(self) -> Pose | None:
-        """Where the row begins on the link that carries the joint; None if at its frame."""
+        """Pose of the beginning of the row on the link that carries the joint; None if at its frame."""
 
     @property
     def is_revolute(self) -> bool:

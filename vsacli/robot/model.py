@@ -56,11 +56,11 @@ class Robot(DeclaredRecord):
     )
     base: Pose = value(RecordOf(Pose), "DH frame 0 in the base frame", default=Pose())
     tool: Pose = value(RecordOf(Pose), "end effector in the last DH frame (frame N)", default=Pose())
-    joints: tuple[Joint, ...] = value(
-        Items(RecordOf(Joint), unique="name"), "joints from the base to the tips"
-    )
     tools: tuple[Tool, ...] = value(
         ItemsByName(RecordOf(Tool)), "end effectors by name, instead of `tool`", default=()
+    )
+    joints: tuple[Joint, ...] = value(
+        Items(RecordOf(Joint), unique="name"), "joints from the base to the tips"
     )
     sources: tuple[Source, ...] = field(default=(), kw_only=True, repr=False, compare=False)
 
@@ -138,7 +138,7 @@ class Robot(DeclaredRecord):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, base to tip."""
+        """Names of the joints, in the order of the file: each after the one that carries it."""
         return tuple(joint.name for joint in self.joints)
 
     @property
@@ -167,6 +167,16 @@ class Robot(DeclaredRecord):
         for number, parent in enumerate(self.parents):
             paths.append((*(paths[parent] if parent >= 0 else ()), number))
         return tuple(paths)
+
+    @cached_property
+    def subtrees(self) -> tuple[tuple[int, ...], ...]:
+        """Joints that stand on the base together, because one on the base carries the others."""
+        numbers = range(len(self.joints))
+        return tuple(
+            tuple(number for number in numbers if self.paths[number][0] == first)
+            for first in numbers
+            if self.parents[first] < 0
+        )
 
     @property
     def tips(self) -> tuple[int, ...]:
@@ -227,19 +237,11 @@ class Robot(DeclaredRecord):
         return tuple(dict.fromkeys(sources))
 
     @cached_property
-    def checked(self) -> CheckedRobot:
-        """The robot's data that plausibility rules need."""
-        from vsacli.documents.record_values import numbers_in_record
-        from vsacli.robot.plausibility.checked_robot import CheckedRobot
+    def checked_subtrees(self) -> tuple[CheckedRobot, ...]:
+        """The data that plausibility rules need, of each of `subtrees`."""
+        from vsacli.robot.plausibility.checked_robot import checked_subtrees
 
-        return CheckedRobot(
-            self.joints,
-            self.parents,
-            self.base,
-            self.gravity,
-            tuple(numbers_in_record(self)),
-            self.placeholder,
-        )
+        return checked_subtrees(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -255,7 +257,7 @@ class Robot(DeclaredRecord):
         of_robot = {OF_PLACEHOLDERS: self.placeholder, WITHOUT_MASSES: massless}
         of_joints = (warning for joint in self.joints for warning in joint.warnings())
         whole = (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
-        return (*(Problem("", 0, warning) for warning in whole), *robot_findings(self.checked, self.sources))
+        return (*(Problem("", 0, warning) for warning in whole), *robot_findings(self))
 
 
 def check_robot(value: object) -> None:

@@ -22,8 +22,8 @@ from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import ZERO, Scalar, SymmetricTensor, Vector, sub
 from vsacli.dynamics.elastic_torques import carriers, joint_state, link_constants
 from vsacli.dynamics.recursion import recursion
+from vsacli.dynamics.recursion_inputs import RecursionInputs, TorqueDerivatives
 from vsacli.dynamics.rigid_body import without_drives
-from vsacli.dynamics.tree import RecursionInputs, TorqueDerivatives
 from vsacli.robot.joint import Inertia, Link
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.model import Robot

@@ -22,7 +22,7 @@ from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import adapt_trajectory, command_of, compute_block
 from vsacli.dynamics.recursion import MovingBody, backward, forward
-from vsacli.dynamics.tree import RecursionInputs
+from vsacli.dynamics.recursion_inputs import RecursionInputs
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters, seeded
 from vsacli.studies.sensitivities.joint_derivatives import MARGIN, OF_MOTORS, drive_derivatives

@@ -63,7 +63,7 @@ class Seat(NamedTuple):
 
 
 class Carrier(NamedTuple):
-    """What carries a joint: the link of joint `parent`, or frame 0 if that is -1, and the seat on it."""
+    """The carrier of a joint: the link of joint `parent`, or frame 0 if that is -1, and the seat on it."""
 
     parent: int
     seat: Seat | None = None
