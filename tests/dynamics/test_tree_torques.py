@@ -45,7 +45,8 @@ def lagrange_torques(
 ) -> FloatArray:
     chain = chain_of(tree, motion, modified=modified)
     total = np.column_stack(chain.torques(order))
-    for contact in contacts_of(tree, wrench):
+    by_order = (wrench.wrench, wrench.dwrench, wrench.ddwrench)
+    for contact in contacts_of(tree, by_order, frames_by_tool(wrench.frame)):
         of_joints = contact_torques(chain, contact, order)
         total += np.column_stack([np.broadcast_to(torque, len(total)) for torque in of_joints])
     return total

@@ -14,7 +14,6 @@ import numpy as np
 from oracles.jets import Scalar, leibniz, matrix_product
 from oracles.kinematics import transform
 from oracles.lagrange import Array, Chain, Derivatives
-from vsacli.base.wrench import Wrench
 from vsacli.robot.model import Robot
 
 
@@ -36,17 +35,20 @@ class Contact:
     link: int = -1
 
 
-def contacts_of(robot: Robot, wrench: Wrench) -> list[Contact]:
-    """The contacts at the tools of a robot on which a wrench, with derivatives (samples, 6 tools), acts."""
-    frames = (wrench.frame,) if isinstance(wrench.frame, str) else wrench.frame
+def contacts_of(robot: Robot, wrench: Sequence[Array], frames: Sequence[str | None]) -> list[Contact]:
+    """The contacts at the tools of a robot under wrenches of the environment.
+
+    Args:
+        robot: robot with tools.
+        wrench: components and their two derivatives, each (samples, 6 tools).
+        frames: along whose axes those of each tool are, "base" or "end_effector"; None: nothing acts on it.
+    """
     names = [joint.name for joint in robot.joints]
     contacts = []
     for index, (tool, frame) in enumerate(zip(robot.end_effectors, frames, strict=True)):
         turn = np.eye(3) if frame == "base" else transform(tool).real[:3, :3]
-        # A wrench is exerted by the environment, a contact by the tool.
-        by_order = [
-            -rows[:, 6 * index : 6 * index + 6] for rows in (wrench.wrench, wrench.dwrench, wrench.ddwrench)
-        ]
+        # What the environment exerts on the tool, the tool exerts on it in the other direction.
+        by_order = [-rows[:, 6 * index : 6 * index + 6] for rows in wrench]
         force, moment = ([rows[:, half] @ turn.T for rows in by_order] for half in (slice(3), slice(3, 6)))
         if frame is not None:
             point, link = np.array(tool.xyz), names.index(tool.joint)
