@@ -17,9 +17,6 @@ from vsacli.robot.model import Robot
 _PLACE = re.compile(r"\w+/(\w+\.yaml)(:\d+: )?")
 """A file in the folder of one order, and a line of it."""
 
-NAMES = ("name", "joint", "motor", "parameter", "path", "run")
-"""Keys by which the entries of a list are matched, if they have any of them."""
-
 WITHOUT_MEANING = frozenset(
     {"self_check", "evaluations", "q_error", "largest_error", "stiffness_error", "line"}
 )
@@ -34,7 +31,7 @@ class TreeFiles(NamedTuple):
 
 
 def write_orders(
-    seed: int, joints: int | None = None, share: float = 0.95, folder: Path = Path()
+    seed: int, joints: int, share: float = 0.95, folder: Path = Path()
 ) -> tuple[TreeFiles, TreeFiles]:
     """Files of a random tree and its motion, and of the same ones in another order of the branches.
 
@@ -45,9 +42,7 @@ def write_orders(
     return first, _write("second", reordered(robot, seed), stiffness, folder)
 
 
-def write_branches(
-    seed: int, joints: int | None = None, share: float = 0.95, folder: Path = Path()
-) -> Iterator[TreeFiles]:
+def write_branches(seed: int, joints: int, share: float = 0.95, folder: Path = Path()) -> Iterator[TreeFiles]:
     """Files of each subtree of the same random tree that stands on the base, alone."""
     robot, stiffness = _tree(seed, joints, share)
     for number, subtree in enumerate(robot.subtrees):
@@ -60,7 +55,7 @@ def write_hand(soft: str, folder: Path = Path()) -> TreeFiles:
     return _write("hand", robot, {**dict.fromkeys(robot.joint_names, 5e3), soft: 500.0}, folder)
 
 
-def _tree(seed: int, joints: int | None, share: float) -> tuple[Robot, dict[str, float]]:
+def _tree(seed: int, joints: int, share: float) -> tuple[Robot, dict[str, float]]:
     """A random tree, and the stiffness of each joint that has one."""
     robot, motion = tree_run(seed, joints)
     lowest = {name: float(np.min(values)) for name, values in motion.stiffness.items()}
@@ -116,9 +111,15 @@ def differences(one: Any, other: Any, where: str = "", scale: float = 1e-9) -> I
 
 
 def _sorted(entries: list[Any]) -> list[Any]:
-    """Entries of a list by name, texts by themselves; others as they are."""
-    if entries and all(isinstance(entry, str) for entry in entries):
-        return sorted(entries, key=lambda entry: _PLACE.sub(r"\1", entry))
-    if entries and all(isinstance(entry, dict) and {*NAMES} & {*entry} for entry in entries):
-        return sorted(entries, key=lambda entry: [str(entry.get(name, "")) for name in NAMES])
-    return entries
+    """Entries with texts sorted by them; others as they are."""
+    return sorted(entries, key=lambda entry: _PLACE.sub(r"\1", " ".join(sorted(_texts(entry)))))
+
+
+def _texts(content: Any) -> Iterator[str]:
+    match content:
+        case str():
+            yield content
+        case dict():
+            yield from (text for entry in content.values() for text in _texts(entry))
+        case list():
+            yield from (text for entry in content for text in _texts(entry))

@@ -138,7 +138,7 @@ def finding_lines(joints: Sequence[JointReport], samples: int) -> Iterator[str]:
     """Yield the problems of a run, the most critical first.
 
     Args:
-        joints: reports of the joints, base to tip.
+        joints: reports of the joints, in the order of the robot file.
         samples: number of samples of the run.
     """
     worst_findings = [
@@ -166,7 +166,7 @@ def group_findings(
 
     Args:
         findings: findings of all joints, each with the index of its joint, in any order.
-        names: names of the joints, base to tip.
+        names: names of the joints, in the order of the robot file.
         words: words for each of them; of equally bad ones, the finding at more samples comes first.
     """
     kinds: dict[str, list[tuple[int, Finding]]] = {}
