@@ -26,7 +26,7 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.curves.types import Declaration, Formula, Recorded, Use, declared_as
 from vsacli.trajectory.devices import set_uncommanded_dampers
-from vsacli.trajectory.plausibility import CheckedTrajectory, trajectory_findings
+from vsacli.trajectory.plausibility import trajectory_findings
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -268,7 +268,7 @@ def declared_trajectory(
         document.slow_down, declared, _declared_profiles(document, declared, recordings)
     )
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
-    checked = CheckedTrajectory(robot, tuple(numbers_in_record(document, joints.types)), times, motion)
+    numbers = tuple(numbers_in_record(document, joints.types))
     return Trajectory(
         times,
         profiles[POSITION.key],
@@ -278,7 +278,7 @@ def declared_trajectory(
         warnings=[
             *(warning for recording in recordings for warning in recording.warnings),
             *_formula_warnings(document, declared, joints),
-            *trajectory_findings(checked, source),
+            *trajectory_findings(robot, numbers, times, motion, source),
         ],
         notes=[
             *(note for recording in recordings for note in recording.notes),

@@ -1,4 +1,4 @@
-"""The links and joints of a URDF as a tree, rigid motions of their frames, and the path of a chain in it."""
+"""The links and joints of a URDF as a tree, and rigid motions of their frames."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.did_you_mean import did_you_mean
-from vsacli.base.errors import InputError, Problem
+from vsacli.base.errors import Problem
 from vsacli.base.units import POSITION, Quantity
-from vsacli.documents.tree import quoted
 
 
 def transform(rotation: FloatArray, origin: FloatArray) -> FloatArray:
@@ -248,95 +246,3 @@ def joints_below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
         for joint in children.get(waiting.pop(), ()):
             yield joint
             waiting.append(joint.child)
-
-
-MAX_TIPS = 12
-"""Most links that a message offers as tip."""
-
-
-class ChainPath(NamedTuple):
-    """The joints from one link to another, fixed ones included."""
-
-    base: str
-    tip: str
-    joints: tuple[UrdfJoint, ...]
-
-    @property
-    def moving(self) -> tuple[UrdfJoint, ...]:
-        """Joints of the path that are not fixed."""
-        return tuple(joint for joint in self.joints if not joint.is_fixed)
-
-
-def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
-    """Return the path from a base link (None: the root) to a tip link (None: the only possible one).
-
-    Raises:
-        InputError: a link or path does not exist, or no joint moves on it.
-    """
-    start = urdf.root if base is None else _check_link_name(urdf, base, "--base")
-    end = _only_tip(urdf, start) if tip is None else _check_link_name(urdf, tip, "--tip")
-    path = _chain_between(urdf, start, end)
-    if start == end:
-        same = f"--base and --tip are the same link, {quoted(start)}"
-        raise InputError.one(f"{same}; choose a base nearer to the root, or a tip below it", urdf.file)
-    if not path.moving:
-        message = f"no joint moves between {quoted(start)} and {quoted(end)}; choose another base or tip"
-        raise InputError.one(message, urdf.file)
-    return path
-
-
-def _check_link_name(urdf: Urdf, name: str, option: str) -> str:
-    if name not in urdf.links:
-        near = did_you_mean(name, urdf.links)
-        raise InputError.one(f"{option}: there is no link {quoted(name)}{near}", urdf.file)
-    return name
-
-
-def _chain_between(urdf: Urdf, base: str, tip: str) -> ChainPath:
-    above = urdf.joints_above(tip)
-    links = [joint.parent for joint in above] + [tip]
-    if base not in links:
-        raise InputError.one(f"the link {quoted(tip)} does not hang below {quoted(base)}", urdf.file)
-    return ChainPath(base, tip, tuple(above[links.index(base) :]))
-
-
-def _only_tip(urdf: Urdf, base: str) -> str:
-    """Return the end of the only branch that moves; raise an InputError if it is ambiguous."""
-    leaves = {leaf: _chain_between(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
-    longest = max(leaves.values(), key=len, default=())
-    tips = [leaf for leaf, moving in leaves.items() if moving and moving == longest]
-    straight = all(moving == longest[: len(moving)] for moving in leaves.values())
-    if not longest:
-        raise InputError.one(f"no joint moves below {quoted(base)}", urdf.file)
-    if not straight or len(tips) > 1:
-        offered = [*_forks(urdf, base), *(leaf for leaf, moving in leaves.items() if moving)]
-        raise InputError.one(_describe_possible_tips(urdf, base, list(dict.fromkeys(offered))), urdf.file)
-    return tips[0]
-
-
-def _leaves(urdf: Urdf, base: str) -> list[str]:
-    joints = list(joints_below(base, urdf.joints.values()))
-    parents = {joint.parent for joint in joints}
-    return [joint.child for joint in joints if joint.child not in parents]
-
-
-def _forks(urdf: Urdf, base: str) -> Iterator[str]:
-    """Yield links beyond a moving joint at which more than one branch with moving joints begins."""
-    branches: dict[str, set[str]] = {}
-    for moving in (joint for joint in joints_below(base, urdf.joints.values()) if not joint.is_fixed):
-        for joint in _chain_between(urdf, base, moving.child).joints:
-            branches.setdefault(joint.parent, set()).add(joint.child)
-    for link, ways in branches.items():
-        if len(ways) > 1 and _chain_between(urdf, base, link).moving:
-            yield link
-
-
-def _describe_possible_tips(urdf: Urdf, base: str, tips: list[str]) -> str:
-    counts = [len(_chain_between(urdf, base, tip).moving) for tip in tips]
-    tip_phrases = [
-        f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)
-    ]
-    more = f" and {len(tip_phrases) - MAX_TIPS} more" if len(tip_phrases) > MAX_TIPS else ""
-    offered = ", ".join(tip_phrases[:MAX_TIPS])
-    which = f"several links below {quoted(base)} could be the end effector"
-    return f"{which}; choose one with --tip: {offered}{more}"
