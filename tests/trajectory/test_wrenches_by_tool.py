@@ -204,7 +204,7 @@ def test_arrays_have_an_axis_of_tools_or_are_flat() -> None:
     assert sampled(wrench_frame=(None, None)).wrench is None
     with pytest.raises(InputError, match=r"wrench has the shape \(11, 6\), expected \(11, 2, 6\)"):
         sampled(wrench=push[:, 0], wrench_frame=frames)
-    with pytest.raises(InputError, match="a wrench is given for tool 1, whose frame is None"):
+    with pytest.raises(InputError, match="a wrench is given for tool 1, which has no frame"):
         sampled(wrench=push, wrench_frame=("base", None))
 
 

@@ -376,7 +376,7 @@ def _declared_wrench(
     document: TrajectoryFile, profiles: Mapping[str, Profile], joints: CommandedJoints
 ) -> WrenchProfile | None:
     """Return the wrenches on the tools; None without any."""
-    declared = {signal: each for signal, each in document.declared.items() if signal.is_wrench}
+    declared = {signal: each for signal, each in document.declared.items() if signal.components}
     if not declared:
         return None
     frames = dict.fromkeys(joints.wrenches.values()) | {

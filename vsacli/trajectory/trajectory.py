@@ -365,7 +365,7 @@ def _wrenches_by_tool(
             by_tool[name] = numbers = numbers.reshape(shape)
             for tool, of_tool in enumerate(frame):
                 if of_tool is None and numbers[:, tool].any():
-                    raise InputError.one(f"a {name} is given for tool {tool}, whose frame is None")
+                    raise InputError.one(f"a {name} is given for tool {tool}, which has no frame")
     return {
         wrench_on(f"tool_{tool}", tool): tuple(
             None if rows is None else rows[:, tool] for rows in by_tool.values()
