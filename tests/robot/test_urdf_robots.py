@@ -1,4 +1,4 @@
-"""Every serial chain, and the whole, of the robots in `example-robot-data`, against Pinocchio's own reading."""
+"""Every serial chain, and the whole, of the robots in `example-robot-data`, against Pinocchio's reading."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import pytest
 from oracles.kinematics import tool_pose
 from oracles.urdf_pinocchio import UrdfOracle
 from samples.urdf_chains import ARMS, REFUSED, WHOLE_REFUSED, WITHOUT_ARMS
+from samples.urdf_deviations import deviations
 
 from vsacli import load_trajectory
 from vsacli.analysis.run import inverse_dynamics
@@ -151,7 +152,7 @@ def test_every_whole_robot_is_exact_or_refused_for_a_listed_reason(path):
     reason = dict(WHOLE_REFUSED).get(path.name, "")
     assert (reason in refusal, bool(reason)) == (True, bool(refusal))
     if conversion is not None:
-        assert max(oracle(path).deviations(conversion, 100, held)) < BOUND
+        assert max(deviations(conversion, oracle(path), 100, held)) < BOUND
         assert max(conversion.residual) < BOUND
         tips = len(conversion.tree.tips)
         assert (conversion.tree.shape, len(conversion.robot.tools)) == (
