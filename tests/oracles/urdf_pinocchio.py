@@ -11,9 +11,6 @@ import numpy as np
 import pinocchio as pin
 
 from vsacli.base.arrays import FloatArray
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.kinematics import forward_kinematics
-from vsacli.robot.urdf import Conversion
 
 Held: TypeAlias = Mapping[str, float]
 NOWHERE: Held = {}
@@ -56,21 +53,6 @@ class UrdfOracle:
         rates[:, columns] = dq, ddq
         torques = pin.rnea(self._model, self._data, self._configuration(joints, q, held), *rates)
         return np.array(torques[columns])
-
-    def deviations(self, conversion: Conversion, samples: int, held: Held = NOWHERE) -> tuple[float, float]:
-        """The largest deviation of tools, m, and of torques over the largest one, at random states."""
-        tree, robot = conversion.tree, conversion.robot
-        joints = [joint.urdf.name for joint in tree.joints]
-        q, dq, ddq = np.random.default_rng(len(joints)).uniform(-2, 2, (3, samples, len(joints)))
-        tips = [
-            [self.tip_pose(joints, tree.base, tip.link, position, held) for tip in tree.tips]
-            for position in q
-        ]
-        shift = np.abs(forward_kinematics(robot, q)[:, len(joints) :] - tips).max()
-        expected = np.array([self.torques(joints, *row, held) for row in zip(q, dq, ddq, strict=True)])
-        damping = dq * [joint.damping for joint in robot.joints]
-        torques = link_torques(robot, q, dq, ddq, 0 * q, 0 * q)[0] - damping
-        return float(shift), float(np.abs(torques - expected).max() / np.abs(expected).max())
 
     def _configuration(self, joints: Sequence[str], q: FloatArray, held: Held) -> FloatArray:
         """An unbounded revolute joint has the cosine and sine of its angle as configuration."""

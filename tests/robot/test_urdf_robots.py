@@ -14,6 +14,7 @@ import pytest
 from oracles.kinematics import tool_pose
 from oracles.urdf_pinocchio import UrdfOracle
 from samples.urdf_chains import ARMS, REFUSED, WHOLE_REFUSED, WITHOUT_ARMS
+from samples.urdf_deviations import deviations
 
 from vsacli import load_trajectory
 from vsacli.analysis.run import inverse_dynamics
@@ -64,8 +65,7 @@ def check(path: Path, conversion: Conversion, held: Mapping[str, float] | None =
     np.testing.assert_allclose(found, expected, rtol=0, atol=BOUND * np.abs(expected).max())
     assert conversion.residual.position < BOUND
     # The rules on plausible numbers find nothing, even if the placeholders are taken for real.
-    real = dataclasses.replace(robot, placeholder=False)
-    assert not any(robot_rules_with_findings(real, subtree) for subtree in real.checked_subtrees)
+    assert robot_rules_with_findings(dataclasses.replace(robot, placeholder=False).checked, ()) == frozenset()
 
 
 def ends(urdf: Urdf) -> Iterator[str]:
@@ -152,7 +152,7 @@ def test_every_whole_robot_is_exact_or_refused_for_a_listed_reason(path):
     reason = dict(WHOLE_REFUSED).get(path.name, "")
     assert (reason in refusal, bool(reason)) == (True, bool(refusal))
     if conversion is not None:
-        assert max(oracle(path).deviations(conversion, 100, held)) < BOUND
+        assert max(deviations(conversion, oracle(path), 100, held)) < BOUND
         assert max(conversion.residual) < BOUND
         tips = len(conversion.tree.tips)
         assert (conversion.tree.shape, len(conversion.robot.tools)) == (

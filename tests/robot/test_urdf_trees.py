@@ -10,6 +10,7 @@ import pytest
 from oracles.urdf_pinocchio import UrdfOracle
 from samples.marks import slow
 from samples.urdf import INERTIAL, joint, link, random_tree, robot, write
+from samples.urdf_deviations import deviations
 
 from vsacli import load_robot
 from vsacli.base.errors import InputError
@@ -52,7 +53,7 @@ def urdf(tmp_path, monkeypatch):
 
 def compare_with_pinocchio(conversion, held=None, bound=ROUNDING):
     """Compare tool poses and torques at random states."""
-    assert max(UrdfOracle(conversion.file).deviations(conversion, 5, held or {})) < bound
+    assert max(deviations(conversion, UrdfOracle(conversion.file), 5, held or {})) < bound
 
 
 def test_all_joints_move_and_each_branch_ends_with_a_tool(urdf):
@@ -294,6 +295,21 @@ def test_fingers_with_mass_that_follow_a_joint_can_be_held(urdf):
     assert not {"close_first", "close_second"} & set(conversion.robot.joint_names)
     assert [held.position for held in conversion.tree.held] == [0.3, 0.3]
     compare_with_pinocchio(conversion, {both: 0.3})
+
+
+def test_all_fingers_that_follow_a_joint_are_named_at_once(urdf):
+    """Also those that follow a joint beyond another that follows one."""
+    parts = [
+        *finger("first", INERTIAL),
+        *finger("second", INERTIAL, '<mimic joint="close_first"/>'),
+        *(link(name) for name in ("third", "fourth")),
+        joint("bend", "second", "third", rest=LIMIT),
+        joint("follow", "third", "fourth", rest=f'<mimic joint="bend"/>{LIMIT}'),
+    ]
+    with pytest.raises(InputError) as caught:
+        import_urdf(urdf(robot(*WAIST, *LEFT, *RIGHT, *parts)))
+    named = re.findall(r"joint '(\w+)' follows '(\w+)' \(<mimic>\)", str(caught.value))
+    assert named == [("close_second", "close_first"), ("follow", "bend")]
 
 
 def test_a_floating_base_is_held_and_warned_of(urdf):

@@ -43,9 +43,15 @@ from vsacli.robot.urdf.dh import (
     tidy,
     tidy_angle,
 )
-from vsacli.robot.urdf.held_joints import HeldJoint, Hold
 from vsacli.robot.urdf.link_tree import POSITION_LIMITS, RigidBody, UrdfJoint, inverse_pose, roll_pitch_yaw
-from vsacli.robot.urdf.moving_tree import STANDARD_GRAVITY, MovingJoint, MovingTree, moving_tree
+from vsacli.robot.urdf.moving_tree import (
+    STANDARD_GRAVITY,
+    HeldJoint,
+    Hold,
+    MovingJoint,
+    MovingTree,
+    moving_tree,
+)
 from vsacli.robot.urdf.placeholders import JointLoad, Placeholders, largest_joint_loads
 from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.srdf import ends_of_group

@@ -82,20 +82,20 @@ def dh_frames(joints: Sequence[MovingJoint], tips: Sequence[Tip], snap: float) -
         tips: links of the end effectors.
         snap: angle, rad, below which axes are made parallel.
     """
-    children = joints_on_links(joints)
+    children = _joints_on_links(joints)
     axes, snaps = _make_parallel(joints, _axes(joints, children), children, snap)
+    is_near = [
+        joint.parent < 0 or len(children[joint.parent]) == 1 or not _normal_is_far(axes[joint.parent], axis)
+        for joint, axis in zip(joints, axes, strict=True)
+    ]
     seats: list[FloatArray] = []
-    is_near: list[bool] = []
-    for joint, axis in zip(joints, axes, strict=True):
-        carrying = seats[joint.parent] if joint.parent >= 0 else None
-        is_only = len(children[joint.parent]) == 1
-        is_near.append(carrying is None or is_only or not _normal_is_far(_axis_of(carrying), axis))
-        seats.append(_seat(carrying, axis, is_near[-1]))
-    poses = []
+    for joint, axis, near in zip(joints, axes, is_near, strict=True):
+        seats.append(_seat_on_axis(seats[joint.parent] if joint.parent >= 0 else None, axis, near))
+    poses: list[FloatArray] = []
     for number, seat in enumerate(seats):
         begun = [seats[child] for child in children[number] if is_near[child]]
-        ends = [_last_frame(seat, tip.pose) for tip in tips if tip.joint == number]
-        poses.append(next(iter([*begun, *([] if children[number] else ends), seat])))
+        ends = [_last_frame(seat, tip.pose) for tip in tips if tip.joint == number and not children[number]]
+        poses.append([*begun, *ends, seat][0])
     scale = float(max(abs(pose[:3, 3]).max() for pose in (*seats, *poses, *(tip.pose for tip in tips))))
     steps = (inverse_pose(seat) @ pose for seat, pose in zip(seats, poses, strict=True))
     return Frames(
@@ -109,7 +109,7 @@ def dh_frames(joints: Sequence[MovingJoint], tips: Sequence[Tip], snap: float) -
     )
 
 
-def joints_on_links(joints: Sequence[MovingJoint]) -> dict[int, list[int]]:
+def _joints_on_links(joints: Sequence[MovingJoint]) -> dict[int, list[int]]:
     """Return the indices of the joints on the link of each joint, those on the base under -1."""
     children: dict[int, list[int]] = {number: [] for number in range(-1, len(joints))}
     for number, joint in enumerate(joints):
@@ -156,7 +156,7 @@ def _make_parallel(
     for joint, axis in zip(joints, axes, strict=True):
         if joint.parent >= 0:
             before = result[joint.parent]
-            sine = _sine(before, axis)
+            sine = _sine_between(before, axis)
             is_only = len(children[joint.parent]) == 1
             if sine <= FILE_ROUNDING or (is_only and sine < snap and _normal_is_far(before, axis)):
                 direction = before.direction * math.copysign(1, before.direction @ axis.direction)
@@ -166,13 +166,13 @@ def _make_parallel(
     return result, tuple(snaps)
 
 
-def _sine(first: Axis, second: Axis) -> float:
+def _sine_between(first: Axis, second: Axis) -> float:
     return float(np.linalg.norm(np.cross(first.direction, second.direction)))
 
 
 def _normal_is_far(first: Axis, second: Axis) -> bool:
     """Return whether the common normal is far away; that of parallel axes is not."""
-    is_parallel = _sine(first, second) <= FILE_ROUNDING
+    is_parallel = _sine_between(first, second) <= FILE_ROUNDING
     return not is_parallel and max(map(abs, _common_normal_feet(first, second))) > FAR_NORMAL
 
 
@@ -192,7 +192,7 @@ def _axis_of(frame: FloatArray) -> Axis:
     return Axis(frame[:3, 3], frame[:3, 2])
 
 
-def _seat(carrying: FloatArray | None, axis: Axis, is_near: bool) -> FloatArray:
+def _seat_on_axis(carrying: FloatArray | None, axis: Axis, is_near: bool) -> FloatArray:
     """Return the frame at which the row of a joint begins: on its axis, where the frames before suggest.
 
     Args:

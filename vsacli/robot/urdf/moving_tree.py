@@ -6,27 +6,159 @@ Links behind fixed and held joints move with the joint that carries them.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.did_you_mean import did_you_mean
+from vsacli.documents.expression import ExpressionError
+from vsacli.documents.number import evaluate
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
-from vsacli.robot.urdf.held_joints import HeldJoint, Hold, held_joints
 from vsacli.robot.urdf.link_tree import (
+    LARGEST_NUMBER,
     MOVING,
+    MovingJoints,
     RigidBody,
     Urdf,
     UrdfJoint,
     UrdfLink,
+    choose_moving_joints,
+    fixed_ends,
     inverse_pose,
+    is_massless,
     joints_below,
     weld_bodies,
 )
-from vsacli.robot.urdf.moving_joints import MovingJoints, choose_moving_joints, fixed_ends
+
+Hold = Mapping[str, float | str]
+"""Positions of held joints by name, rad (m), or texts such as "90 deg"."""
+
+LIMIT_ROUNDING = 1e-9
+"""Distance, rad or m, by which a held joint may be beyond a limit without a warning."""
+
+
+class HeldJoint(NamedTuple):
+    """A joint that could move but is held.
+
+    Attributes:
+        urdf: joint of the URDF.
+        position: position at which it is held, rad (m).
+        leader: name of the last leader in a chain of mimics; its own without an existing leader.
+        released: whether it is held although it follows a joint that moves.
+    """
+
+    urdf: UrdfJoint
+    position: float
+    leader: str
+    released: bool = False
+
+    @property
+    def follows(self) -> bool:
+        """Whether its position follows from another joint."""
+        return self.leader != self.urdf.name
+
+    def __str__(self) -> str:
+        following = f" (follows {self.leader})" if self.follows else ""
+        return f"{self.urdf.name} at {self.position:.6g} {self.urdf.unit()}{following}"
+
+    def warnings(self) -> Iterator[str]:
+        """Yield warnings that the position may be wrong, with a fix."""
+        mimic, limit = self.urdf.mimic, self.urdf.limit.position
+        if mimic is not None and self.released:
+            yield f"{self}: it follows {mimic.leader} (<mimic>), and its motion with that joint is neglected"
+        elif mimic is not None and not self.follows and self.position == _default_position(self.urdf):
+            reason = f"there is no joint {quoted(mimic.leader)}, which it should follow (<mimic>)"
+            yield f"{self}: {reason}; if it stands elsewhere, say so by --hold {self.leader}=VALUE"
+        if limit is not None and not limit[0] - LIMIT_ROUNDING <= self.position <= limit[1] + LIMIT_ROUNDING:
+            low, high = limit
+            value = "VALUE" if self.follows else f"{max(low, min(high, self.position)):.6g}"
+            limits = f"is outside its limits, {low:.6g} to {high:.6g} {self.urdf.unit()}"
+            yield f"{self} {limits}; hold it elsewhere by --hold {self.leader}={value}"
+
+
+def held_joints(
+    urdf: Urdf, standing: Iterable[UrdfJoint], moving: MovingJoints, hold: Hold
+) -> list[HeldJoint]:
+    """Return held joints, at their given position, at one that follows from a leader, or at zero.
+
+    Args:
+        urdf: robot.
+        standing: joints to hold.
+        moving: joints that move.
+        hold: positions of joints that follow no other, or one that moves.
+
+    Raises:
+        InputError: a position cannot be given, or has no effect.
+    """
+    followed = [(joint, urdf.relation_to_leader(joint, hold)) for joint in standing]
+    leaders = {mimic.leader: _default_position(urdf.joints[mimic.leader]) for _, mimic in followed}
+    problems = Problems(urdf.file)
+    for name, value in hold.items():
+        leaders[name] = _read_hold_position(urdf, name, value, leaders, moving, problems)
+    problems.check()
+    held = [
+        HeldJoint(
+            joint,
+            mimic.multiplier * leaders[mimic.leader] + mimic.offset,
+            mimic.leader,
+            joint.name in hold and urdf.relation_to_leader(joint).leader in moving.names,
+        )
+        for joint, mimic in followed
+    ]
+    for joint, position, leader, _ in held:
+        if not abs(position) <= LARGEST_NUMBER:
+            message = f"following {quoted(leader)} it stands at {position:g} {joint.unit()}"
+            problems.add(joint.line, f"joint {quoted(joint.name)}: {message}, more than can be computed with")
+    problems.check()
+    return held
+
+
+def _default_position(joint: UrdfJoint) -> float:
+    """Return the default position of a joint: zero, or that at which its missing leader is at zero."""
+    return 0.0 if joint.mimic is None else joint.mimic.offset
+
+
+def _read_hold_position(
+    urdf: Urdf,
+    name: str,
+    value: float | str,
+    leaders: Collection[str],
+    moving: MovingJoints,
+    problems: Problems,
+) -> float:
+    """Return the given position of a held joint; 0 after adding a problem."""
+    option = f"--hold {name}={value}"
+    reason = _reason_against(urdf, name, leaders, moving)
+    if reason:
+        problems.add(0, f"{option}: {reason}")
+        return 0.0
+    unit = urdf.joints[name].unit()
+    try:
+        return evaluate(str(value), unit)
+    except ExpressionError as error:
+        problems.add(0, f"{option}: {error}")
+        return 0.0
+
+
+def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: MovingJoints) -> str:
+    """Return the reason why a joint cannot be held; empty if it can."""
+    joint, shown = urdf.joints.get(name), quoted(name)
+    if joint is None:
+        return f"there is no joint {shown} outside the {moving.shape}{did_you_mean(name, leaders)}"
+    if joint.type not in MOVING:
+        return f"{shown} is {joint.type}, so it has no position to choose"
+    if name in moving.names:
+        return f"{shown} belongs to the {moving.shape}, where it moves"
+    if (leader := urdf.relation_to_leader(joint).leader) != name and leader not in moving.names:
+        return f"{shown} follows {quoted(leader)} (<mimic>); hold that one"
+    if name not in leaders:
+        return f"{shown} is neither outside the {moving.shape} nor below its base, so that it has no effect"
+    return ""
+
 
 STANDARD_GRAVITY = 9.81
 """Gravity, m/s^2, along -z of the root link; a URDF does not give any."""
@@ -133,12 +265,12 @@ def moving_tree(
     """
     hold = hold or {}
     moving = choose_moving_joints(urdf, base, tips, hold)
-    carriers = _carriers(urdf, moving)
+    carriers = _carriers_of_links(urdf, moving)
     carried = _links_by_carrier(urdf, carriers, len(moving.joints))
     below_base = [joint for joint in urdf.joints_above(moving.base) if not joint.is_fixed]
     side = _side_joints(urdf, carriers, moving)
     follow = {
-        joint.name: urdf.relation_to_leader(joint, hold).leader in moving.names and _is_massless(urdf, joint)
+        joint.name: urdf.relation_to_leader(joint, hold).leader in moving.names and is_massless(urdf, joint)
         for joint in side
     }
     beside = [joint for joint in side if not follow[joint.name]]
@@ -176,12 +308,6 @@ def moving_tree(
 def _ends_beyond(urdf: Urdf, moving: MovingJoints, tip: str) -> tuple[str, ...]:
     """Return links that could be the tool instead of a tip that was not chosen."""
     return tuple(fixed_ends(urdf, tip)) if moving.whole else ()
-
-
-def _is_massless(urdf: Urdf, joint: UrdfJoint) -> bool:
-    """Return whether a joint moves links without mass only, so that it exerts no torque on its leader."""
-    links = [urdf.links[moved.child] for moved in (joint, *joints_below(joint.child, urdf.joints.values()))]
-    return not any(link.flaw or (link.body and (link.body.mass or link.body.inertia.any())) for link in links)
 
 
 def _check_joints(
@@ -232,7 +358,7 @@ def _link_poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
     return poses
 
 
-def _carriers(urdf: Urdf, moving: MovingJoints) -> dict[str, int]:
+def _carriers_of_links(urdf: Urdf, moving: MovingJoints) -> dict[str, int]:
     """Return the index of the moving joint that carries each link from the base on; -1 for the base."""
     number = {name: index for index, name in enumerate(moving.names)}
     carriers = {moving.base: -1}

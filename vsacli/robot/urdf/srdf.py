@@ -73,7 +73,7 @@ class _Groups:
             for joint in moving
             if joint.name not in inner
         ]
-        base = self._base(group, [paths[tip] for tip in tips], moving)
+        base = self._common_base(group, [paths[tip] for tip in tips], moving)
         above = self._urdf.joints_above(base)
         between = {joint.name: joint for tip in tips for joint in paths[tip] if joint not in above}
         missing = [joint for joint in between.values() if not joint.is_fixed and joint not in moving]
@@ -83,7 +83,9 @@ class _Groups:
             self._problems.fail(group.line, f"the group {quoted(name)} leaves out {names} within its {shape}")
         return GroupEnds(base, tuple(tips))
 
-    def _base(self, group: Element, paths: Sequence[Sequence[UrdfJoint]], moving: Sequence[UrdfJoint]) -> str:
+    def _common_base(
+        self, group: Element, paths: Sequence[Sequence[UrdfJoint]], moving: Sequence[UrdfJoint]
+    ) -> str:
         """Return the last link before all moving joints; of a single chain, the base link if it names one."""
         chain = next(group.children_with_tag("chain"), None)
         if chain is not None and len(paths) == 1:
