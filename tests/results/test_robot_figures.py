@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from functools import cache
 from pathlib import Path
 
@@ -15,11 +16,12 @@ from samples.figures import smallest_stiffness
 from samples.marks import slow_but
 from samples.robots import random_motion, random_robot
 from samples.shipped import shipped_robot, shipped_run
+from samples.torso_and_hand import hand_text, torso_text, written
 from samples.wrenches import held
 
 from vsacli import inverse_dynamics, load_robot
 from vsacli.files.info.robot_info import load_sizes, static_load
-from vsacli.results.charts.arm_chart import Chain, arm_chart, home_position
+from vsacli.results.charts.arm_chart import ArmPoints, arm_chart, home_position
 from vsacli.results.charts.robot_charts import LIMITS, ActuatorChart, StiffnessMap, actuator_charts
 from vsacli.results.plots import actuators_figure, arm_figure, stiffness_figure
 from vsacli.robot.model import Robot
@@ -165,26 +167,27 @@ def test_torque_of_a_mechanism_has_the_stiffness_of_each_setting() -> None:
 def test_points_of_the_chain_agree_with_forward_kinematics(types: str) -> None:
     robot = held(random_robot(types, seed=3))
     q = random_motion(robot, 5, seed=1)[0]
-    chain = Chain.of(robot, q)
+    points = ArmPoints.of(robot, q)
+    chain = np.concatenate((points.origins, points.tools), axis=1)
     for row, position in enumerate(q):
         poses = [
             oracle.tool_pose(Robot(name="part", base=robot.base, joints=robot.joints[:end]), position[:end])
             for end in range(1, len(types) + 1)
         ]
         poses = [oracle.transform(robot.base), *poses, oracle.tool_pose(robot, position)]
-        np.testing.assert_allclose(chain.origins[row], [pose.real[:3, 3] for pose in poses], atol=1e-12)
-        np.testing.assert_allclose(chain.axes[row], [pose.real[:3, 2] for pose in poses[:-2]], atol=1e-12)
-        along = chain.elbows[row] - chain.origins[row, :-2]
-        np.testing.assert_allclose(np.cross(along, chain.axes[row]), 0, atol=1e-12)
-        lengths = np.linalg.norm(chain.origins[row, 1:-1] - chain.elbows[row], axis=1)
+        np.testing.assert_allclose(chain[row], [pose.real[:3, 3] for pose in poses], atol=1e-12)
+        np.testing.assert_allclose(points.axes[row], [pose.real[:3, 2] for pose in poses[:-2]], atol=1e-12)
+        along = points.elbows[row] - points.seats[row]
+        np.testing.assert_allclose(np.cross(along, points.axes[row]), 0, atol=1e-12)
+        lengths = np.linalg.norm(points.origins[row, 1:] - points.elbows[row], axis=1)
         np.testing.assert_allclose(lengths, [abs(joint.dh.a) for joint in robot.joints], atol=1e-12)
 
 
 @bundled
 def test_joints_are_drawn_on_their_axes_and_apart(file: Path) -> None:
     arm = arm_chart(load_robot(file))
-    along = arm.centers - arm.chain.origins[0, :-2]
-    np.testing.assert_allclose(np.cross(along, arm.chain.axes[0]), 0, atol=1e-12)
+    along = arm.centers - arm.points.seats[0]
+    np.testing.assert_allclose(np.cross(along, arm.points.axes[0]), 0, atol=1e-12)
     apart = np.linalg.norm(arm.centers[:, None] - arm.centers, axis=-1) + np.eye(len(arm.centers))
     assert apart.min() > 0.9 * arm.joint_length
 
@@ -208,6 +211,36 @@ def test_views_have_gravity_downward_and_are_right_handed(file: Path) -> None:
     for view in arm.views:
         np.testing.assert_allclose(np.linalg.norm([view.right, view.up], axis=1), 1)
         assert view.right @ view.up == pytest.approx(0)
+
+
+def test_a_tree_is_drawn_with_every_branch_and_tool(tmp_path: Path) -> None:
+    robot = load_robot(written(tmp_path, torso_text()))
+    arm = arm_chart(robot)
+    origins, seats, elbows, tools = (
+        points[0].tolist()
+        for points in (arm.points.origins, arm.points.seats, arm.points.elbows, arm.points.tools)
+    )
+    to_left_hand = [elbows[2], origins[3], elbows[3], origins[4], tools[0]]
+    assert [line.tolist() for line in arm.lines[:2]] == [
+        [[0, 0, 0], origins[0], elbows[0], origins[1], seats[1], elbows[1], origins[2], *to_left_hand],
+        [origins[1], seats[4], elbows[4], origins[5], elbows[5], origins[6], elbows[6], origins[7], tools[1]],
+    ]
+    assert [len(line) for line in arm.lines] == [12, 9, 5]
+    corners = np.concatenate(arm.lines)
+    assert np.ptp(corners, axis=0).max() <= arm.size
+    texts = [text.get_text() for text in arm_figure(arm).axes[0].texts]
+    assert {*robot.joint_names, *robot.tool_names} <= set(texts)
+
+
+@pytest.mark.slow
+def test_all_joints_of_a_hand_are_named(tmp_path: Path) -> None:
+    hand = load_robot(written(tmp_path, hand_text()))
+    figure = arm_figure(arm_chart(hand))
+    assert {*hand.joint_names, *hand.tool_names} <= {text.get_text() for text in figure.axes[0].texts}
+    figure.draw_without_rendering()
+    names = [text for text in figure.axes[0].texts if text.get_text() in hand.joint_names]
+    boxes = sorted((text.get_window_extent() for text in names), key=lambda box: float(box.y0))
+    assert all(below.y1 <= above.y0 + 1 for below, above in itertools.pairwise(boxes))
 
 
 def test_a_flat_arm_needs_no_top_view() -> None:

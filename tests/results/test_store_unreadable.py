@@ -24,7 +24,7 @@ def foreign(path):
 
 def newer(path):
     with h5py.File(path, "r+") as file:
-        file.attrs["format"] = "vsacli-result/3"
+        file.attrs["format"] = "vsacli-result/4"
 
 
 def without_report(path):
@@ -55,7 +55,8 @@ def folder(path):
         (foreign, "is an HDF5 file that vsacli has not written, expected a result"),
         (
             newer,
-            "has the format vsacli-result/3, but this version reads vsacli-result/2; run invdyn again",
+            "has the format vsacli-result/4, but this version reads vsacli-result/2 and vsacli-result/3; "
+            "run invdyn again",
         ),
         (truncated, "is damaged or truncated; compute it again"),
         (without_report, r"is damaged or truncated \(report not found\); compute it again"),

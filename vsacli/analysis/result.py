@@ -14,7 +14,7 @@ from vsacli.base.errors import InputError, check_path
 from vsacli.base.renamed import now_called
 from vsacli.base.storage import temporary_folder
 from vsacli.base.tables import aligned, html_table
-from vsacli.base.variables import VARIABLES, Block
+from vsacli.base.variables import VARIABLES, Block, split_axes, variables_by_tool
 from vsacli.results.store.reader import StoredResult, open_one_of
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -51,7 +51,9 @@ class Result(Shown, Block):
     """
 
     def __init__(self, *, report: Report, robot: Robot, trajectory: Trajectory, **arrays: AnyArray) -> None:
-        super().__init__(**arrays)
+        declared = variables_by_tool(VARIABLES, len(robot.tool_names))
+        shaped = {name: split_axes(array, declared[name], robot.labels) for name, array in arrays.items()}
+        super().__init__(**shaped)
         self.report, self.robot, self.trajectory = report, robot, trajectory
 
     @property
@@ -127,7 +129,7 @@ class Result(Shown, Block):
         """
         from vsacli.results.exports.formats import labeled_dataset
 
-        return labeled_dataset(self.arrays(), self.robot.joint_names, self.robot.joint_types)
+        return labeled_dataset(self.arrays(), self.robot.labels, self.robot.joint_types)
 
 
 class ResultFile(Shown, StoredResult):
@@ -193,7 +195,7 @@ class ResultFile(Shown, StoredResult):
         """Return all variables of the file as an `xarray.Dataset`; see `Result.to_xarray`."""
         from vsacli.results.exports.formats import labeled_dataset
 
-        return labeled_dataset(self.arrays(), self.joint_names, self.joint_types)
+        return labeled_dataset(self.arrays(), self.labels, self.joint_types)
 
 
 def open_result(path: str | os.PathLike[str]) -> ResultFile:

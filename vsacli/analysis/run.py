@@ -268,7 +268,8 @@ def inverse_dynamics(
         engine: Backend: "numpy", compiled "c", or "auto", which uses compiled code where that saves time.
 
     Returns:
-        Every variable of `Block` over (samples, joints[, 2]); `report` holds the verdict.
+        Every variable of `Block` over (samples, joints[, 2]), the wrenches on several tools over (samples,
+        tools, 6); `report` holds the verdict.
 
     Raises:
         InputError: The trajectory has a different number of joints than the robot, or no stiffness for a

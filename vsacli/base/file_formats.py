@@ -12,4 +12,12 @@ COLUMNS = "vsacli-columns/1"
 RESULT = "vsacli-result/2"
 SIMULATION = "vsacli-simulation/2"
 SENSITIVITY = "vsacli-sensitivity/2"
+OF_TREES = {
+    RESULT: "vsacli-result/3",
+    SIMULATION: "vsacli-simulation/3",
+    SENSITIVITY: "vsacli-sensitivity/3",
+}
+"""Versions for robots that are trees or have `tools`: a dimension `tool`, and inputs `parent`, `mount` and
+`tools`, which readers of the version before would miss."""
+
 STUDY_TABLE = "vsacli-study-table/1"

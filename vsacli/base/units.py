@@ -21,6 +21,10 @@ class Quantity:
         """Return the unit at a joint, or along an axis of a wrench."""
         return self.unit(joint_types[index])
 
+    def of_axis(self, _column: int) -> str:
+        """Return the unit of a column of a variable that is not one of joints."""
+        return self.revolute
+
     def inside(self, variant: str | None) -> Quantity:
         """Return the quantity in a record with a unit variant of its own; None is that of the joint."""
         return self if variant is None else constant(self.unit(variant))
@@ -50,9 +54,9 @@ class WrenchQuantity(Quantity):
         """See `Quantity.of_component`."""
         return self.of_axis(index)
 
-    def of_axis(self, axis: int) -> str:
-        """Return the unit of a component: three forces, then three moments."""
-        return self.prismatic if axis < 3 else self.revolute
+    def of_axis(self, column: int) -> str:
+        """Return the unit of a component: three forces, then three moments, of each tool in turn."""
+        return self.prismatic if column % 6 < 3 else self.revolute
 
     def __str__(self) -> str:
         return f"{self.prismatic} (forces), {self.revolute} (moments)"

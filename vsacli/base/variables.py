@@ -5,8 +5,9 @@ The declarations feed the pipeline, the HDF5 attributes, the CSV headers, the pl
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, ClassVar, NamedTuple, Self
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any, ClassVar, NamedTuple, Self, TypeAlias
 
 from vsacli.base import units
 from vsacli.base.arrays import AnyArray, of_joint
@@ -14,9 +15,12 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.units import Quantity
-from vsacli.base.wrench import wrench_columns
+from vsacli.base.wrench import DISPLACEMENT_AXES, WRENCH_AXES, wrench_columns
 
 MOTORS = (1, 2)
+_WRENCH = ("wrench_axis",)
+"""Dimensions of the wrench on one tool."""
+
 SPRINGS = "springs"
 """Requirement of variables, other than commanded signals, that only joints with springs have."""
 
@@ -37,7 +41,8 @@ class Variable(NamedTuple):
 
     Attributes:
         name: name in files and in Python.
-        dims: dimensions after `time`: (), ("joint",), ("joint", "motor") or ("wrench_axis",).
+        dims: dimensions after `time`: (), ("joint",), ("joint", "motor") or ("wrench_axis",); see
+            `variables_by_tool` for robots with several tools.
         quantity: units at revolute and prismatic joints, or of moments and forces.
         long_name: short description.
         equation: number in Buondonno & De Luca (2016), or source of the value.
@@ -66,7 +71,7 @@ def _given() -> Iterator[Variable]:
     for signal in COMMANDED.values():
         # joints with springs have a stiffness even if it is not commanded
         yield from _of_signal(signal, "joint", SPRINGS if signal is STIFFNESS else signal.key)
-    yield from _of_signal(WRENCH, "wrench_axis")
+    yield from _of_signal(WRENCH, *_WRENCH)
 
 
 _JOINT, _MOTOR = ("joint",), ("joint", "motor")
@@ -214,9 +219,9 @@ class Block:
     """Variables over consecutive samples, as attributes of shape (samples, joints[, 2]).
 
     A value that cannot be computed is NaN, and `flags` gives the reason; a variable that the joint's actuator
-    does not have is NaN throughout. Missing variables are None: the wrench, (samples, 6), of a trajectory
-    without one; `motor_energy`, an integral over all earlier samples, and standard deviations until the block
-    has its place in a run; standard deviations if no signal was recorded.
+    does not have is NaN throughout. Missing variables are None: the wrench, (samples, 6 tools), of a
+    trajectory without one; `motor_energy`, an integral over all earlier samples, and standard deviations
+    until the block has its place in a run; standard deviations if no signal was recorded.
 
     Attributes:
         declared: variables that a block may have, by name.
@@ -280,9 +285,59 @@ def _like(name: str, declared: Iterable[str]) -> list[str]:
     return [each for each in declared if name.endswith(ending) or not each.endswith(ending)]
 
 
-def column_names(variable: Variable, joint_names: Iterable[str]) -> list[str]:
-    """Return the CSV headers of a variable in the order of its flat values, e.g. `elbow.tau_motor_1`."""
-    if "wrench_axis" in variable.dims:
-        return wrench_columns(variable.name)
-    endings = [f"_{motor}" for motor in MOTORS] if "motor" in variable.dims else [""]
-    return [f"{joint}.{variable.name}{ending}" for joint in joint_names for ending in endings]
+Labels: TypeAlias = Mapping[str, Sequence[Any]]
+"""Labels along each dimension after `time`."""
+
+
+def dimension_labels(joint_names: Sequence[str], tool_names: Sequence[str]) -> Labels:
+    """Return the labels along the dimensions of the variables of a robot."""
+    return {
+        "joint": joint_names,
+        "motor": MOTORS,
+        "tool": tool_names,
+        "displacement_axis": DISPLACEMENT_AXES,
+        "wrench_axis": WRENCH_AXES,
+    }
+
+
+def variables_by_tool(declared: Mapping[str, Variable], tools: int) -> Mapping[str, Variable]:
+    """Return the variables of a robot with some number of tools: several have wrenches along `tool`.
+
+    In memory, blocks of samples have the components of several tools in turn along one axis.
+    """
+    if tools < 2:
+        return declared
+    return {
+        name: _of_each_tool(variable) if variable.dims == _WRENCH else variable
+        for name, variable in declared.items()
+    }
+
+
+def _of_each_tool(variable: Variable) -> Variable:
+    words = variable.long_name.replace("the end effector", "each tool")
+    return variable._replace(dims=("tool", *variable.dims), long_name=words)
+
+
+def row_shape(variable: Variable, labels: Labels) -> tuple[int, ...]:
+    """Return the lengths of the axes after time."""
+    return tuple(len(labels[dim]) for dim in variable.dims)
+
+
+def split_axes(values: AnyArray, variable: Variable, labels: Labels) -> AnyArray:
+    """Return samples of a variable with an axis for each dimension: tools may be in turn along one."""
+    return values.reshape(len(values), *row_shape(variable, labels))
+
+
+def column_names(variable: Variable, labels: Labels) -> list[str]:
+    """Return the CSV headers of a variable in the order of its flat values.
+
+    Examples: `elbow.tau_motor_1`, `fx`, and `left_hand.fx` for a robot with several tools.
+    """
+    owned = variable.dims[0] in ("joint", "tool")
+    owners = [f"{owner}." for owner in labels[variable.dims[0]]] if owned else [""]
+    if variable.dims[owned:] == _WRENCH:
+        columns = wrench_columns(variable.name)
+    else:
+        endings = product(*(labels[dim] for dim in variable.dims[owned:]))
+        columns = ["_".join(map(str, (variable.name, *ending))) for ending in endings]
+    return [owner + column for owner in owners for column in columns]

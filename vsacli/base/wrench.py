@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 WRENCH_AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 """Components: the force, and the moment about the origin of the tool frame."""
 
+DISPLACEMENT_AXES = ("x", "y", "z", "rx", "ry", "rz")
+"""Components of a small displacement: translation along, and rotation about the axes of a frame."""
+
 WRENCH_NAMES = ("wrench", "dwrench", "ddwrench")
 """Names of the wrench and its derivatives in `Wrench`, files and results."""
 

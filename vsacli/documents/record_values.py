@@ -34,7 +34,7 @@ class ResolvedField(NamedTuple):
 
     Attributes:
         path: keys that lead to the field in a file, e.g. ("joints", "link", "mass").
-        dims: names of the axes of `values`: joint, motor, axis, bound or direction.
+        dims: names of the axes of `values`: joint, tool, motor, axis, bound or direction.
         quantity: unit at revolute and prismatic joints, None for text.
         doc: declared description.
         values: float64 or str objects; NaN or "" at entries without the field.
@@ -66,6 +66,8 @@ def resolve_values(
                 yield _resolve_single(kind.number, entry)._replace(path=(name,))
         case PairOf(item, dim):
             yield from _stack_members(dim, (resolve_values(item, side, of_record) for side in content))
+        case ItemsByName(item=item):
+            yield from _stack_members("tool", (resolve_values(item, tool, of_record) for tool in content))
         case Items(item=item, records=records) if records:
             yield from _stack_members("joint", (resolve_values(item, joint, of_record) for joint in content))
         case _:
@@ -83,7 +85,7 @@ def _resolve_single(kind: ValueKind, content: Any) -> ResolvedField:
 
 
 def _stack_members(dim: str, members: Iterable[Iterable[ResolvedField]]) -> Iterator[ResolvedField]:
-    """Join the fields of all joints, or of both sides of a joint, along a new first axis.
+    """Join the fields of all joints or tools, or of both sides of a joint, along a new first axis.
 
     The variant of a field with most dimensions determines the shape: joints may have one or two motors or
     springs.

@@ -13,7 +13,7 @@ from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_type
 from vsacli.base.signals import COMMANDED, Signal
 from vsacli.base.tables import aligned, html_table
-from vsacli.base.variables import LOSSES, OF_ANY_ROBOT, VARIABLES, Variable
+from vsacli.base.variables import LOSSES, OF_ANY_ROBOT, VARIABLES, Labels, Variable, dimension_labels
 from vsacli.documents.fields import (
     Items,
     ItemsByName,
@@ -113,8 +113,18 @@ class Robot(DeclaredRecord):
         return html_table(f"Robot {self.name}", self._joint_rows())
 
     def _joint_rows(self) -> list[tuple[str, ...]]:
-        joints = ((joint.name, joint.type, joint.actuator_type) for joint in self.joints)
-        return [("joint", "type", "actuator"), *joints]
+        joints = [(joint.name, joint.type, joint.actuator_type) for joint in self.joints]
+        rows: list[tuple[str, ...]] = [("joint", "type", "actuator"), *joints]
+        if self.is_plain_chain:
+            return rows
+        carriers = [FRAME_0 if parent < 0 else self.joint_names[parent] for parent in self.parents]
+        tools = [
+            ", ".join(tool.name for tool in self.end_effectors if tool.joint == name) or "-"
+            for name in self.joint_names
+        ]
+        return [
+            (*row, *further) for row, *further in zip(rows, ["on", *carriers], ["tools", *tools], strict=True)
+        ]
 
     def replace(self, path: str | Mapping[str, Any], value: Any = None) -> Self:
         """Return a robot with another value at a path; the original is unchanged.
@@ -179,6 +189,12 @@ class Robot(DeclaredRecord):
         )
 
     @property
+    def is_plain_chain(self) -> bool:
+        """Whether each link carries the next joint at its frame, and the tool is not one of `tools`."""
+        mounted = any(joint.mount is not None for joint in self.joints)
+        return not (mounted or self.tools) and self.parents == tuple(range(-1, len(self.joints) - 1))
+
+    @property
     def tips(self) -> tuple[int, ...]:
         """Joints whose links carry no other joint."""
         return tuple(sorted(set(range(len(self.joints))) - set(self.parents)))
@@ -200,6 +216,11 @@ class Robot(DeclaredRecord):
     def tool_names(self) -> tuple[str, ...]:
         """Names of `end_effectors`."""
         return tuple(tool.name for tool in self.end_effectors)
+
+    @property
+    def labels(self) -> Labels:
+        """Labels along each dimension of the variables of results."""
+        return dimension_labels(self.joint_names, self.tool_names)
 
     def end_effector(self, name: str | None = None) -> int:
         """Return the index of a tool among `end_effectors`; None stands for the only one.

@@ -17,6 +17,7 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited, rest_t
 from samples.marks import needs
 from samples.measured_pages import wicked_page
 from samples.studies import study
+from samples.torso_and_hand import torso_result
 
 from vsacli.cli.main import run
 
@@ -186,11 +187,11 @@ def test_controls_are_reached_by_tab(page: Browser) -> None:
     for _ in range(20):
         page.press("\ue004")
         reached.add(page.run("return document.activeElement.id || document.activeElement.className"))
-    assert {"play", "cursor", "zoom-in", "zoom-out", "zoom-all", "chip", "chain"} <= reached
+    assert {"play", "cursor", "zoom-in", "zoom-out", "zoom-all", "chip", "arm"} <= reached
 
 
 def test_time_runs_and_the_robot_moves(page: Browser) -> None:
-    picture = "return document.getElementById('chain').toDataURL()"
+    picture = "return document.getElementById('arm').toDataURL()"
     still = page.run(picture)
     page.find("#play").click()
     moved = page.run("return new Promise(done => setTimeout(() => done(vsacli.state.cursor), 700))")
@@ -199,12 +200,30 @@ def test_time_runs_and_the_robot_moves(page: Browser) -> None:
     assert page.settled(picture) != still
 
 
+def test_a_tree_moves_with_its_tools(browser: Browser, tmp_path: Path) -> None:
+    torso_result(tmp_path).save(tmp_path / "torso.h5")
+    assert run(["plot", str(tmp_path / "torso.h5"), "--format", "html", "-o", str(tmp_path), "-q"]) == 0
+    browser.open(tmp_path / "torso.html", whole=False)
+    drawn = browser.run(
+        """const { arm } = vsacli.data.files[0], { array } = vsacli;
+        return [arm.tools, arm.tool_carriers, array(arm.origins).length, array(arm.seats).length]"""
+    )
+    assert drawn == [["left_hand", "right_hand", "lamp"], [4, 7, 8], 41 * (9 + 3) * 3, 41 * 8 * 3]
+    picture = "return document.getElementById('arm').toDataURL()"
+    still = browser.settled(picture)
+    browser.find("#play").click()
+    browser.run("return new Promise(done => setTimeout(done, 400))")
+    browser.find("#play").click()
+    assert browser.settled(picture) != still
+    assert not browser.complaints()
+
+
 FALL = """const { flat } = vsacli.robot.eye(), [from, to] = [flat([0, 0, 0]), flat(arguments[0])];
 return [to[0] - from[0], to[1] - from[1]]"""
 """The way of a point that moves along a vector, to the right and down in the picture, pixels."""
 
-DARKEST = """const chain = document.getElementById('chain');
-const { data } = chain.getContext('2d').getImageData(0, 0, 0.12 * chain.width, 0.25 * chain.height);
+DARKEST = """const arm = document.getElementById('arm');
+const { data } = arm.getContext('2d').getImageData(0, 0, 0.12 * arm.width, 0.25 * arm.height);
 let darkest = 255;
 for (let at = 0; at < data.length; at += 4) if (data[at + 3] > 250) darkest = Math.min(darkest, data[at]);
 return darkest"""
@@ -222,7 +241,7 @@ def test_up_is_against_gravity_with_its_arrow(browser: Browser, pages: Pages, gr
         assert down > 10 * abs(gravity[1])
         assert abs(aside) < 1e-9 * down
     heights = browser.run(
-        """const { data, array, robot: { down } } = vsacli, points = array(data.files[0].chain.origins);
+        """const { data, array, robot: { down } } = vsacli, points = array(data.files[0].arm.origins);
         return Array.from({ length: points.length / 3 }, (_, at) =>
           -down.reduce((sum, part, axis) => sum + part * points[3 * at + axis], 0));"""
     )
@@ -262,7 +281,7 @@ def test_failures_are_marked_and_the_robot_says_what_is_wrong(browser: Browser, 
     failing = browser.texts(".trouble span")
     assert failing
     browser.run("vsacli.setCursor(4)")
-    assert "infeasible" in browser.settled("return document.getElementById('chain-note').textContent")
+    assert "infeasible" in browser.settled("return document.getElementById('arm-note').textContent")
     names = browser.run("return vsacli.data.joints.map(joint => joint.name)")
     paints = browser.run("return vsacli.data.joints.map((_, joint) => vsacli.curveColor(joint))")
     areas = browser.run(AREAS)
@@ -302,8 +321,8 @@ for (const each of document.querySelectorAll('.copy *')) {
 }
 return [...inks]"""
 
-BRIGHTEST = """const chain = document.getElementById('chain');
-const { data } = chain.getContext('2d').getImageData(0, 0, chain.width, chain.height);
+BRIGHTEST = """const arm = document.getElementById('arm');
+const { data } = arm.getContext('2d').getImageData(0, 0, arm.width, arm.height);
 let brightest = 0;
 for (let at = 0; at < data.length; at += 4) {
   if (data[at + 3] > 250) brightest = Math.max(brightest, data[at + 1]);

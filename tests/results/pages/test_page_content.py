@@ -152,7 +152,7 @@ def test_stretches_are_those_where_steps_fail(vsacli: Any, infeasible_result: Pa
 
 def test_the_chain_moves_as_forward_kinematics_says(page: Page, feasible_result: Path) -> None:
     [file] = page.data["files"]
-    chain, robot = file["chain"], load_robot(ROBOT)
+    chain, robot = file["arm"], load_robot(ROBOT)
     with h5py.File(feasible_result) as stored:
         poses = forward_kinematics(robot, stored["q"][...])
     origins = page.array(chain["origins"]).reshape(401, 5, 3)
@@ -272,7 +272,8 @@ def test_a_result_reads_its_geometry(feasible_result: Path) -> None:
     with StoredResult.open(feasible_result) as result:
         geometry = result.geometry()
     assert [row.dh for row in geometry.joints] == [joint.dh for joint in robot.joints]
-    assert (geometry.base, geometry.tool) == (robot.base, robot.tool)
+    assert (geometry.base, geometry.end_effectors) == (robot.base, (robot.tool,))
+    assert (geometry.parents, geometry.tool_joints) == (robot.parents, robot.tool_joints)
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ from vsacli.base.units import Quantity
 from vsacli.documents.reading import format_changes
 from vsacli.files.stored_reports import stored_report
 from vsacli.results.store.reader import StoredResult
+from vsacli.robot.model import END_EFFECTOR
 
 
 def describe_result(result: StoredResult) -> dict[str, Any]:
@@ -19,6 +20,7 @@ def describe_result(result: StoredResult) -> dict[str, Any]:
     Raises:
         InputError: the file is damaged.
     """
+    tools = {} if result.tool_names == (END_EFFECTOR,) else {"tools": list(result.tool_names)}
     return {
         "kind": result.kind,
         "robot": result.robot_name,
@@ -32,6 +34,7 @@ def describe_result(result: StoredResult) -> dict[str, Any]:
                 result.joint_names, result.joint_types, result.actuators, strict=True
             )
         ],
+        **tools,
         "provenance": result.provenance(),
         "variables": [
             {
@@ -70,7 +73,10 @@ def result_lines(result: Mapping[str, Any]) -> Iterator[str]:
         yield from (f"  with --set {change}" for change in format_changes(each.get("changes", {})))
     rows = [("joint", "type", "actuator")]
     rows += [(joint["name"], joint["type"], joint["actuator"]) for joint in result["joints"]]
-    yield from ("", *aligned(rows), "")
+    yield from ("", *aligned(rows))
+    if result.get("tools"):
+        yield f"tools {', '.join(result['tools'])}"
+    yield ""
     yield from _left(
         [
             (each["name"], ", ".join(each["dims"]), each["units"], each["meaning"])

@@ -166,6 +166,8 @@ def _without_defaults(fields: dict[str, Any], *names: str) -> dict[str, Any]:
 
 def _reaches(robot: Robot) -> dict[str, Any]:
     """Return the reach of each tool by its name."""
+    if not robot.end_effectors:
+        return {}
     furthest, bounds = reach(robot), reach_bounds(robot)
     return {
         name: {"bound": bound, "found": float(found), "at": configuration.tolist()}
@@ -177,9 +179,12 @@ def _reaches(robot: Robot) -> dict[str, Any]:
 
 def _joints(robot: Robot) -> list[dict[str, Any]]:
     loads = static_load(robot)
+    carriers = [None if parent < 0 else robot.joint_names[parent] for parent in robot.parents]
+    in_row = [None, *robot.joint_names[:-1]]
     return [
         {
-            **_without_defaults(json_fields(joint), "parent", "mount"),
+            **_without_defaults({**json_fields(joint), "parent": None}, "parent", "mount"),
+            **({} if carriers == in_row else {"parent": carriers[index]}),
             "static_load": {"torque": float(value), "at": configuration.tolist()},
             "stiffness_range": stiffness_ranges(joint, float(value), float(configuration[index])),
         }

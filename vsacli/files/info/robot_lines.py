@@ -22,16 +22,20 @@ PLACES = {"link": "between its links", "transmission": "parallel to its springs"
 
 def robot_lines(robot: Values) -> Iterator[str]:
     """Yield the description of a robot as lines of text."""
-    reach, joints = robot["reach"], robot["joints"]
+    joints = robot["joints"]
     yield f"robot {robot['name']}: {counted(len(joints), 'joint')}, {short(robot['mass'])} kg"
     if robot["description"]:
         yield robot["description"]
     yield f"gravity {row(robot['gravity'])} m/s^2 in the base frame"
-    for name in ("base", "tool"):
-        pose = robot[name]
-        yield f"{name} xyz {row(pose['xyz'])} m, rpy {row(pose['rpy'])} rad"
-    yield f"reach {short(reach['found'])} m from the origin of DH frame 0; bound {short(reach['bound'])} m"
+    yield f"base {_pose(robot['base'])}"
+    if "tools" in robot:
+        yield from ("", *aligned(list(_tools(robot))), "reach: from the origin of DH frame 0")
+    elif (reach := robot["reach"]) is not None:
+        yield f"tool {_pose(robot['tool'])}"
+        bound = f"bound {short(reach['bound'])} m"
+        yield f"reach {short(reach['found'])} m from the origin of DH frame 0; {bound}"
     yield from ("", *aligned(list(_geometry(joints))))
+    yield from _mounts(joints)
     yield from ("", *aligned(list(_masses(joints))))
     yield from ("", *aligned(list(_drives(joints))), "")
     yield "static load: the largest torque of gravity that was found, over configurations within the limits"
@@ -43,12 +47,38 @@ def robot_lines(robot: Values) -> Iterator[str]:
     yield from warnings_and_notes(robot["warnings"], ())
 
 
+def _pose(pose: Values) -> str:
+    return f"xyz {row(pose['xyz'])} m, rpy {row(pose['rpy'])} rad"
+
+
+def _tools(robot: Values) -> Iterator[tuple[str, ...]]:
+    yield "tool", "on", "xyz [m]", "rpy [rad]", "reach [m]", "bound [m]"
+    for name, tool in robot["tools"].items():
+        reach = robot["reach"][name]
+        frame = row(tool["xyz"]), row(tool["rpy"])
+        yield name, tool["joint"], *frame, short(reach["found"]), short(reach["bound"])
+
+
 def _geometry(joints: Sequence[Values]) -> Iterator[tuple[str, ...]]:
-    yield "joint", "type", "a [m]", "alpha [rad]", "d [m]", "theta [rad]", "limits"
+    on = ("on",) if any("parent" in joint for joint in joints) else ()
+    yield "joint", *on, "type", "a [m]", "alpha [rad]", "d [m]", "theta [rad]", "limits"
     for joint in joints:
-        row = (short(joint["dh"][name]) for name in ("a", "alpha", "d", "theta"))
+        carrier = (joint["parent"] or "frame 0",) if on else ()
+        numbers = (short(joint["dh"][name]) for name in ("a", "alpha", "d", "theta"))
         unit = POSITION.unit(joint["type"])
-        yield joint["name"], joint["type"], *row, span(joint["limits"]["position"], unit)
+        limits = span(joint["limits"]["position"], unit)
+        yield joint["name"], *carrier, joint["type"], *numbers, limits
+
+
+def _mounts(joints: Sequence[Values]) -> Iterator[str]:
+    """Yield a table of the mounts, if there are any."""
+    rows = [
+        (joint["name"], row(joint["mount"]["xyz"]), row(joint["mount"]["rpy"]))
+        for joint in joints
+        if "mount" in joint
+    ]
+    if rows:
+        yield from ("", *aligned([("mount of", "xyz [m]", "rpy [rad]"), *rows]))
 
 
 def _masses(joints: Sequence[Values]) -> Iterator[tuple[str, ...]]:

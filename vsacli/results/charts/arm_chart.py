@@ -26,34 +26,74 @@ SMALLEST_SIZE = 1e-3
 """Size, m, of the drawing of a robot without lengths."""
 
 
-class Chain(NamedTuple):
-    """Points of a chain of links in the base frame, m.
+class ArmPoints(NamedTuple):
+    """Points of a tree of links in the base frame, m.
 
     Attributes:
-        origins: origins of DH frames 0 to N and of the end effector, (samples, joints + 2, 3).
+        origins: origins of DH frames 0 to N, (samples, joints + 1, 3).
+        seats: points of the carriers at which the rows of the joints begin, (samples, joints, 3).
         elbows: intersections of the common normal of two axes with the first, (samples, joints, 3): the
-            offset d leads there along the z axis of the previous frame, the length a from there to the next
-            frame.
+            offset d leads there along the z axis of the seat, the length a from there to the next frame.
         axes: unit vectors along the axes of the joints, (samples, joints, 3).
-        base, tool: axes of DH frame 0 and of the end effector as columns, (samples, 3, 3).
+        tools: origins of the tools, (samples, tools, 3).
+        base: axes of DH frame 0 as columns, (samples, 3, 3).
+        tool_axes: axes of the tools as columns, (samples, tools, 3, 3).
+        carriers: index in `origins` of the frame that carries each joint.
+        tool_carriers: index in `origins` of the frame that carries each tool.
     """
 
     origins: FloatArray
+    seats: FloatArray
     elbows: FloatArray
     axes: FloatArray
+    tools: FloatArray
     base: FloatArray
-    tool: FloatArray
+    tool_axes: FloatArray
+    carriers: tuple[int, ...]
+    tool_carriers: tuple[int, ...]
 
     @classmethod
-    def of(cls, geometry: Geometry, q: FloatArray) -> Chain:
-        """Return the chain at joint positions, (samples, joints)."""
+    def of(cls, geometry: Geometry, q: FloatArray) -> ArmPoints:
+        """Return the points at joint positions, (samples, joints)."""
         base, seats, links, tools = frames_in_base(geometry, q)
-        origins = np.stack([frame.origin for frame in (base, *links, *tools)], axis=1)
+        origins = np.stack([frame.origin for frame in (base, *links)], axis=1)
         lengths = np.array([joint.dh.a for joint in geometry.joints])
         normals = np.stack([frame.axes[..., 0] for frame in links], axis=1)
-        axes = np.stack([seat.axes[..., 2] for seat in seats], axis=1)
-        elbows = origins[:, 1:-1] - lengths[:, None] * normals
-        return cls(origins, elbows, axes, base.axes, tools[-1].axes)
+        return cls(
+            origins,
+            np.stack([seat.origin for seat in seats], axis=1),
+            origins[:, 1:] - lengths[:, None] * normals,
+            np.stack([seat.axes[..., 2] for seat in seats], axis=1),
+            np.stack([origins[:, 0], *(tool.origin for tool in tools)], axis=1)[:, 1:],
+            base.axes,
+            np.stack([base.axes, *(tool.axes for tool in tools)], axis=1)[:, 1:],
+            tuple(parent + 1 for parent in geometry.parents),
+            tuple(carrier + 1 for carrier in geometry.tool_joints),
+        )
+
+    def lines(self) -> list[FloatArray]:
+        """Return the corners of the links of one sample as lines, (corners, 3), the base frame first.
+
+        A line goes on from a link to the first joint or tool that it carries; others begin lines of their
+        own.
+        """
+        [origins], [seats], [elbows], [tools] = self.origins, self.seats, self.elbows, self.tools
+        lines = [[np.zeros(3), origins[0]]]
+        open_ends = {0: lines[0]}
+        stretches = [
+            (carrier, [*([] if np.array_equal(seat, origins[carrier]) else [seat]), elbow, origin])
+            for carrier, seat, elbow, origin in zip(self.carriers, seats, elbows, origins[1:], strict=True)
+        ]
+        stretches += [(carrier, [tool]) for carrier, tool in zip(self.tool_carriers, tools, strict=True)]
+        for number, (carrier, corners) in enumerate(stretches, 1):
+            line = open_ends.pop(carrier, None)
+            if line is None:
+                line = [origins[carrier]]
+                lines.append(line)
+            line += corners
+            if number < len(origins):
+                open_ends[number] = line
+        return [np.array(line) for line in lines]
 
 
 def home_position(joint: Joint) -> float:
@@ -95,8 +135,9 @@ class ArmChart(NamedTuple):
         title: name of the robot, and the configuration.
         joints: the joints.
         q: home configuration, (joints,).
-        chain: points of the links, of one sample.
-        line: corners of the links from the base to the end effector, (corners, 3).
+        tool_names: names of several tools; empty for a single one.
+        points: points of the links, of one sample.
+        lines: corners of the links from the base to the tools, (corners, 3).
         centers: places of the joints on their axes, (joints, 3); apart from each other where several axes
             intersect.
         down: direction of gravity, (3,); zero without gravity.
@@ -109,8 +150,9 @@ class ArmChart(NamedTuple):
     title: str
     joints: tuple[Joint, ...]
     q: FloatArray
-    chain: Chain
-    line: FloatArray
+    tool_names: tuple[str, ...]
+    points: ArmPoints
+    lines: list[FloatArray]
     centers: FloatArray
     down: FloatArray
     size: float
@@ -122,19 +164,21 @@ class ArmChart(NamedTuple):
 def arm_chart(robot: Robot) -> ArmChart:
     """Return the drawing of a robot's arm."""
     q = np.array([home_position(joint) for joint in robot.joints])
-    chain = Chain.of(robot, q[None])
-    line = _corners(chain)
-    extents = np.ptp(line, axis=0)
+    points = ArmPoints.of(robot, q[None])
+    lines = points.lines()
+    corners = np.concatenate(lines)
+    extents = np.ptp(corners, axis=0)
     size = max(float(extents.max()), SMALLEST_SIZE)
     length = size * min(JOINT_SHARE, SUM_OF_JOINTS / len(robot.joints))
-    centers = _centers(chain, length)
+    centers = _centers(points, length)
     down = direction_of(np.array(robot.gravity))
-    drawn = np.concatenate((line, centers))
+    drawn = np.concatenate((corners, centers))
     middle = (drawn.max(axis=0) + drawn.min(axis=0)) / 2
     title = f"{robot.name}: arm at {_configuration(robot, q)}"
     views = _views(down, extents, size)
     size = max(size, float(np.ptp(drawn, axis=0).max()))
-    return ArmChart(title, robot.joints, q, chain, line, centers, down, size, length, middle, views)
+    tools = robot.tool_names if len(robot.tool_names) > 1 else ()
+    return ArmChart(title, robot.joints, q, tools, points, lines, centers, down, size, length, middle, views)
 
 
 def direction_of(gravity: FloatArray) -> FloatArray:
@@ -153,21 +197,14 @@ def _configuration(robot: Robot, q: FloatArray) -> str:
     return f"q = 0, {', '.join(moved)} at the middle of the limits"
 
 
-def _corners(chain: Chain) -> FloatArray:
-    """Return the corners of the links, (corners, 3): base frame, DH frames with elbows between, tool."""
-    origins, elbows = chain.origins[0], chain.elbows[0]
-    moving = np.stack((elbows, origins[1:-1]), axis=1).reshape(-1, 3)
-    return np.concatenate((np.zeros((1, 3)), origins[:1], moving, origins[-1:]))
-
-
-def _centers(chain: Chain, length: float) -> FloatArray:
+def _centers(points: ArmPoints, length: float) -> FloatArray:
     """Return the places of the joints: where the offset d is long, in the middle of it.
 
     Joints in the place of an earlier one move along their axes: the first one backward, others forward.
     """
-    origins, elbows, axes = chain.origins[0, :-2], chain.elbows[0], chain.axes[0]
-    far = np.linalg.norm(elbows - origins, axis=1) > 2 * length
-    centers = np.where(far[:, None], (origins + elbows) / 2, origins)
+    seats, elbows, axes = points.seats[0], points.elbows[0], points.axes[0]
+    far = np.linalg.norm(elbows - seats, axis=1) > 2 * length
+    centers: FloatArray = np.where(far[:, None], (seats + elbows) / 2, seats)
     for index in range(1, len(centers)):
         near = np.flatnonzero(np.linalg.norm(centers[:index] - centers[index], axis=1) < length)
         if near.tolist() == [0]:

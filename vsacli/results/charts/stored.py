@@ -17,7 +17,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.simulation_variables import COMMANDS, SIMULATED, measured
 from vsacli.base.units import WrenchQuantity
-from vsacli.base.variables import MOTORS, VARIABLES, Variable, deviation
+from vsacli.base.variables import MOTORS, VARIABLES, Variable, column_names, deviation
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Band, Chart, Failures, Limit, Line
 from vsacli.results.charts.reduction import (
@@ -145,7 +145,15 @@ class StoredCharts:
 
     def __init__(self, files: Sequence[StoredResult]) -> None:
         self.files, self.first = files, files[0]
-        self.common = [name for name in self.first.variables if all(name in f.variables for f in files)]
+        self.common = [
+            name for name in self.first.variables if all(self._has_common(name, file) for file in files)
+        ]
+
+    def _has_common(self, name: str, file: StoredResult) -> bool:
+        """Return whether a file has a variable of the first one, and along the same tools if along any."""
+        if name not in file.variables or "tool" not in self.first.declared[name].dims:
+            return name in file.variables
+        return file.tool_names == self.first.tool_names
 
     @cached_property
     def failures(self) -> list[Failures]:
@@ -293,7 +301,7 @@ class StoredCharts:
         """Return all charts of a variable: by motor and type of joint, of simulations with the command."""
         variable = self.first.declared[name]
         if "joint" not in variable.dims:
-            return list(self._of_wrench(variable))
+            return list(self._of_wrench(variable)) if isinstance(variable.quantity, WrenchQuantity) else []
         columns = list(self._columns(variable))
         if name == "stiffness" and set(BOUNDS) <= set(self.common) and len(self.files) == 1:
             return [replace(each, title=f"{variable.long_name}, {each.title}") for each in self.corridors()]
@@ -336,26 +344,28 @@ class StoredCharts:
                     yield column, f"{words}{motor}{kind}", joints
 
     def _of_wrench(self, variable: Variable) -> Iterator[Chart]:
-        """Yield charts of forces and of moments."""
+        """Yield charts of forces and of moments, on each of several tools."""
         assert isinstance(variable.quantity, WrenchQuantity), "see WRENCH_AXES"
-        curves = [read_curves(_Components(file), [variable.name]) for file in self.files]
-        for words, axes in (("forces", range(3)), ("moments", range(3, 6))):
-            lines = [
-                Line(of_file[axis][0], axis, WRENCH_AXES[axis], axis % 3, file=file)
-                for file, of_file in enumerate(curves)
-                for axis in axes
-            ]
-            unit = variable.quantity.of_axis(axes[0])
-            yield Chart(f"{variable.long_name}, {words}", unit, lines, name=variable.name)
+        curves = [read_curves(_Components(file, variable), [variable.name]) for file in self.files]
+        tools = [f" on {tool}" for tool in self.first.tool_names] if "tool" in variable.dims else [""]
+        for number, on_tool in enumerate(tools):
+            before = number * len(WRENCH_AXES)
+            for words, axes in (("forces", range(3)), ("moments", range(3, 6))):
+                lines = [
+                    Line(of_file[before + axis][0], axis, WRENCH_AXES[axis], axis % 3, file=file)
+                    for file, of_file in enumerate(curves)
+                    for axis in axes
+                ]
+                unit = variable.quantity.of_axis(axes[0])
+                yield Chart(f"{variable.long_name}, {words}{on_tool}", unit, lines, name=variable.name)
 
 
 class _Components:
-    """A wrench over time, with its components in place of joints."""
+    """A wrench over time, with its components, those of several tools in turn, in place of joints."""
 
-    joint_names = WRENCH_AXES
-
-    def __init__(self, file: Sampled) -> None:
+    def __init__(self, file: StoredResult, variable: Variable) -> None:
         self._file = file
+        self.joint_names = column_names(variable, file.labels)
 
     @property
     def time(self) -> FloatArray:

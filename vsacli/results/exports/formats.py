@@ -20,8 +20,7 @@ import scipy
 
 from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
-from vsacli.base.variables import MOTORS, VARIABLES
-from vsacli.base.wrench import WRENCH_AXES
+from vsacli.base.variables import VARIABLES, Labels, row_shape, variables_by_tool
 from vsacli.results.exports.result_format import ResultFormat
 from vsacli.results.exports.selection import Chosen, Samples, Selection
 from vsacli.results.store.schema import storage_type, variable_attributes
@@ -33,9 +32,9 @@ if TYPE_CHECKING:
 
 def write_csv(selection: Selection, stream: TextIO, done: Callable[[int], object]) -> None:
     """Write a header line and a line for each sample; open a file with newline=""."""
-    names = selection.result.joint_names
+    labels = selection.result.labels
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["time", *(column for each in selection.chosen for column in each.columns(names))])
+    writer.writerow(["time", *(column for each in selection.chosen for column in each.columns(labels))])
     for block in selection.blocks():
         columns = [block.time.tolist()]
         for each in selection.chosen:
@@ -62,7 +61,7 @@ MAX_VARIABLE_BYTES = 2**31 - 2**16
 
 
 def write_mat(selection: Selection, stream: IO[bytes], done: Callable[[int], object]) -> None:
-    """Write `time`, each variable (samples, joints[, 2]), and names and units.
+    """Write `time`, each variable (samples, joints[, 2]), or by tool, and names and units.
 
     Each variable is read when it is written, so that only one is in memory.
     """
@@ -87,9 +86,12 @@ class _Variables(Mapping[str, Any]):
     """The variables of the file by name, each created on access."""
 
     def __init__(self, selection: Selection, done: Callable[[int], object]) -> None:
+        tools = {"tool_names": lambda: _cell_array(selection.result.tool_names)}
+        by_tool = any("tool" in each.variable.dims for each in selection.chosen)
         self._made: dict[str, Callable[[], Any]] = {
             "joint_names": lambda: _cell_array(selection.result.joint_names),
             "joint_types": lambda: _cell_array(selection.result.joint_types),
+            **(tools if by_tool else {}),
             "units": lambda: _units(selection),
             "time": lambda: selection.time,
             **{each.name: _reading(selection, each, done) for each in selection.chosen},
@@ -120,9 +122,11 @@ def _cell_array(texts: Sequence[str]) -> Any:
 
 
 def _units(selection: Selection) -> dict[str, Any]:
-    """Return the units of each variable by name: one for each joint, or each axis of the wrench."""
-    types = selection.result.joint_types
+    """Return the units of each variable by name: one for each joint, or each axis of the wrench, by tool."""
+    types, labels = selection.result.joint_types, selection.result.labels
     units = {each.name: _cell_array(each.units(types)) for each in selection.chosen}
+    for variable in (each.variable for each in selection.chosen if "tool" in each.variable.dims):
+        units[variable.name] = units[variable.name].reshape(row_shape(variable, labels))
     return {"time": "s", **units}
 
 
@@ -176,7 +180,7 @@ def _columns(selection: Selection) -> Iterator[tuple[str, np.dtype[Any], str]]:
     yield "time", np.dtype(np.float64), "s"
     for each in selection.chosen:
         units = np.repeat(each.units(result.joint_types), each.there.sum(axis=1)).tolist()
-        for name, unit in zip(each.columns(result.joint_names), units, strict=True):
+        for name, unit in zip(each.columns(result.labels), units, strict=True):
             yield name, storage_type(each.variable), unit
 
 
@@ -248,13 +252,13 @@ JOINT_TRAJECTORY = ResultFormat(
 
 
 def labeled_dataset(
-    arrays: Mapping[str, AnyArray], joint_names: Sequence[str], joint_types: tuple[str, ...]
+    arrays: Mapping[str, AnyArray], labels: Labels, joint_types: tuple[str, ...]
 ) -> xarray.Dataset:
     """Return the dataset that xarray would read from a result file with these variables.
 
     Args:
         arrays: variables by name, each (samples, ...) with its declared dimensions.
-        joint_names: names of the joints, base to tip.
+        labels: labels along each dimension.
         joint_types: types of the joints, "revolute" or "prismatic".
 
     Raises:
@@ -265,12 +269,11 @@ def labeled_dataset(
     except ModuleNotFoundError:
         reason = "to_xarray needs the package xarray, which is not installed; pip install xarray gets it"
         raise ModuleNotFoundError(reason, name="xarray") from None
-    labels = {"joint": list(joint_names), "motor": list(MOTORS), "wrench_axis": list(WRENCH_AXES)}
-    variables = {}
+    declared, variables = variables_by_tool(VARIABLES, len(labels["tool"])), {}
     for name, array in arrays.items():
-        attributes = variable_attributes(VARIABLES[name], joint_types)
+        attributes = variable_attributes(declared[name], joint_types)
         attributes.pop("coordinates", None)  # xarray derives it from the dataset
-        variables[name] = (("time", *VARIABLES[name].dims), array, attributes)
+        variables[name] = (("time", *declared[name].dims), array, attributes)
     used = {dim for dims, _, _ in variables.values() for dim in dims}
-    coordinates = {name: label for name, label in labels.items() if name in used}
+    coordinates = {name: list(label) for name, label in labels.items() if name in used}
     return xarray.Dataset(variables, {**coordinates, "joint_type": ("joint", list(joint_types))})

@@ -123,7 +123,7 @@ def _gaps(selection: Selection, chosen: Chosen) -> Iterator[Gap]:
     faults = np.concatenate(
         [chosen.faults(selection.read(chosen, *span)) for span in selection.spans([chosen])]
     )
-    for place, of_joint in zip(chosen.places(selection.result.joint_names), faults.T, strict=True):
+    for place, of_joint in zip(chosen.places(selection.result.labels), faults.T, strict=True):
         for fault in (MISSING, INFINITE):
             steps = of_joint == FAULTS.index(fault)
             if steps.any():

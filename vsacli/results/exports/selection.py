@@ -14,8 +14,8 @@ import numpy.typing as npt
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.texts import joined
-from vsacli.base.units import WrenchQuantity, time_text
-from vsacli.base.variables import VARIABLES, Variable, column_names, select_variables
+from vsacli.base.units import time_text
+from vsacli.base.variables import VARIABLES, Labels, Variable, column_names, select_variables
 from vsacli.results.store.reader import StoredResult
 
 Side: TypeAlias = Literal["joint", "motor"]
@@ -45,7 +45,7 @@ class Chosen:
     Attributes:
         variable: declaration of the variable; on the motor side its name ends in `_shaft`.
         stored: name of the variable in the result.
-        there: mask of existing columns, (joints, columns of each), or (axes, 1) for the wrench.
+        there: mask of existing columns, (joints, columns of each), or (columns, 1) of other variables.
         scale: factor for the stored values; None if they are exported unchanged.
     """
 
@@ -64,15 +64,15 @@ class Chosen:
         """Name in the export."""
         return self.variable.name
 
-    def columns(self, joint_names: Iterable[str]) -> Iterator[str]:
+    def columns(self, labels: Labels) -> Iterator[str]:
         """Return the names of the existing columns."""
-        return compress(column_names(self.variable, joint_names), self.there.flat)
+        return compress(column_names(self.variable, labels), self.there.flat)
 
     def units(self, joint_types: Iterable[str]) -> list[str]:
-        """Return the unit at each joint, or along each axis of the wrench."""
+        """Return the unit at each joint, or of each column of another variable."""
         quantity = self.variable.quantity
-        if isinstance(quantity, WrenchQuantity):
-            return [quantity.of_axis(axis) for axis in range(len(self.there))]
+        if "joint" not in self.variable.dims:
+            return [quantity.of_axis(column) for column in range(len(self.there))]
         return [quantity.unit("revolute" if self.on_shaft else each) for each in joint_types]
 
     def of_columns(self, values: FloatArray | FlagArray) -> npt.NDArray[Any]:
@@ -80,11 +80,11 @@ class Chosen:
         flat: npt.NDArray[Any] = values.reshape(len(values), -1).T[self.there.ravel()]
         return flat
 
-    def places(self, joint_names: Iterable[str]) -> list[str]:
+    def places(self, labels: Labels) -> list[str]:
         """Return names of the rows of `there`: the variable at each joint, or the columns of the wrench."""
         if "joint" not in self.variable.dims:
-            return column_names(self.variable, ())
-        return [f"{joint}.{self.name}" for joint in joint_names]
+            return column_names(self.variable, labels)
+        return [f"{joint}.{self.name}" for joint in labels["joint"]]
 
     def faults(self, values: FloatArray | FlagArray) -> npt.NDArray[np.uint8]:
         """Return the worst fault of the existing values as an index of `FAULTS`, (samples, places)."""
@@ -176,9 +176,9 @@ def _chosen(result: StoredResult, variable: Variable, on_shaft: bool) -> Chosen:
 
 
 def _existing(result: StoredResult, variable: Variable) -> BoolArray:
-    """Return a mask of existing columns, (joints, columns of each), or (axes, 1) for the wrench."""
+    """Return a mask of existing columns, (joints, columns of each), or (columns, 1) of other variables."""
     if "joint" not in variable.dims:
-        return np.ones((len(column_names(variable, ())), 1), dtype=bool)
+        return np.ones((len(column_names(variable, result.labels)), 1), dtype=bool)
     return result.existing(variable)
 
 

@@ -1,7 +1,7 @@
 """Pages of curves over time: results or simulations on the same axes, and measured signals.
 
 Variables are grouped in sections. Samples that cannot be executed, and the ends of recordings, are shaded in
-all plots, and the robot is animated as a chain.
+all plots, and the links of the robot are animated.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from vsacli.base.simulation_variables import ERRORS, SIMULATED_NAMES, error
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import counted, one_line
 from vsacli.base.variables import deviation
-from vsacli.results.charts.arm_chart import Chain, direction_of
+from vsacli.results.charts.arm_chart import ArmPoints, direction_of
 from vsacli.results.charts.comparison import check_comparable, distinct_labels
 from vsacli.results.charts.figures import result_title
 from vsacli.results.charts.measured import MeasuredCurve
@@ -118,7 +118,8 @@ def result_page(
             for name in section.names:
                 drawn += [packed.chart(chart, start) for chart in charts.charts_of(name)]
                 bar.update(1)
-            sections.append({"heading": section.heading, "shown": section.shown, "charts": drawn})
+            if drawn:
+                sections.append({"heading": section.heading, "shown": section.shown, "charts": drawn})
     joints = zip(files[0].joint_names, files[0].joint_types, strict=True)
     data = {
         "kind": "over time",
@@ -159,7 +160,7 @@ def _file(file: StoredResult, label: str, start: float, packed: Packed) -> dict[
         "label": label,
         "troubles": {kind: list(map(after, joints)) for kind, joints in troubles(file).items()},
         "unreliable": after(unreliable(file)),
-        "chain": chain_motion(file, start, packed),
+        "arm": arm_motion(file, start, packed),
     }
 
 
@@ -210,8 +211,8 @@ def unreliable(result: StoredResult) -> list[list[float]]:
     return [span for span in clipped if span[0] < span[1]]
 
 
-def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str, Any] | None:
-    """Return the motion of the chain, for the animation; None if positions are not stored.
+def arm_motion(result: StoredResult, start: float, packed: Packed) -> dict[str, Any] | None:
+    """Return the motion of the links, for the animation; None if positions are not stored.
 
     Args:
         result: result or simulation file.
@@ -219,8 +220,10 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str
         packed: store of the arrays.
 
     Returns:
-        Numbers of the arrays `time`, (instants,), s after the start of the page, and `origins`, `elbows` and
-        `axes` of the `Chain` at these instants; and the unit vector `down` along gravity, zero without it.
+        Numbers of the arrays `time`, (instants,), s after the start of the page, and of the `ArmPoints` at
+        these instants: `origins`, those of the tools last, `elbows`, `axes`, and `seats` if a joint has a
+        mount; lists `carriers` and `tool_carriers`; names of several `tools`; and the unit vector `down`
+        along gravity, zero without it.
     """
     if "q" not in result.variables:
         return None
@@ -228,12 +231,17 @@ def chain_motion(result: StoredResult, start: float, packed: Packed) -> dict[str
     geometry = result.geometry()
     positions = np.asarray(result.read("q"), dtype=np.float64)[steps]
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-        chain = Chain.of(geometry, positions)
+        points = ArmPoints.of(geometry, positions)
+    mounted = any(row.mount is not None for row in geometry.joints)
     return {
         "time": packed.add(result.time[steps] - start),
-        "origins": packed.add(chain.origins),
-        "elbows": packed.add(chain.elbows),
-        "axes": packed.add(chain.axes),
+        "origins": packed.add(np.concatenate((points.origins, points.tools), axis=1)),
+        "elbows": packed.add(points.elbows),
+        "axes": packed.add(points.axes),
+        "seats": packed.add(points.seats) if mounted else None,
+        "carriers": points.carriers,
+        "tool_carriers": points.tool_carriers,
+        "tools": result.tool_names if len(result.tool_names) > 1 else (),
         "down": direction_of(result.gravity()).tolist(),
     }
 
@@ -256,7 +264,7 @@ def measured_page(
     data = {
         "kind": "over time",
         "joints": [],
-        "files": [{"label": texts.label, "troubles": {}, "unreliable": [], "chain": None}],
+        "files": [{"label": texts.label, "troubles": {}, "unreliable": [], "arm": None}],
         "start": 0.0,
         "span": [
             min((float(curve.time[0]) for curve in every), default=0.0),

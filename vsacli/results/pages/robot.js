@@ -6,22 +6,24 @@ vsacli.robot = (() => {
   const SHORTEST = 0.3;  // share of its length below which the arrow of gravity is left out
   const ISOMETRIC = { turn: -0.75 * Math.PI, tilt: 0.6155 };
   const view = { ...ISOMETRIC };
-  const canvas = document.getElementById("chain"), note = document.getElementById("chain-note");
-  const chains = data.files ? data.files.map((file) => file.chain).map(unpacked).filter(Boolean) : [];
+  const canvas = document.getElementById("arm"), note = document.getElementById("arm-note");
+  const arms = data.files ? data.files.map((file) => file.arm).map(unpacked).filter(Boolean) : [];
   const joints = data.joints || [];
   const add = (a, b, share = 1) => [a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]];
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
   const scaled = (a, factor) => a.map((each) => factor * each);
   const size = (a) => Math.sqrt(dot(a, a));
-  const down = (chains.find((chain) => size(chain.down) > 0) || { down: [0, 0, 0] }).down;
+  const down = (arms.find((arm) => size(arm.down) > 0) || { down: [0, 0, 0] }).down;
   const frame = level(size(down) > 0 ? scaled(down, -1) : [0, 0, 1]);
   const box = bounds();
 
-  function unpacked(chain, file) {
-    if (!chain) return null;
-    const [time, origins, elbows, axes] = [chain.time, chain.origins, chain.elbows, chain.axes].map(array);
-    return { file, down: chain.down, time, origins, elbows, axes, points: origins.length / time.length / 3, count: axes.length / time.length / 3 };
+  /* Points of the frames, those of the tools last; joints sit at `seats`, else at the frames that carry them. */
+  function unpacked(arm, file) {
+    if (!arm) return null;
+    const [time, origins, elbows, axes] = [arm.time, arm.origins, arm.elbows, arm.axes].map(array);
+    const seats = arm.seats === null ? null : array(arm.seats), count = arm.carriers.length;
+    return { ...arm, file, time, origins, elbows, axes, seats, count, points: origins.length / time.length / 3 };
   }
 
   /* Upright unit vector, and two level ones: of a base frame that stands upright its axes x and y. */
@@ -31,11 +33,11 @@ vsacli.robot = (() => {
     return { first, second: cross(up, first), up };
   }
 
-  /* Middle and radius of all points that any chain passes, and the height of the lowest. */
+  /* Middle and radius of all points that any arm passes, and the height of the lowest. */
   function bounds() {
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     let lowest = Infinity;
-    for (const { origins } of chains) {
+    for (const { origins } of arms) {
       for (let at = 0; at < origins.length; at += 3) {
         const point = [...origins.subarray(at, at + 3)], height = dot(point, frame.up);
         if (height < lowest) lowest = height;
@@ -50,10 +52,10 @@ vsacli.robot = (() => {
   }
 
   /* Points of an array at the cursor, linear between instants. */
-  function pointsAt(chain, values, count) {
-    const next = Math.min(Math.max(after(chain.time, state.cursor), 1), chain.time.length - 1), before = Math.max(next - 1, 0);
-    const span = chain.time[next] - chain.time[before];
-    const share = span > 0 ? Math.min(Math.max((state.cursor - chain.time[before]) / span, 0), 1) : 0;
+  function pointsAt(arm, values, count) {
+    const next = Math.min(Math.max(after(arm.time, state.cursor), 1), arm.time.length - 1), before = Math.max(next - 1, 0);
+    const span = arm.time[next] - arm.time[before];
+    const share = span > 0 ? Math.min(Math.max((state.cursor - arm.time[before]) / span, 0), 1) : 0;
     return Array.from({ length: count }, (_, point) => [0, 1, 2].map((axis) => {
       const [a, b] = [before, next].map((instant) => values[(instant * count + point) * 3 + axis]);
       return a + share * (b - a);
@@ -106,23 +108,27 @@ vsacli.robot = (() => {
     return Object.keys(troubles).filter((kind) => inside(troubles[kind][joint]));
   }
 
-  function chainFaces(chain, eye) {
+  function armFaces(arm, eye) {
     const faces = [], radius = box.radius;
-    const origins = pointsAt(chain, chain.origins, chain.points);
-    const elbows = pointsAt(chain, chain.elbows, chain.count), axes = pointsAt(chain, chain.axes, chain.count);
+    const origins = pointsAt(arm, arm.origins, arm.points);
+    const elbows = pointsAt(arm, arm.elbows, arm.count), axes = pointsAt(arm, arm.axes, arm.count);
     const link = { fill: color("soft") };
     const [base, upright] = [origins[0], axes[0]];  // the plate stands across the first axis
     prism(add(base, upright, -2.4 * THICK * radius), add(base, upright, -THICK * radius), 2 * THICK * radius, 4, link, faces, eye);
+    const seats = arm.seats ? pointsAt(arm, arm.seats, arm.count) : arm.carriers.map((carrier) => origins[carrier]);
     axes.forEach((axis, joint) => {
-      const bad = trouble(chain.file, joint)[0];
+      const bad = trouble(arm.file, joint)[0];
       const paint = { fill: bad ? color("bad") : curveColor(joint) }, wide = THICK * radius * (bad ? 1.35 : 1);
-      const here = origins[joint], sleeve = scaled(axis, 1.3 * THICK * radius);
+      const here = seats[joint], sleeve = scaled(axis, 1.3 * THICK * radius);
       const sliding = joints[joint].type === "prismatic";
       prism(add(here, sleeve, -1), add(here, sleeve), sliding ? 1.2 * wide : wide, sliding ? 4 : 18, paint, faces, eye);
+      prism(origins[arm.carriers[joint]], here, THIN * radius, 10, link, faces, eye);
       prism(here, elbows[joint], (sliding ? 0.75 : 1) * THIN * radius, sliding ? 4 : 10, sliding ? paint : link, faces, eye);
       prism(elbows[joint], origins[joint + 1], THIN * radius, 10, link, faces, eye);
     });
-    prism(origins[chain.points - 2], origins[chain.points - 1], 0.6 * THIN * radius, 8, link, faces, eye);
+    arm.tool_carriers.forEach((carrier, tool) => {
+      prism(origins[carrier], origins[arm.count + 1 + tool], 0.6 * THIN * radius, 8, link, faces, eye);
+    });
     return faces;
   }
 
@@ -165,23 +171,37 @@ vsacli.robot = (() => {
       context[draw]();
     }
     context.font = `${4 * unit}px system-ui, sans-serif`;
+    context.textAlign = "left";
     context.fillText("g", x + 2 * unit, end);
   }
 
-  function drawTrace(context, chain, flat) {
-    const last = chain.points - 1, trace = [];
-    for (let instant = 0; instant < chain.time.length; instant += 1) {
-      const at = (instant * chain.points + last) * 3;
-      trace.push([chain.origins[at], chain.origins[at + 1], chain.origins[at + 2]]);
+  function drawTrace(context, arm, point, flat) {
+    const trace = [];
+    for (let instant = 0; instant < arm.time.length; instant += 1) {
+      const at = (instant * arm.points + point) * 3;
+      trace.push([arm.origins[at], arm.origins[at + 1], arm.origins[at + 2]]);
     }
-    path(context, trace.filter((point) => point.every(Number.isFinite)), flat);
+    path(context, trace.filter((place) => place.every(Number.isFinite)), flat);
     context.strokeStyle = color("accent");
     context.lineWidth = 1.2 * devicePixelRatio;
     context.stroke();
   }
 
+  /* Names of several tools, next to them. */
+  function drawNames(context, arm, flat) {
+    const unit = 0.01 * Math.min(canvas.width, canvas.height), points = pointsAt(arm, arm.origins, arm.points);
+    context.fillStyle = color("ink");
+    context.font = `${3.2 * unit}px system-ui, sans-serif`;
+    arm.tools.forEach((name, tool) => {
+      const [x, y] = flat(points[arm.count + 1 + tool]);
+      const outside = x + 1.5 * unit + context.measureText(name).width > canvas.width;
+      context.textAlign = outside ? "right" : "left";
+      context.fillText(name, x + (outside ? -1.5 : 1.5) * unit, y - 1.5 * unit);
+    });
+  }
+
   function draw() {
-    if (!chains.length) return;
+    if (!arms.length) return;
     const wanted = Math.round(canvas.clientWidth * devicePixelRatio);
     if (canvas.width !== wanted || canvas.height !== Math.round(canvas.clientHeight * devicePixelRatio)) {
       canvas.width = wanted;
@@ -191,10 +211,10 @@ vsacli.robot = (() => {
     context.clearRect(0, 0, canvas.width, canvas.height);
     context.lineJoin = "round";
     drawGround(context, eye.flat);
-    chains.filter((chain) => state.files.has(chain.file)).forEach((chain, order) => {
+    arms.filter((arm) => state.files.has(arm.file)).forEach((arm, order) => {
       context.globalAlpha = order ? 0.45 : 1;
-      drawTrace(context, chain, eye.flat);
-      for (const { corners, bright, paint } of chainFaces(chain, eye).sort((a, b) => a.depth - b.depth)) {
+      arm.tool_carriers.forEach((_, tool) => drawTrace(context, arm, arm.count + 1 + tool, eye.flat));
+      for (const { corners, bright, paint } of armFaces(arm, eye).sort((a, b) => a.depth - b.depth)) {
         path(context, corners, eye.flat);
         context.closePath();
         context.fillStyle = context.strokeStyle = shaded(paint.fill, bright);
@@ -202,6 +222,7 @@ vsacli.robot = (() => {
         context.fill();
         context.stroke();
       }
+      drawNames(context, arm, eye.flat);
     });
     context.globalAlpha = 1;
     drawGravity(context, eye);
@@ -209,7 +230,7 @@ vsacli.robot = (() => {
   }
 
   function tellTroubles() {
-    const said = chains.flatMap((chain) => joints.map((joint, at) => [joint.name, trouble(chain.file, at)]));
+    const said = arms.flatMap((arm) => joints.map((joint, at) => [joint.name, trouble(arm.file, at)]));
     const bad = said.filter(([, kinds]) => kinds.length).map(([name, kinds]) => `${name}: ${kinds.join(", ")}`);
     note.classList.toggle("hint", !bad.length);
     note.textContent = bad.length ? bad.join("; ") : "drag, or arrow keys, turn the view; double-click resets it";
@@ -246,7 +267,7 @@ vsacli.robot = (() => {
     ["paper", "screen"].forEach((topic) => vsacli.listen(topic, draw));
   }
 
-  if (chains.length) {
+  if (arms.length) {
     document.getElementById("robot").hidden = false;
     document.getElementById("columns").className = "beside";
     follow();

@@ -52,6 +52,9 @@ ARROW_SHARE = 0.19
 SHORTEST_ARROW = 0.3
 """Share of its length below which an arrow of a frame, seen from its tip, is left out."""
 
+SEVERAL = 0.5
+"""Share of the length of the arrows of the tool frame where there are several tools."""
+
 NAME_SIZE, ARROW_SIZE = 9, 8
 """Sizes of the names of joints and arrows at the usual font size, points."""
 
@@ -76,12 +79,12 @@ _ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.
 
 def arm_figure(chart: ArmChart) -> Figure:
     """Draw the views of an arm at one scale; the first one names the joints."""
-    widths = [1 + LABEL_WIDTH, *(1.0 for _ in chart.views[1:])]
+    widths, larger = [1 + LABEL_WIDTH, *(1.0 for _ in chart.views[1:])], _crowding(chart)
 
     def natural(columns: int) -> tuple[float, float]:
         if columns == len(widths):
-            return PANEL_WIDTH * sum(widths), PANEL_WIDTH + 1.4
-        return PANEL_WIDTH * 2, VIEW_HEIGHT * 2 + 1.0
+            return larger * PANEL_WIDTH * sum(widths), larger * PANEL_WIDTH + 1.4
+        return larger * PANEL_WIDTH * 2, larger * VIEW_HEIGHT * 2 + 1.0
 
     columns = columns_of_panels(len(widths), natural, NARROWEST_VIEW * sum(widths) / len(widths))
     with new_figure(natural(columns)) as figure:
@@ -125,19 +128,22 @@ def _frame_panel(axes: Axes, chart: ArmChart, view: View, *, named: bool) -> Non
 
 def _draw_arm(axes: Axes, chart: ArmChart, view: View) -> None:
     """Draw links, joints from the farthest to the nearest, axes, tool frame and gravity."""
-    length, arrow, chain = chart.joint_length, ARROW_SHARE * chart.size, chart.chain
-    axes.plot(*view.project(chart.line).T, **scaled(_LINK), zorder=2)
-    for origin, center in zip(chain.origins[0], chart.centers, strict=False):  # joints moved along their axes
-        moved = view.project(np.stack((origin, center))).T
+    length, arrow, points = chart.joint_length, ARROW_SHARE * chart.size, chart.points
+    for line in chart.lines:
+        axes.plot(*view.project(line).T, **scaled(_LINK), zorder=2)
+    for seat, center in zip(points.seats[0], chart.centers, strict=True):  # joints moved along their axes
+        moved = view.project(np.stack((seat, center))).T
         axes.plot(*moved, **scaled({**_LINK, "linewidth": 2.5}), zorder=2)
     solids = sorted(_solids(chart), key=lambda solid: float(solid.middle @ view.toward))
     for rank, solid in enumerate(solids):
         _draw_solid(axes, solid, view, 3 + rank / len(solids))
-    for center, axis in zip(chart.centers, chain.axes[0], strict=True):
+    for center, axis in zip(chart.centers, points.axes[0], strict=True):
         ends = np.stack((center - AXIS_LENGTH * length * axis, center + AXIS_LENGTH * length * axis))
         axes.plot(*view.project(ends).T, **scaled(_AXIS), zorder=4.2)
-    for direction, name in zip(chain.tool[0].T, "xyz", strict=True):
-        _draw_arrow(axes, view, chain.origins[0, -1], arrow * direction, name)
+    share = SEVERAL if chart.tool_names else 1.0
+    for origin, tool_axes in zip(points.tools[0], points.tool_axes[0], strict=True):
+        for direction, name in zip(tool_axes.T, "xyz", strict=True):
+            _draw_arrow(axes, view, origin, share * arrow * direction, name, share)
     start = chart.middle + ROOM / 2 * chart.size * (0.75 * view.up - 0.85 * view.right)
     _draw_arrow(axes, view, start, arrow * chart.down, "g")
 
@@ -155,7 +161,7 @@ def _solids(chart: ArmChart) -> Iterator[_Solid]:
     length = chart.joint_length
     foot, up = _base(chart)
     yield _prism(foot - PLATE_HEIGHT * length * up, foot, PLATE * length, 4, _BASE_FILL)
-    for center, axis, joint in zip(chart.centers, chart.chain.axes[0], chart.joints, strict=True):
+    for center, axis, joint in zip(chart.centers, chart.points.axes[0], chart.joints, strict=True):
         half, fill = length / 2 * axis, FILLS.get(joint.actuator_type, _OTHER_FILL)
         yield _prism(center - half, center + half, RADIUS * length, ROUND if joint.is_revolute else 4, fill)
         motor = MOTOR_LENGTH * length * axis
@@ -166,7 +172,7 @@ def _solids(chart: ArmChart) -> Iterator[_Solid]:
 
 def _base(chart: ArmChart) -> tuple[FloatArray, FloatArray]:
     """Return place and normal of the base: the base frame, or below the first joint if that is near."""
-    origin, up = chart.chain.origins[0, 0], chart.chain.base[0, :, 2]
+    origin, up = chart.points.origins[0, 0], chart.points.base[0, :, 2]
     if np.linalg.norm(origin) > chart.joint_length:
         return np.zeros(3), np.array([0.0, 0.0, 1.0])
     below = (0.5 + MOTOR_LENGTH) * chart.joint_length
@@ -213,22 +219,29 @@ def _area(face: FloatArray) -> float:
     return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
 
 
-def _draw_arrow(axes: Axes, view: View, start: FloatArray, arrow: FloatArray, name: str) -> None:
-    """Draw an arrow with its name, unless it points toward the viewer or away."""
+def _draw_arrow(
+    axes: Axes, view: View, start: FloatArray, arrow: FloatArray, name: str, share: float = 1.0
+) -> None:
+    """Draw an arrow with its name, of a share of the usual size, unless it is seen from an end."""
     tail, tip = view.project(start), view.project(start + arrow)
     if np.linalg.norm(tip - tail) <= SHORTEST_ARROW * np.linalg.norm(arrow):
         return
-    axes.annotate("", tuple(tip), tuple(tail), arrowprops=_ARROW, zorder=5)
+    drawn = axes.annotate("", tuple(tip), tuple(tail), arrowprops=_ARROW, zorder=5)
+    drawn.set_fontsize(share * float(drawn.get_fontsize()))  # the size of its head
     x, y = tail + 1.25 * (tip - tail)
-    axes.text(x, y, name, fontsize=current_look().points(ARROW_SIZE), ha="center", va="center", zorder=5)
+    size = current_look().points(ARROW_SIZE * share**0.5)
+    axes.text(x, y, name, fontsize=size, ha="center", va="center", zorder=5)
 
 
 def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:
-    """Write names in a column at the right, each with a line to its joint; of long chains only some."""
-    most, size = _names_that_fit(axes), current_look().points(NAME_SIZE)
-    every = math.ceil(len(chart.joints) / most)
-    places = view.project(chart.centers)[::every]
-    names = [shortened(joint.name, NAME_LENGTH) for joint in chart.joints[::every]]
+    """Write names in a column at the right, each with a line to its joint or tool; of many only some."""
+    crowding = _crowding(chart)
+    size = current_look().points(NAME_SIZE / crowding)
+    most = _names_that_fit(axes, size, math.ceil(MOST_NAMES * crowding**2 - 1e-9))
+    every = math.ceil(len(_names(chart)) / most)
+    tools = chart.points.tools[0, : len(chart.tool_names)]
+    places = view.project(np.concatenate((chart.centers, tools)))[::every]
+    names = [shortened(name, NAME_LENGTH) for name in _names(chart)[::every]]
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     column = left + (right - left) / (1 + LABEL_WIDTH)
     gap = (top - bottom) / (most + 1)
@@ -238,14 +251,24 @@ def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:
         axes.text(column + 0.7 * gap, height, name, fontsize=size, va="center", parse_math=False)
 
 
-def _names_that_fit(axes: Axes) -> int:
-    """Return the number of names that fit into the column, at most `MOST_NAMES`."""
+def _names(chart: ArmChart) -> list[str]:
+    """Return the names of the joints, and of the tools if there are several."""
+    return [*(joint.name for joint in chart.joints), *chart.tool_names]
+
+
+def _crowding(chart: ArmChart) -> float:
+    """Return by which factor the figure of a tree grows, and its names shrink, so that all names fit."""
+    return 1.0 if len(chart.lines) == 1 else max(1.0, len(_names(chart)) / MOST_NAMES) ** 0.5
+
+
+def _names_that_fit(axes: Axes, size: float, most: int) -> int:
+    """Return the number of names of some size, points, that fit into the column, at most `most`."""
     look, figure = current_look(), axes.get_figure(root=True)
     if look.width is None or figure is None:
-        return MOST_NAMES
+        return most
     figure.draw_without_rendering()
     height = axes.get_window_extent().height / figure.dpi * POINTS_PER_INCH
-    return min(MOST_NAMES, max(1, int(height / (NAME_LINE * look.points(NAME_SIZE))) - 1))
+    return min(most, max(1, int(height / (NAME_LINE * size)) - 1))
 
 
 def _spread(heights: FloatArray, gap: float, low: float, high: float) -> FloatArray:

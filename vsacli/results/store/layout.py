@@ -6,7 +6,7 @@ import json
 import math
 import platform
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Set
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,9 +16,16 @@ import h5py
 import numpy as np
 
 from vsacli.base.arrays import AnyArray
-from vsacli.base.variables import MOTORS, OF_ANY_ROBOT, VARIABLES, Variable
+from vsacli.base.variables import (
+    MOTORS,
+    OF_ANY_ROBOT,
+    VARIABLES,
+    Labels,
+    Variable,
+    row_shape,
+)
 from vsacli.base.version import __version__
-from vsacli.base.wrench import WRENCH_AXES
+from vsacli.base.wrench import frames_by_tool
 from vsacli.documents.fields import declared_fields
 from vsacli.documents.record_values import ResolvedField, resolve_values
 from vsacli.results.store.inputs import write_sources
@@ -27,24 +34,39 @@ from vsacli.results.store.schema import (
     DOUBLE,
     EXISTING,
     TEXT,
-    row_shape,
+    holds_flags,
     storable,
     storage_type,
     unit_attributes,
     variable_attributes,
 )
+from vsacli.robot.joint import FRAME_0
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
 LABELS = {"axis": ("x", "y", "z"), "bound": ("lower", "upper"), "direction": ("negative", "positive")}
 """Labels of dimensions that only the robot's arrays have; each is written if an array has it."""
 
+PARENTS = ("joints", "parent")
+"""Path of the field with the parents of the joints."""
+
 GZIP_LEVEL = 4
 
 
-def row_bytes(variable: Variable, joints: int, precision: str) -> int:
+AXES = {
+    "tool": "tool name",
+    "displacement_axis": "translation along and rotation about the axes of the base frame",
+    "wrench_axis": "force and moment along the axes of a frame",
+}
+"""Dimensions that a file has where a variable or an input has them, each with its description."""
+
+WRENCH_FRAME = "wrench_frame"
+"""Attribute of `tool`: the frame of the wrench on each tool, empty where nothing acts."""
+
+
+def row_bytes(variable: Variable, labels: Labels, precision: str) -> int:
     """Return the size of one sample in bytes."""
-    return math.prod(row_shape(variable, joints)) * storage_type(variable, precision).itemsize
+    return math.prod(row_shape(variable, labels)) * storage_type(variable, precision).itemsize
 
 
 def create_layout(
@@ -72,8 +94,9 @@ def create_layout(
     """
     file.attrs.update({"format": format_name, **_root_attributes(robot, trajectory, provenance)})
     scales = _create_coordinates(file, robot, trajectory.samples)
-    if trajectory.wrench is not None and any("wrench_axis" in variable.dims for variable in variables):
-        scales["wrench_axis"] = _create_wrench_axis(file, trajectory.wrench.frame)
+    of_variables = {dim for variable in variables for dim in variable.dims}
+    of_tree = set() if robot.is_plain_chain or not robot.end_effectors else {"tool"}
+    scales |= _create_axes(file, of_variables | of_tree, robot, trajectory)
     stored = {"time": scales["time"]}
     for variable in variables:
         dataset = _create_variable(file, variable, robot, trajectory.samples, precision)
@@ -126,11 +149,22 @@ def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> dict[str
     return scales
 
 
-def _create_wrench_axis(file: h5py.File, frame: str) -> h5py.Dataset:
-    axis = create_labels(file, "wrench_axis", WRENCH_AXES, "force and moment along the axes of a frame")
-    axis.attrs["frame"] = frame
-    axis.make_scale("wrench_axis")
-    return axis
+def _create_axes(
+    file: h5py.File, dims: Set[str], robot: Robot, trajectory: Trajectory
+) -> dict[str, h5py.Dataset]:
+    """Write the dimension scales of `AXES` among some dimensions; return them by name."""
+    axes = {
+        dim: create_labels(file, dim, robot.labels[dim], words) for dim, words in AXES.items() if dim in dims
+    }
+    if trajectory.wrench is not None:
+        frames = frames_by_tool(trajectory.wrench.frame)
+        if len(frames) > 1:
+            axes["tool"].attrs[WRENCH_FRAME] = np.array([frame or "" for frame in frames], dtype=TEXT)
+        elif "wrench_axis" in axes:
+            axes["wrench_axis"].attrs["frame"] = frames[0]
+    for dim, axis in axes.items():
+        axis.make_scale(dim)
+    return axes
 
 
 def create_labels(
@@ -146,15 +180,14 @@ def create_labels(
 def _create_variable(
     file: h5py.File, variable: Variable, robot: Robot, samples: int, precision: str
 ) -> h5py.Dataset:
-    joints = len(robot.joints)
-    row = row_shape(variable, joints)
+    row = row_shape(variable, robot.labels)
     dataset = file.create_dataset(
         variable.name,
         shape=(samples, *row),
         maxshape=(samples, *row),
         dtype=storage_type(variable, precision),
-        chunks=(chunk_rows(samples, row_bytes(variable, joints, precision)), *row),
-        compression=GZIP_LEVEL if variable.name == "flags" else None,
+        chunks=(chunk_rows(samples, row_bytes(variable, robot.labels, precision)), *row),
+        compression=GZIP_LEVEL if holds_flags(variable) else None,
         track_order=True,
     )
     dataset.attrs.update(variable_attributes(variable, robot.joint_types))
@@ -167,24 +200,34 @@ def _create_variable(
 def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5py.Dataset]) -> None:
     """Write the subgroup `robot`: each declared field as an array, e.g. `gravity`, `joints/link_mass`.
 
-    The joints have one flat group, since a group `motor` would collide with the coordinate `motor`.
+    The joints have one flat group, since a group `motor` would collide with the coordinate `motor`; so have
+    the tools.
     """
     group = inputs.create_group("robot", track_order=True)
     scales, fields = dict(coordinates), resolve(robot)
     for name in [name for name in LABELS if any(name in field.dims for field in fields)]:
         scales[name] = _add_array(group, name, np.array(LABELS[name], dtype=TEXT))
         scales[name].make_scale(name)
-    joints = group.create_group("joints")
+    members = {"joints": group.create_group("joints")}
+    if robot.tools:
+        members["tools"] = group.create_group("tools")
     for field in fields:
-        of_joints = field.path[0] == "joints"
-        name = "_".join(field.path[1:] if of_joints else field.path)
-        dataset = _write_field(joints if of_joints else group, name, field, robot.joint_types)
+        place, path = members.get(field.path[0], group), field.path
+        name = "_".join(path if place is group else path[1:])
+        dataset = _write_field(place, name, field, robot.joint_types)
         attach_scales(dataset, [scales[dim] for dim in field.dims])
 
 
 def resolve(robot: Robot) -> list[ResolvedField]:
-    """Return every declared field of a robot with defaults, in SI units, motor values on the joint side."""
-    return list(_resolved(robot))
+    """Return every declared field of a robot with defaults, in SI units, motor values on the joint side.
+
+    If the robot has the field `parent`, it has the parent of each joint.
+    """
+    parents = [FRAME_0 if parent < 0 else robot.joint_names[parent] for parent in robot.parents]
+    return [
+        field._replace(values=np.array(parents, dtype=object)) if field.path == PARENTS else field
+        for field in _resolved(robot)
+    ]
 
 
 def _resolved(record: Any) -> Iterator[ResolvedField]:

@@ -1,4 +1,4 @@
-"""Reading of result files, and of simulation files, which have the same layout.
+"""Reading of result files, and of simulation and sensitivity files, which have the same layout.
 
 `StoredFile` opens any HDF5 file of this program, `StoredResult` reads samples, limits and geometry, and
 `open_stored` opens a result or a simulation, depending on the file. Content is checked before it is used.
@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self, TypeVar, cast
+from typing import Any, Self, TypeVar, cast
 
 import h5py
 import numpy as np
@@ -22,7 +22,19 @@ from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.simulation_variables import SIMULATED_NAMES, SIMULATION_VARIABLES
 from vsacli.base.texts import joined, one_line, shown
-from vsacli.base.variables import MOTOR_CONSTANTS, MOTORS, OF_ANY_ROBOT, VARIABLES, Variable, select_variables
+from vsacli.base.variables import (
+    MOTOR_CONSTANTS,
+    MOTORS,
+    OF_ANY_ROBOT,
+    VARIABLES,
+    Labels,
+    Variable,
+    dimension_labels,
+    row_shape,
+    select_variables,
+    split_axes,
+    variables_by_tool,
+)
 from vsacli.results.store.damage import (
     SCALES,
     CheckedFile,
@@ -34,18 +46,20 @@ from vsacli.results.store.damage import (
     read_texts,
     reporting_damage,
 )
+from vsacli.results.store.geometry import ARRAYS, CARRIER, PARENT, StoredGeometry
 from vsacli.results.store.inputs import StoredInput, read_sources
 from vsacli.results.store.schema import (
     DOUBLE,
     EXISTING,
     PRECISION,
-    row_shape,
     storage_type,
     variable_attributes,
 )
-from vsacli.robot.joint import DenavitHartenberg, Pose, existing_columns
+from vsacli.robot.joint import existing_columns
+from vsacli.robot.model import END_EFFECTOR
 
-OF_JOINTS = "inputs/robot/joints/{}"
+OF_ROBOT = "inputs/robot"
+OF_JOINTS = f"{OF_ROBOT}/joints/{{}}"
 """Dataset of a parameter of all joints: path in the robot file with underscores in place of dots."""
 
 BLOCK_SAMPLES = 8192
@@ -77,61 +91,6 @@ SIZES = {
     "voltage": "actuator_motor_max_voltage",
 }
 """Datasets with the largest magnitude of motor variables, by variable."""
-
-DH = ("a", "alpha", "d", "theta")
-"""Parameters of a Denavit-Hartenberg row, in the order of its fields."""
-
-
-class StoredRow(NamedTuple):
-    """The kinematic part of a joint."""
-
-    dh: DenavitHartenberg
-    is_revolute: bool
-    mount: Pose | None = None
-
-
-class StoredGeometry(NamedTuple):
-    """A kinematic chain, which `vsacli.robot.kinematics` accepts in place of a robot."""
-
-    base: Pose
-    tool: Pose
-    joints: tuple[StoredRow, ...]
-
-    @classmethod
-    def of(cls, joint_types: Sequence[str], rows: FloatArray, base: FloatArray, tool: FloatArray) -> Self:
-        """Return the chain of stored numbers.
-
-        Args:
-            joint_types: "revolute" or "prismatic", base to tip.
-            rows: Denavit-Hartenberg rows, (joints, 4), in the order of `DH`.
-            base: `xyz` and `rpy` of the base pose, (2, 3).
-            tool: `xyz` and `rpy` of the tool pose, (2, 3).
-        """
-        joints = (
-            StoredRow(DenavitHartenberg(**dict(zip(DH, row, strict=True))), joint_type == "revolute")
-            for row, joint_type in zip(rows.tolist(), joint_types, strict=True)
-        )
-        return cls(_pose(base), _pose(tool), tuple(joints))
-
-    @property
-    def parents(self) -> Sequence[int]:
-        """Index of the joint whose link carries each joint; -1 for frame 0."""
-        return range(-1, len(self.joints) - 1)
-
-    @property
-    def end_effectors(self) -> tuple[Pose, ...]:
-        """Pose of the tool in the frame of its link."""
-        return (self.tool,)
-
-    @property
-    def tool_joints(self) -> tuple[int, ...]:
-        """Index of the joint whose link carries the tool."""
-        return (len(self.joints) - 1,)
-
-
-def _pose(numbers: FloatArray) -> Pose:
-    xyz, rpy = map(tuple, numbers.tolist())
-    return Pose(xyz=xyz, rpy=rpy)
 
 
 class StoredFile:
@@ -193,6 +152,7 @@ class StoredResult(StoredFile):
         robot_name, trajectory_name, verdict: as in the report.
         complete: False if the run ended early at an infeasible sample.
         joint_names, joint_types: names and types ("revolute" or "prismatic"), base to tip.
+        tool_names: names of the tools.
         actuators: kind of the actuator of each joint.
         gear_ratio: gear ratios of the motors, (joints, 2); NaN where the robot file gives none.
         variables: names of the stored variables, in declared order, without `time`.
@@ -231,6 +191,8 @@ class StoredResult(StoredFile):
             self.precision = str(file.attrs.get(PRECISION, DOUBLE))
             self.joint_names = self._labels("joint")
             self.joint_types = self._labels("joint_type")
+            self.tool_names = self._tool_names()
+            self.declared = variables_by_tool(self.declared, len(self.tool_names))
             self.actuators = self._labels("inputs/robot/joints/actuator_type")
             self.gear_ratio = self._of_motors("actuator_motor_gear_ratio")
             self.variables = tuple(
@@ -239,6 +201,17 @@ class StoredResult(StoredFile):
             self.samples = self._samples()
             self.report_json = self._json("report/json")
         self._whole: set[str] = set()
+
+    @property
+    def labels(self) -> Labels:
+        """Labels along each dimension of the variables."""
+        return dimension_labels(self.joint_names, self.tool_names)
+
+    def _tool_names(self) -> tuple[str, ...]:
+        """Return the names of the tools; chains that need none in their file have one."""
+        if "tool" in self._file:
+            return self._labels("tool")
+        return (END_EFFECTOR,) if self.format == str(self.attributes["format"]) else ()
 
     def motor_constant(self, name: str) -> FloatArray:
         """Return a parameter of the motors on the joint side, (joints, 2); NaN where there is none.
@@ -274,18 +247,18 @@ class StoredResult(StoredFile):
         return bounds
 
     def geometry(self) -> StoredGeometry:
-        """Return the kinematic chain of the robot.
+        """Return the geometry of the robot.
 
         Raises:
             InputError: the file is damaged.
         """
         with reporting_damage(self.path):
-            rows = [self._dataset(OF_JOINTS.format(f"dh_{name}"))[...] for name in DH]
-            poses = [
-                np.stack([self._dataset(f"inputs/robot/{frame}_{part}")[...] for part in ("xyz", "rpy")])
-                for frame in ("base", "tool")
-            ]
-            return StoredGeometry.of(self.joint_types, np.stack(rows, axis=-1), *poses)
+            arrays = {
+                name: np.array(self._labels(path)) if name in (PARENT, CARRIER) else self._dataset(path)[...]
+                for name in ARRAYS
+                if (path := f"{OF_ROBOT}/{name}") in self._file
+            }
+            return StoredGeometry.of(self.joint_names, self.joint_types, arrays)
 
     def gravity(self) -> FloatArray:
         """Return the gravity acceleration in the base frame, (3,), m/s^2.
@@ -294,7 +267,7 @@ class StoredResult(StoredFile):
             InputError: the file is damaged.
         """
         with reporting_damage(self.path):
-            return np.asarray(self._dataset("inputs/robot/gravity")[...], dtype=np.float64).reshape(3)
+            return np.asarray(self._dataset(f"{OF_ROBOT}/gravity")[...], dtype=np.float64).reshape(3)
 
     def has_variable(self, variable: Variable) -> bool:
         """Return whether runs of this robot have a variable, as far as that depends on the robot file."""
@@ -332,7 +305,7 @@ class StoredResult(StoredFile):
         return values
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray | FlagArray:
-        """Read samples start..stop-1 of a variable, (samples, joints) or (samples, joints, 2), in its units.
+        """Read samples start..stop-1 of a variable, (samples, ...) with its dimensions, in its units.
 
         Raises:
             InputError: the variable is unknown, not stored, or damaged there.
@@ -352,7 +325,7 @@ class StoredResult(StoredFile):
         """Return values of a variable, rounded as by storage in the precision of this file."""
         variable = self.declared[name]
         with np.errstate(over="ignore"):
-            stored = values.astype(storage_type(variable, self.precision))
+            stored = split_axes(values, variable, self.labels).astype(storage_type(variable, self.precision))
         read: FloatArray | FlagArray = stored.astype(storage_type(variable))
         return read
 
@@ -361,7 +334,7 @@ class StoredResult(StoredFile):
         if name in self._whole:
             return
         dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name], self.precision)
-        shape = (self.samples, *row_shape(self.declared[name], len(self.joint_names)))
+        shape = (self.samples, *row_shape(self.declared[name], self.labels))
         if dataset.shape != shape or dataset.dtype != expected:
             raise DamageError(f"{name} is {dataset.dtype} {dataset.shape}, expected {expected} {shape}")
         self._whole.add(name)
@@ -425,6 +398,16 @@ class StoredSimulation(StoredResult):
     _to_get = "run simulate again"
 
 
+class StoredSensitivity(StoredResult):
+    """An open sensitivity file; a context manager that closes it."""
+
+    format = file_formats.SENSITIVITY
+    kind = "sensitivity"
+    command = "sensitivity"
+    _of_runs = ()
+    _to_get = "run sensitivity again"
+
+
 def _changes(file: StoredInput) -> dict[str, Any]:
     return {"changes": file.changes} if file.changes else {}
 
@@ -450,7 +433,7 @@ def open_one_of(path: str | Path, *kinds: type[_Stored]) -> _Stored:
 
 
 def stored_format(path: str | Path) -> str | None:
-    """Return the attribute `format` of an HDF5 file; None if it has none.
+    """Return the attribute `format` of an HDF5 file, for trees that of chains; None if it has none.
 
     Raises:
         InputError, StorageError: as `StoredResult.open`.
@@ -473,9 +456,12 @@ def stored_inputs(path: str | Path) -> list[StoredInput]:
 
 
 def _format(path: str | Path, file: h5py.File) -> str | None:
+    """Return the attribute `format`, for trees that of chains."""
     with reporting_damage(path):
         found = file.attrs.get("format")
-    return found if isinstance(found, str) else None
+    if not isinstance(found, str):
+        return None
+    return next((plain for plain, of_tree in file_formats.OF_TREES.items() if of_tree == found), found)
 
 
 def _foreign(found: str | None, kinds: Sequence[type[StoredResult]]) -> str:
@@ -495,7 +481,8 @@ def kind_of_format(found: str | None) -> str:
 def other_version(found: str, read: str, command: str) -> str:
     """Return that a file has another version of a format, and how to compute it again."""
     again = f"run {command} again, with its inputs (vsacli info FILE --extract FOLDER)"
-    return f"has the format {found}, but this version reads {read}; {again}"
+    formats = joined((read, *(of_tree for plain, of_tree in file_formats.OF_TREES.items() if plain == read)))
+    return f"has the format {found}, but this version reads {formats}; {again}"
 
 
 def open_stored(path: str | Path) -> StoredResult:

@@ -10,8 +10,7 @@ import numpy as np
 from vsacli.base.arrays import FLAG_TYPE
 from vsacli.base.flags import Flag
 from vsacli.base.units import Quantity, WrenchQuantity
-from vsacli.base.variables import MOTORS, Variable
-from vsacli.base.wrench import WRENCH_AXES
+from vsacli.base.variables import Variable
 
 EXISTING = "existing"
 """Attribute of variables that depend on devices of the joints: 1 for each column that a joint has."""
@@ -50,23 +49,22 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
     attributes |= {"long_name": variable.long_name, "equation": variable.equation}
     if "joint" in variable.dims:
         attributes["coordinates"] = "joint_type"
-    if variable.name == "flags":
+    if holds_flags(variable):
         attributes["flag_masks"] = np.array([int(flag) for flag in Flag], dtype=FLAG_TYPE)
         attributes["flag_meanings"] = " ".join(flag.label for flag in Flag)
     return attributes
 
 
+def holds_flags(variable: Variable) -> bool:
+    """Return whether the values of a variable are flags: integers, of which each bit is a finding."""
+    return variable.name.endswith("flags")
+
+
 def storage_type(variable: Variable, precision: str = DOUBLE) -> np.dtype[Any]:
     """Return the little-endian type of a variable in a file of some precision; times are always double."""
-    if variable.name == "flags":
+    if holds_flags(variable):
         return np.dtype(FLAG_TYPE).newbyteorder("<")
     return FLOATS[precision if variable.dims else DOUBLE]
-
-
-def row_shape(variable: Variable, joints: int) -> tuple[int, ...]:
-    """Return the lengths of the axes after time."""
-    lengths = {"joint": joints, "motor": len(MOTORS), "wrench_axis": len(WRENCH_AXES)}
-    return tuple(lengths[dim] for dim in variable.dims)
 
 
 def storable(text: str) -> str:

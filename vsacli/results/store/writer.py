@@ -16,7 +16,16 @@ from vsacli.base.errors import InputError, StorageError
 from vsacli.base.outputs import Staged
 from vsacli.base.signals import COMMANDED
 from vsacli.base.units import time_text
-from vsacli.base.variables import MOTOR_CONSTANTS, UNCERTAIN, VARIABLES, Variable, deviation, select_variables
+from vsacli.base.variables import (
+    MOTOR_CONSTANTS,
+    UNCERTAIN,
+    VARIABLES,
+    Variable,
+    deviation,
+    select_variables,
+    split_axes,
+    variables_by_tool,
+)
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.results.store.layout import create_layout, row_bytes
 from vsacli.results.store.new_file import ChunkFiller, NewFile
@@ -68,6 +77,8 @@ class ResultWriter(NewFile):
             raise InputError.one(f"unknown precision {precision!r}{did_you_mean(precision, FLOATS)}")
         super().__init__(file)
         self._robot = robot
+        self._labels = robot.labels
+        self._declared = variables_by_tool(self._declared, len(robot.tool_names))
         self._trajectory = trajectory
         self._variables = self._selected(variables, robot, trajectory)
         self._precision = precision
@@ -120,7 +131,7 @@ class ResultWriter(NewFile):
     def _create(self) -> None:
         stored = create_layout(
             self._file,
-            self._format,
+            self._format if self._robot.is_plain_chain else file_formats.OF_TREES[self._format],
             self._robot,
             self._trajectory,
             self._variables,
@@ -131,16 +142,16 @@ class ResultWriter(NewFile):
 
     def _values(self, block: Any, name: str) -> AnyArray:
         """Return the values of a block for a dataset."""
-        values: AnyArray = getattr(block, name)
-        return values
+        return split_axes(getattr(block, name), self._declared[name], self._labels)
 
     def _too_large(self, name: str, values: AnyArray, time: FloatArray) -> StorageError:
         """Return the error for values that overflow single precision."""
         with np.errstate(over="ignore"):
             lost = np.isfinite(values) & np.isinf(values.astype(np.float32))
         at = tuple(np.argwhere(lost)[0])
-        joint = f" of {self._robot.joint_names[at[1]]}" if "joint" in self._declared[name].dims else ""
-        what = f"{name}{joint} is {values[at]:.3g} at t = {time_text(time[at[0]])}"
+        owner = next((dim for dim in self._declared[name].dims if dim in ("joint", "tool")), None)
+        of_owner = f" of {self._labels[owner][at[1]]}" if owner else ""
+        what = f"{name}{of_owner} is {values[at]:.3g} at t = {time_text(time[at[0]])}"
         advice = f"beyond the {np.finfo(np.float32).max:.2g} of single precision; store in double precision"
         return StorageError(self._staged.path, f"cannot be written: {what}, {advice}")
 
@@ -153,8 +164,7 @@ class ResultWriter(NewFile):
     def _size(self) -> int:
         """Return the bytes of all samples, flags before compression."""
         stored = (VARIABLES["time"], *self._variables)
-        joints = len(self._robot.joints)
-        row = sum(row_bytes(variable, joints, self._precision) for variable in stored)
+        row = sum(row_bytes(variable, self._labels, self._precision) for variable in stored)
         return self._trajectory.samples * row
 
     def _selected(
