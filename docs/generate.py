@@ -30,13 +30,14 @@ from vsacli.actuators.mechanisms import MECHANISMS
 from vsacli.actuators.serial import Serial
 from vsacli.base.flags import FLAG_BITS
 from vsacli.base.renamed import RENAMINGS
-from vsacli.base.signals import COMMANDED, POSITION
+from vsacli.base.signals import COMMANDED, POSITION, WRENCHES
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.cli.console import Exit
 from vsacli.control.poles import PolesFile
 from vsacli.documents.columns_file import ColumnSource
+from vsacli.documents.fields import declared_fields
 from vsacli.documents.plausibility import Rule
 from vsacli.files.examples import Example, examples, examples_root, opening_comment
 from vsacli.robot.file import RobotFile
@@ -85,7 +86,9 @@ def spring_fields() -> str:
 
 def trajectory_fields() -> str:
     """Fields of a trajectory file."""
-    return record_sections(trajectory_file_class(frozenset(COMMANDED), rigid=False))
+    cls = trajectory_file_class(frozenset(COMMANDED), rigid=False)
+    as_wrench = declared_fields(cls)[WRENCHES][0].kind.records
+    return record_sections(cls, [as_wrench])
 
 
 def csv_columns() -> str:
@@ -107,6 +110,7 @@ def _signal_columns() -> Iterator[tuple[str, str, str]]:
 def _wrench_columns() -> Iterator[tuple[str, str, str]]:
     for name in WRENCH_NAMES:
         columns = " ".join(f"`{column}`" for column in wrench_columns(name))
+        columns += f"; of several tools `<tool>.{wrench_columns(name)[0]}` ..."
         needed = "for a wrench" if name == WRENCH_NAMES[0] else "no"
         yield columns, str(VARIABLES[name].quantity), needed
 

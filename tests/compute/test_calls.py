@@ -16,6 +16,7 @@ from samples.generated_code import compile_c
 from samples.long_chains import mixed_chain, random_chain
 from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
+from samples.trees import hand
 
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.control_flow import Keyed, call, repeat
@@ -25,6 +26,7 @@ from vsacli.compute.engine.engines import Kernel, TracedEngine, kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.compute.tracing import Kind, Program, is_of_calls, trace
 from vsacli.compute.tracing.row_functions import CallingRowFunction
+from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.robot.model import Robot
@@ -237,3 +239,41 @@ def test_joints_with_other_constants_need_no_other_code():
 
     twice, thrice = (bodies(program_of(LinkTorques(repeated(times)), calling=True)) for times in (2, 3))
     assert len(twice) == len(thrice)
+
+
+def length_of_code(kernel: Kernel) -> tuple[int, int]:
+    """Operations in all bodies, and calls."""
+    program = program_of(kernel, calling=True)
+    calls = [symbol for symbol in program.operations if symbol.operation == "call"]
+    return sum(len(body.operations) for body in bodies(program)), len(calls)
+
+
+def links_of_hand(fingers: int, frame: str | None, joints: int = 4) -> LinkTorques:
+    robot = hand(fingers, joints)
+    if frame is None or fingers == 1:
+        return LinkTorques(robot, frame)
+    return LinkTorques(robot, (frame,) * fingers)
+
+
+def run_of_hand(fingers: int, _frame: None) -> BalancedDynamics:
+    return BalancedDynamics(InverseDynamics(hand(fingers, 4)))
+
+
+def test_a_second_finger_adds_no_code_but_the_signs_of_its_wrench():
+    """18 operations of its own, and a sum on the wrist of 18; of 2,000."""
+    (one, _), (two, _) = (length_of_code(links_of_hand(fingers, "end_effector", 2)) for fingers in (1, 2))
+    assert two <= one + 2 * 18
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kernel_of", "frame"),
+    [(links_of_hand, None), (links_of_hand, "end_effector"), (links_of_hand, "base"), (run_of_hand, None)],
+)
+def test_equal_fingers_share_their_code(kernel_of: Callable[[int, str | None], Kernel], frame: str | None):
+    """At any mounts; each further finger adds equally many calls."""
+    (one, _), (_, of_two), (_, of_three), (five, of_five) = (
+        length_of_code(kernel_of(fingers, frame)) for fingers in (1, 2, 3, 5)
+    )
+    assert five <= 1.1 * one
+    assert of_five - of_three == 2 * (of_three - of_two)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +11,7 @@ import pytest
 from oracles import pinocchio
 from samples.plants import all_rigid, elastic, random_state, rigid, torques_of, with_actuators
 from samples.robots import random_robot, still_joint, vsa_3r
+from samples.trees import finger, hand, reordered
 
 from vsacli.base.errors import InputError
 from vsacli.base.wrench import Wrench
@@ -17,6 +19,8 @@ from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.forward import State, mass_matrix, state_derivative
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link, Pose
 from vsacli.robot.model import Robot
+
+NOTHING = Link(mass=0, com=(0, 0, 0), inertia=Inertia(xx=0, yy=0, zz=0))
 
 CHAINS = ["R", "RRR", "RPRP", "PPP", "RRRRRRR"]
 
@@ -132,14 +136,38 @@ def test_a_joint_that_moves_no_mass_is_named(at, named):
     if at == 3:
         joints.append(still_joint("tip"))
     else:
-        nothing = Link(mass=0, com=(0, 0, 0), inertia=Inertia(xx=0, yy=0, zz=0))
-        joints[2] = dataclasses.replace(joints[2], link=nothing)
+        joints[2] = dataclasses.replace(joints[2], link=NOTHING)
     robot = dataclasses.replace(robot, joints=tuple(joints))
     state = random_state(robot, 2, seed=1)
     with pytest.raises(
         InputError, match=f"^{named}: the inertia it moves is not positive .leading minor {len(joints)}"
     ):
         state_derivative(robot, state, np.zeros((2, len(joints), 2)))
+
+
+def test_branches_without_mass_are_named_in_any_order():
+    """Two of three fingers end in joints without mass; alone, such a finger names the same joint."""
+    tips = ("finger_0_joint_1", "finger_2_joint_1")
+    whole = hand(3, 2, palm=False)
+    robot = dataclasses.replace(whole, joints=tuple(map(partial(_weightless, tips), whole.joints)))
+    for ordered in (robot, reordered(robot, 1)):
+        assert _named_as_massless(ordered) == set(tips)
+    assert _named_as_massless(finger(robot, 0)) == {tips[0]}
+    palm = hand(3, 2)
+    robot = dataclasses.replace(palm, joints=tuple(map(partial(_weightless, tips), palm.joints)))
+    for ordered in (robot, reordered(robot, 1)):
+        assert _named_as_massless(ordered) == set(tips)
+
+
+def _weightless(names: tuple[str, ...], joint: Joint) -> Joint:
+    return dataclasses.replace(joint, link=NOTHING) if joint.name in names else joint
+
+
+def _named_as_massless(robot: Robot) -> set[str]:
+    state = random_state(robot, 2, seed=1)
+    with pytest.raises(InputError, match="the inertia it moves is not positive") as raised:
+        state_derivative(robot, state, np.zeros((2, len(robot.joints), 2)))
+    return {problem.message.split()[1].rstrip(":") for problem in raised.value.problems}
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,7 @@ def test_torques_under_a_wrench_agree_with_pinocchio(robot: Robot, frame: str) -
     motion = random_motion(robot, SAMPLES, seed=2)
     wrench = random_wrench(SAMPLES, frame, seed=2)
     tau_e, *_ = link_torques(robot, *motion, wrench)
-    expected = pinocchio.torques_under_wrench(robot, motion[:3], wrench.wrench, in_base=frame == "base")
+    expected = pinocchio.torques_under_wrench(robot, motion[:3], wrench.wrench, [frame])
     assert_same(tau_e, expected)
 
 

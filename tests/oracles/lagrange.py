@@ -1,6 +1,7 @@
-"""Lagrange's equations of a chain, from 4x4 Denavit-Hartenberg matrices; no angular velocity, no recursion.
+"""Lagrange's equations of a tree, from 4x4 Denavit-Hartenberg matrices; no angular velocity, no recursion.
 
-With the transform T_k of link k and its pseudo-inertia J_k = integral(r r^T dm), r = (x, y, z, 1):
+With the transform T_k of link k in the base and its pseudo-inertia J_k = integral(r r^T dm) of the points
+r = (x, y, z, 1):
 
     kinetic energy    1/2 sum_k tr(T_k' J_k T_k'^T)
     potential energy     -sum_k g^T T_k J_k e_4
@@ -15,12 +16,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property, reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from oracles.jets import Scalar, circle, leibniz, matrix_product
+from oracles.kinematics import transform
+from vsacli.robot.joint import FRAME_0, Pose
 from vsacli.robot.model import Robot
 
 Array = npt.NDArray[Any]
@@ -69,13 +73,30 @@ class State:
     rates: Sequence[Scalar]
 
 
-class Chain:
-    """A chain at given states; `gravity` is the acceleration in the base frame."""
+class Place(NamedTuple):
+    """Where a joint stands: on the link of joint `parent`, -1 the base, at `seat`, 4x4, None at its frame."""
 
-    def __init__(self, links: Sequence[Link], states: Sequence[State], gravity: Array) -> None:
+    parent: int
+    seat: Array | None = None
+
+
+class Chain:
+    """Links at given states; `gravity` is the acceleration in the base frame.
+
+    `places` says where each joint stands, after the one whose link carries it: by default on the link before.
+    """
+
+    def __init__(
+        self,
+        links: Sequence[Link],
+        states: Sequence[State],
+        gravity: Array,
+        places: Sequence[Place] | None = None,
+    ) -> None:
         self.links = links
         self.states = states
         self.gravity = np.array([*gravity, 0])
+        self.places = places or [Place(index - 1) for index in range(len(links))]
         self.steps = [_transform(link, state) for link, state in zip(links, states, strict=True)]
         self.poses = self._poses()
 
@@ -97,38 +118,47 @@ class Chain:
         )
 
     def _poses(self) -> list[Derivatives]:
-        poses = [self.steps[0]]
-        for step in self.steps[1:]:
-            poses.append(matrix_product(poses[-1], step))
+        poses = list[Derivatives]()
+        for place, step in zip(self.places, self.steps, strict=True):
+            poses.append(_behind(poses[place.parent] if place.parent >= 0 else None, place.seat, step))
         return poses
 
     def _torque(self, i: int, order: int) -> Scalar:
         total = self.links[i].damping * self.states[i].rates[order]
-        for link, pose, sensitivity in zip(
-            self.links[i:], self.poses[i:], self.sensitivities(i), strict=True
-        ):
+        for k, sensitivity in self.sensitivities(i).items():
+            link, pose = self.links[k], self.poses[k]
             j = link.pseudo_inertia
             total = total + leibniz(order, sensitivity, pose[2:], lambda a, b, j=j: _trace(a @ j, b))
             total = total - self._weight(sensitivity[order], link)
         return total
 
-    def sensitivities(self, i: int) -> list[Derivatives]:
-        """Derivatives of dT_k/dq_i for k = i, i + 1, ..."""
-        generator = self.links[i].generator
-        sensitivity = [generator @ step for step in self.steps[i]]
-        if i > 0:
-            sensitivity = matrix_product(self.poses[i - 1], sensitivity)
-        sensitivities = [sensitivity]
-        for step in self.steps[i + 1 :]:
-            sensitivities.append(matrix_product(sensitivities[-1], step))
-        return sensitivities
+    def sensitivities(self, i: int) -> dict[int, Derivatives]:
+        """Derivatives of dT_k/dq_i, by k, of each link k that joint i moves."""
+        return self._sensitivities[i]
+
+    @cached_property
+    def _sensitivities(self) -> list[dict[int, Derivatives]]:
+        return [self._sensitivities_by(i) for i in range(len(self.links))]
+
+    def _sensitivities_by(self, i: int) -> dict[int, Derivatives]:
+        parent, seat = self.places[i]
+        generated = [self.links[i].generator @ step for step in self.steps[i]]
+        moved = {i: _behind(self.poses[parent] if parent >= 0 else None, seat, generated)}
+        for k in range(i + 1, len(self.links)):
+            parent, seat = self.places[k]
+            if parent in moved:
+                moved[k] = _behind(moved[parent], seat, self.steps[k])
+        return moved
 
     def _weight(self, pose: Array, link: Link) -> Scalar:
         return (pose @ link.pseudo_inertia[:, 3]) @ self.gravity
 
 
-def chain_of(robot: Robot, motion: Sequence[Array]) -> Chain:
-    """The chain of a robot at q, dq, ddq, d3q, d4q, each (samples, joints)."""
+def chain_of(robot: Robot, motion: Sequence[Array], *, modified: bool = False) -> Chain:
+    """The links of a robot at q, dq, ddq, d3q, d4q, each (samples, joints).
+
+    `modified` says that its rows and link frames are meant in the modified Denavit-Hartenberg convention.
+    """
     q, *rates = (np.moveaxis(np.asarray(array), -1, 0) for array in motion)
     links, states = [], []
     for index, joint in enumerate(robot.joints):
@@ -139,16 +169,36 @@ def chain_of(robot: Robot, motion: Sequence[Array]) -> Chain:
         links.append(
             Link(
                 revolute=joint.type == "revolute",
-                a=joint.dh.a,
-                cos_alpha=math.cos(joint.dh.alpha),
-                sin_alpha=math.sin(joint.dh.alpha),
+                a=0 if modified else joint.dh.a,
+                cos_alpha=1 if modified else math.cos(joint.dh.alpha),
+                sin_alpha=0 if modified else math.sin(joint.dh.alpha),
                 mass=joint.link.mass,
                 com=np.array(joint.link.com),
                 inertia=joint.link.inertia.tensor,
                 damping=joint.damping,
             )
         )
-    return Chain(links, states, np.array(robot.gravity))
+    return Chain(links, states, np.array(robot.gravity), _places(robot, modified))
+
+
+def _places(robot: Robot, modified: bool) -> list[Place]:
+    """Where the joints stand: on the base behind its pose, or on a link, behind the mount."""
+    names, places = [joint.name for joint in robot.joints], list[Place]()
+    for index, joint in enumerate(robot.joints):
+        on_base = index == 0 if joint.parent is None else joint.parent == FRAME_0
+        before = [robot.base] if on_base else []
+        poses = [transform(pose).real for pose in (*before, *([joint.mount] if joint.mount else []))]
+        if modified:
+            poses.append(transform(Pose(xyz=(joint.dh.a, 0, 0), rpy=(joint.dh.alpha, 0, 0))).real)
+        parent = index - 1 if joint.parent in (None, FRAME_0) else names.index(joint.parent)
+        places.append(Place(-1 if on_base else parent, reduce(np.matmul, poses) if poses else None))
+    return places
+
+
+def _behind(carrying: Derivatives | None, seat: Array | None, step: Derivatives) -> Derivatives:
+    """Transform of a link: of the carrying one, unless that is the base, its seat, and its own step."""
+    seated = step if seat is None else [seat @ matrix for matrix in step]
+    return seated if carrying is None else matrix_product(carrying, seated)
 
 
 def _transform(link: Link, state: State) -> Derivatives:

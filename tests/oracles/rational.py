@@ -1,14 +1,15 @@
-"""Chains of exact fractions: twists and angles at rational points of the circle."""
+"""Chains and trees of exact fractions: twists, angles and seats at rational points of circle and sphere."""
 
 from __future__ import annotations
 
 import random
+from collections.abc import Collection, Sequence
 from fractions import Fraction
 
 import numpy as np
 
 from oracles.contact import Contact
-from oracles.lagrange import Chain, Link, State
+from oracles.lagrange import Array, Chain, Link, Place, State
 
 
 def random_chain(types: str, seed: int) -> Chain:
@@ -19,11 +20,29 @@ def random_chain(types: str, seed: int) -> Chain:
     return Chain(links, states, _vector(rng))
 
 
-def random_contact(seed: int, *, in_base: bool) -> Contact:
+def random_tree(types: str, parents: Sequence[int], seated: Collection[int], seed: int) -> Chain:
+    """A tree of the links that `random_chain` has, each on the one of its parent, some joints on seats."""
+    chain, rng = random_chain(types, seed), random.Random(f"seats {seed}")
+    places = [Place(parent, _seat(rng) if joint in seated else None) for joint, parent in enumerate(parents)]
+    return Chain(chain.links, chain.states, chain.gravity[:3], places)
+
+
+def random_contact(seed: int, *, in_base: bool, link: int = -1) -> Contact:
     """Force, moment, their derivatives and the point of contact random fractions."""
     rng = random.Random(seed)
     force, moment = ([_vector(rng) for _ in range(3)] for _ in range(2))
-    return Contact(force, moment, _vector(rng), in_base)
+    return Contact(force, moment, _vector(rng), in_base, link)
+
+
+def _seat(rng: random.Random) -> Array:
+    """A pose whose rotation is that of a quaternion of integers, none of its entries 0 or +-1."""
+    w, x, y, z = (rng.choice((-1, 1)) * n for n in rng.sample(range(2, 12), 4))
+    square = Fraction(w * w + x * x + y * y + z * z)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    rotation = np.eye(3, dtype=int) + 2 * (w * cross + cross @ cross) / square
+    seat = np.eye(4, dtype=object)
+    seat[:3, :3], seat[:3, 3] = rotation, _vector(rng)
+    return seat
 
 
 def _link(rng: random.Random, revolute: bool) -> Link:

@@ -16,7 +16,7 @@ from samples.figures import smallest_stiffness
 from samples.marks import slow_but
 from samples.robots import random_motion, random_robot
 from samples.shipped import shipped_robot, shipped_run
-from samples.trees import hand_text, torso_text, written
+from samples.torso_and_hand import hand_text, torso_text, written
 from samples.wrenches import held
 
 from vsacli import inverse_dynamics, load_robot

@@ -13,7 +13,7 @@ import pytest
 import scipy.io
 import xarray
 from samples.results import REPORT, PlannedTrajectory, robot
-from samples.trees import FRAMES, hand_text, torso_result, written
+from samples.torso_and_hand import FRAMES, hand_text, torso_result, written
 
 from vsacli import InputError, Pose, Result, load_robot, open_result
 from vsacli.base.outputs import Outputs

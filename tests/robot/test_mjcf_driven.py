@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
-from samples.mujoco_models import driven
+from samples.mujoco_models import driven, frame_of_wrenches
 
 from vsacli import inverse_dynamics, load_robot, load_trajectory
 
@@ -17,7 +17,8 @@ def error(robot_name, trajectory_name, step):
     robot = load_robot(REPOSITORY / "robots" / f"{robot_name}.yaml")
     file = REPOSITORY / "trajectories" / f"{trajectory_name}.yaml"
     trajectory = load_trajectory(file, robot, {"rate": 2 / step})
-    return np.abs(driven(robot, inverse_dynamics(robot, trajectory))).max()
+    result = inverse_dynamics(robot, trajectory)
+    return np.abs(driven(robot, result, frame_of_wrenches(trajectory))).max()
 
 
 @pytest.mark.parametrize(
@@ -31,6 +32,8 @@ def error(robot_name, trajectory_name, step):
         ("rp_2", "rp_2", 0.004, 1e-7),
         ("compact_1r", "compact_1r", 0.008, 1e-6),
         ("tendon_1r", "tendon_1r", 0.008, 1e-6),
+        ("torso_2x3r", "torso_2x3r", 0.01, 1e-6),
+        ("hand_3x2r", "hand_3x2r", 0.004, 1e-6),
     ],
 )
 def test_the_error_falls_with_the_fourth_power_of_the_step(robot, trajectory, step, largest):

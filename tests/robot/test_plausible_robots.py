@@ -150,3 +150,38 @@ def test_the_attainable_stiffness_is_computed_once(monkeypatch: pytest.MonkeyPat
     for _ in range(2):
         assert load_trajectory(REST_TO_REST, robot).warnings == ()
     assert len(solved) == 3
+
+
+def hand_with(tmp_path: Path, *changes: tuple[str, str]) -> Robot:
+    """The bundled hand with numbers in other units."""
+    return load_robot(edited(REPOSITORY / "robots" / "hand_3x2r.yaml", tmp_path / "hand.yaml", *changes))
+
+
+@pytest.mark.parametrize("joint", ["index_middle", "middle_knuckle"])
+def test_a_mount_in_millimeters(joint: str, tmp_path: Path) -> None:
+    """On a link it is compared with the links, on the base with the reach of the finger."""
+    changes = {
+        "index_middle": (
+            "  - name: index_middle\n",
+            "  - name: index_middle\n    mount: {xyz: [12, 0, 0]}\n",
+        ),
+        "middle_knuckle": ("mount: {xyz: [0.092, 0, 0]", "mount: {xyz: [92, 0, 0]"),
+    }
+    (warning,) = hand_with(tmp_path, changes[joint]).warnings
+    assert f"joints.{joint}.mount.xyz.0 (x) = " in warning
+    assert "did you mean" in warning
+    assert "mm, which is" in warning
+
+
+def test_a_finger_in_millimeters_hides_nothing_of_the_others(tmp_path: Path) -> None:
+    lengths = ("dh: &first {a: 0.045, alpha: 0", "dh: {a: 45, alpha: 0")
+    others = ("dh: *first", "dh: {a: 0.045, alpha: 0, d: 0, theta: 0}")
+    weak = (
+        "  - name: thumb_middle",
+        "  - name: thumb_middle\n    limits: {position: [-400, 400]}",
+    )
+    warnings = hand_with(tmp_path, lengths, others, weak).warnings
+    alone = hand_with(tmp_path, others, weak).warnings
+    assert len(alone) == 2
+    assert {*alone} < {*warnings}
+    assert any("joints.index_knuckle.dh.a = 45 m" in warning for warning in warnings)

@@ -53,17 +53,17 @@ def files(tmp_path):
 
 @pytest.mark.parametrize("name", GROUPS)
 def test_ends_of_a_group(files, name):
-    group, ends, names = GROUPS[name]
+    group, (base, tip), names = GROUPS[name]
     urdf, srdf = files(group)
-    assert ends_of_group(srdf, "arm", read_urdf(urdf)) == ends
+    assert ends_of_group(srdf, "arm", read_urdf(urdf)) == (base, (tip,))
     conversion = import_urdf(urdf, srdf=srdf, group="arm")
     assert conversion.robot.joint_names == tuple(names.split())
-    assert (conversion.chain.base, conversion.chain.tip) == ends
+    assert (conversion.tree.base, conversion.tree.tips[0].link) == (base, tip)
 
 
 def test_the_only_group_needs_no_name(files):
     urdf, srdf = files('<joint name="j2"/>', others="")
-    assert ends_of_group(srdf, None, read_urdf(urdf)) == ("l1", "l2")
+    assert ends_of_group(srdf, None, read_urdf(urdf)) == ("l1", ("l2",))
 
 
 REFUSED = {
@@ -97,12 +97,49 @@ def test_groups_that_are_no_chain(files, case):
         ends_of_group(srdf, name, read_urdf(urdf))
 
 
-def test_branches_are_no_chain(tmp_path):
-    text = robot(*map(link, "abc"), joint("j1", "a", "b"), joint("j2", "a", "c"))
-    urdf = write(tmp_path / "arm.urdf", text)
-    group = '<robot name="x"><group name="both"><joint name="j1"/><joint name="j2"/></group></robot>'
-    srdf = write(tmp_path / "arm.srdf", group)
-    with pytest.raises(InputError, match="the joints of the group 'both' are no serial chain: 'j1', 'j2'"):
+BODY = robot(
+    *map(link, ("floor", "torso", "neck", "head", "left", "left_hand", "right", "right_hand", "wheel")),
+    joint("lift", "floor", "torso", "P"),
+    joint("nod", "torso", "head"),
+    joint("raise_left", "torso", "left", xyz="0 0.2 0"),
+    joint("bend_left", "left", "left_hand", rpy="1 0 0"),
+    joint("weld", "torso", "neck", "F"),
+    joint("raise_right", "neck", "right", xyz="0 -0.2 0"),
+    joint("bend_right", "right", "right_hand", rpy="-1 0 0"),
+    joint("roll", "floor", "wheel"),
+)
+LEFT = '<group name="left"><chain base_link="torso" tip_link="left_hand"/></group>'
+RIGHT = '<group name="right"><joint name="raise_right"/><joint name="bend_right"/></group>'
+BOTH = '<group name="left"/><group name="right"/>'
+TREES = {
+    "groups": (BOTH, "torso", ["left_hand", "right_hand"]),
+    "groups in another order": (
+        '<group name="right"/><group name="left"/>',
+        "torso",
+        ["right_hand", "left_hand"],
+    ),
+    "with the joint that carries both": (f'<joint name="lift"/>{BOTH}', "floor", ["left_hand", "right_hand"]),
+    "joints": ('<joint name="nod"/><joint name="raise_left"/>', "torso", ["head", "left"]),
+}
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_a_group_may_be_a_tree(tmp_path, name):
+    group, base, tips = TREES[name]
+    urdf = write(tmp_path / "body.urdf", BODY)
+    text = f'<robot name="x"><group name="both">{group}</group>{LEFT}{RIGHT}</robot>'
+    conversion = import_urdf(urdf, srdf=write(tmp_path / "body.srdf", text), group="both")
+    assert (conversion.tree.base, [tip.link for tip in conversion.tree.tips]) == (base, tips)
+    assert conversion.robot.tool_names == tuple(tips)
+    assert "roll" not in conversion.robot.joint_names
+
+
+def test_a_tree_has_no_gaps(tmp_path):
+    urdf = write(tmp_path / "body.urdf", BODY)
+    joints = '<joint name="roll"/><joint name="bend_left"/>'
+    srdf = write(tmp_path / "body.srdf", f'<robot name="x"><group name="both">{joints}</group></robot>')
+    sentence = "the group 'both' leaves out 'lift', 'raise_left' within its tree"
+    with pytest.raises(InputError, match=sentence):
         import_urdf(urdf, srdf=srdf)
 
 

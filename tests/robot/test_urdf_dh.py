@@ -26,12 +26,14 @@ def path(tmp_path):
 
 def strays(conversion, samples: int = 20) -> tuple[float, float]:
     """Largest distance of the tips, and largest relative error of torques, from Pinocchio's reading."""
-    chain, built = conversion.chain, conversion.robot
+    chain, built = conversion.tree, conversion.robot
     oracle, names = UrdfOracle(conversion.file), [each.urdf.name for each in chain.joints]
     q, dq, ddq = np.random.default_rng(1).uniform(-2, 2, (3, samples, len(chain.joints)))
     expected = np.array([oracle.torques(names, *row) for row in zip(q, dq, ddq, strict=True)])
     found = link_torques(built, q, dq, ddq, 0 * q, 0 * q)[0]
-    tips = [tool_pose(built, row).real - oracle.tip_pose(names, chain.base, chain.tip, row) for row in q]
+    tips = [
+        tool_pose(built, row).real - oracle.tip_pose(names, chain.base, chain.tips[0].link, row) for row in q
+    ]
     return float(np.abs(tips).max()), float(np.abs(found - expected).max() / np.abs(expected).max())
 
 

@@ -41,7 +41,7 @@ def urdf(tmp_path, monkeypatch):
 
 
 def positions(conversion):
-    return {held.urdf.name: held.position for held in conversion.chain.held}
+    return {held.urdf.name: held.position for held in conversion.tree.held}
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,10 @@
-"""Every serial chain of the robots in `example-robot-data`, against Pinocchio's own reading of the files."""
+"""Every chain, and the whole, of the robots in `example-robot-data`, against Pinocchio's own reading."""
 
 from __future__ import annotations
 
 import dataclasses
 import importlib.metadata
+import re
 from collections.abc import Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -12,7 +13,8 @@ import numpy as np
 import pytest
 from oracles.kinematics import tool_pose
 from oracles.urdf_pinocchio import UrdfOracle
-from samples.urdf_chains import ARMS, REFUSED, WITHOUT_ARMS
+from samples.urdf_chains import ARMS, REFUSED, WHOLE_REFUSED, WITHOUT_ARMS
+from samples.urdf_deviations import deviations
 
 from vsacli import load_trajectory
 from vsacli.analysis.run import inverse_dynamics
@@ -51,12 +53,12 @@ def oracle(path: Path) -> UrdfOracle:
 def check(path: Path, conversion: Conversion, held: Mapping[str, float] | None = None) -> None:
     """Compare tips and torques at random states with those of Pinocchio."""
     held = held or {}
-    chain, robot = conversion.chain, conversion.robot
+    chain, robot = conversion.tree, conversion.robot
     joints = [joint.urdf.name for joint in chain.joints]
     q, dq, ddq = np.random.default_rng(len(joints)).uniform(-2, 2, (3, SAMPLES, len(joints)))
     for position in q:
         found = tool_pose(robot, position).real
-        expected = oracle(path).tip_pose(joints, chain.base, chain.tip, position, held)
+        expected = oracle(path).tip_pose(joints, chain.base, chain.tips[0].link, position, held)
         np.testing.assert_allclose(found, expected, rtol=0, atol=BOUND)
     found = link_torques(robot, q, dq, ddq, 0 * q, 0 * q)[0] - dq * [joint.damping for joint in robot.joints]
     expected = np.array([oracle(path).torques(joints, *row, held) for row in zip(q, dq, ddq, strict=True)])
@@ -112,8 +114,8 @@ def test_every_chain_from_the_root_is_exact_or_refused_for_a_listed_reason(path)
 def held_anywhere(conversion: Conversion) -> dict[str, float]:
     """A random position, within the limits if there are any, of each joint that can be held."""
     rng = np.random.default_rng(3)
-    leaders = {held.leader for held in conversion.chain.held if held.urdf.type in MOVING}
-    limits = {held.urdf.name: held.urdf.limit.position or (-2.0, 2.0) for held in conversion.chain.held}
+    leaders = {held.leader for held in conversion.tree.held if held.urdf.type in MOVING}
+    limits = {held.urdf.name: held.urdf.limit.position or (-2.0, 2.0) for held in conversion.tree.held}
     return {name: float(rng.uniform(*limits.get(name, (-2.0, 2.0)))) for name in sorted(leaders)}
 
 
@@ -132,6 +134,30 @@ def test_an_arm_can_execute_its_new_trajectory(name, base, tip, tmp_path):
     path = tmp_path / "move.yaml"
     path.write_text(trajectory_template(robot).replace("rate: 1000", "rate: 50  "))
     assert inverse_dynamics(robot, load_trajectory(path, robot)).report.verdict == "ok"
+
+
+def whole_robot(path: Path) -> tuple[Conversion | None, dict[str, float], str]:
+    """All of a robot, with joints held as the message of a refusal advises, and this message."""
+    try:
+        return import_urdf(path), {}, ""
+    except InputError as error:
+        held = dict.fromkeys(re.findall(r"or both by --hold (\S+)=0", str(error)), 0.0)
+        return (import_urdf(path, hold=held) if held else None), held, str(error)
+
+
+@pytest.mark.cases(14)
+@pytest.mark.parametrize("path", FILES, ids=lambda path: f"{path.parts[-3]}-{path.stem}")
+def test_every_whole_robot_is_exact_or_refused_for_a_listed_reason(path):
+    conversion, held, refusal = whole_robot(path)
+    reason = dict(WHOLE_REFUSED).get(path.name, "")
+    assert (reason in refusal, bool(reason)) == (True, bool(refusal))
+    if conversion is not None:
+        assert max(deviations(conversion, oracle(path), 100, held)) < BOUND
+        assert max(conversion.residual) < BOUND
+        tips = len(conversion.tree.tips)
+        assert (conversion.tree.shape, len(conversion.robot.tools)) == (
+            ("chain", 0) if tips == 1 else ("tree", tips)
+        )
 
 
 def test_every_file_is_listed():

@@ -13,9 +13,12 @@ from scipy import optimize
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
+from vsacli.base.wrench import WrenchFrame, frames_by_tool
 from vsacli.robot.model import Robot
+from vsacli.robot.models.exported_model import exported_tool_names
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_drives import Start, motor_name
+from vsacli.trajectory.trajectory import Trajectory
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -84,8 +87,32 @@ def controls(robot: Robot, result: Any) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def inverse_error(robot: Robot, result: Any) -> float:
-    """Largest error of the forces that MuJoCo finds for a run, a share of the peak of all torques."""
+def forces_of_tools(
+    robot: Robot, frame: WrenchFrame, wrench: FloatArray, model: Any, data: Any
+) -> FloatArray:
+    """Forces on MuJoCo's coordinates of the wrenches on the tools, six components each, in their frames."""
+    total = np.zeros(model.nv)
+    for name, of_tool, components in zip(
+        exported_tool_names(robot), frames_by_tool(frame), wrench.reshape(-1, 6), strict=True
+    ):
+        if of_tool is not None:
+            site, body = data.site(name), model.site(name).bodyid[0]
+            axes = site.xmat.reshape(3, 3) if of_tool == "end_effector" else np.eye(3)
+            force, moment = axes @ components[:3], axes @ components[3:]
+            mujoco.mj_applyFT(model, data, force, moment, site.xpos, body, total)
+    return total
+
+
+def frame_of_wrenches(trajectory: Trajectory) -> WrenchFrame:
+    """Frame of the wrenches of a trajectory on the tools; empty without any."""
+    return () if trajectory.wrench is None else trajectory.wrench.frame
+
+
+def inverse_error(robot: Robot, result: Any, frame: WrenchFrame = ()) -> float:
+    """Largest error of the forces that MuJoCo finds for a run, a share of the peak of all torques.
+
+    With wrenches on the tools, if their frame is given.
+    """
     with compiled(robot) as (model, data):
         rows, commands = coordinates(robot, model, result), controls(robot, result)
         errors = []
@@ -94,14 +121,18 @@ def inverse_error(robot: Robot, result: Any) -> float:
             data.ctrl[:] = commands[sample]
             mujoco.mj_inverse(model, data)
             mujoco.mj_fwdActuation(model, data)
-            errors.append(np.abs(data.qfrc_inverse - data.qfrc_actuator).max())
+            exerted = data.qfrc_actuator.copy()
+            if frame:
+                exerted += forces_of_tools(robot, frame, result.wrench[sample], model, data)
+            errors.append(np.abs(data.qfrc_inverse - exerted).max())
     return float(max(errors) / np.abs(result.tau_motor[np.isfinite(result.tau_motor)]).max())
 
 
-def driven(robot: Robot, result: Any) -> FloatArray:
+def driven(robot: Robot, result: Any, frame: WrenchFrame = ()) -> FloatArray:
     """Positions of MuJoCo's coordinates less those of a run, (steps, nq).
 
-    A step of RK4 goes over two samples, so that the torques of all its stages are known.
+    A step of RK4 goes over two samples, so that the torques of all its stages are known, and the wrenches on
+    the tools, if their frame is given.
     """
     with compiled(robot) as (model, data):
         rows, commands = coordinates(robot, model, result), controls(robot, result)
@@ -109,8 +140,11 @@ def driven(robot: Robot, result: Any) -> FloatArray:
         model.opt.timestep = 2 * half
         data.qpos[:], data.qvel[:] = rows.positions[0], rows.velocities[0]
 
-        def control(_model: Any, data: Any) -> None:
-            data.ctrl[:] = commands[round(data.time / half)]
+        def control(model: Any, data: Any) -> None:
+            sample = round(data.time / half)
+            data.ctrl[:] = commands[sample]
+            if frame:
+                data.qfrc_applied[:] = forces_of_tools(robot, frame, result.wrench[sample], model, data)
 
         mujoco.set_mjcb_control(control)
         errors = []

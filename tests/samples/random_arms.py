@@ -44,7 +44,7 @@ def _joint(kind: str, name: str, rng: np.random.Generator) -> Joint:
         link=_link(rng),
         damping=rng.uniform(0.2, 1),
         friction=_friction(rng) if rubs else None,
-        actuator=_actuator(kind, rng),
+        actuator=random_drive(kind, rng),
     )
 
 
@@ -61,7 +61,8 @@ def _friction(rng: np.random.Generator) -> Friction:
     return Friction(coulomb=(size, size), width=WIDTH)
 
 
-def _actuator(kind: str, rng: np.random.Generator) -> Actuator:
+def random_drive(kind: str, rng: np.random.Generator) -> Actuator:
+    """An actuator of one of the `KINDS`, some of them with friction."""
     friction = _friction(rng) if rng.random() < 0.6 else None
     motor = Motor(inertia=rng.uniform(0.2, 3), damping=rng.uniform(0.3, 2), friction=friction)
     if kind == "rigid":

@@ -1,99 +1,261 @@
-"""Robots that are trees, as files: a torso with two arms and a hand; and runs of them with wrenches."""
+"""Random trees: branches, seats, several tools, wrenches on them, and every kind of actuator."""
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vsacli import Result, Robot, Trajectory, inverse_dynamics, load_robot, load_trajectory
-from vsacli.base.signals import WRENCH
-from vsacli.trajectory.curves import ConstantProfile
+from samples.marks import slow_but
+from samples.mechanisms import DEVICES
+from samples.random_arms import random_drive
+from samples.robot_files import fields, tables
+from samples.robots import ODD_GRAVITY, random_actuator, random_joint
+from samples.springs import SPRINGS
+from samples.term_mutations import mutated_run
+from samples.wrenches import SCALES
+from vsacli import Trajectory, inverse_dynamics, load_robot
+from vsacli.actuators.actuator import Actuator
+from vsacli.actuators.antagonistic import Antagonistic
+from vsacli.actuators.motor import Motor
+from vsacli.base import file_formats
+from vsacli.base.arrays import FloatArray
+from vsacli.base.signals import POSITION, STIFFNESS, WRENCH, Signal
+from vsacli.base.wrench import Wrench, WrenchFrame, frames_by_tool
+from vsacli.robot.joint import FRAME_0, Joint, Pose, Tool
+from vsacli.robot.model import Robot
+from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.profile import WrenchProfile
+from vsacli.trajectory.times import UniformTimes
 
-ACTUATOR = "{type: antagonistic, motor: {inertia: 0.01}, spring: {type: cubic, k: 400, k_c: 2000}}"
-FRAMES = ("base", None, "end_effector")
-"""Frames of the wrenches on the tools of the torso."""
+MOST_TOOLS = 3
+_LOSSY = [joint for run in ("pair", "serial", "spring") for joint in mutated_run(run)[0].joints]
+"""Joints with friction, a damper, windings, gears, coupled springs or rotors."""
 
-SWING = """format: vsacli-trajectory/1
-name: swing
-duration: 1
-rate: 40
-position: {type: polynomial, degree: 7, start: 0.1, end: 0.5}
-stiffness: {type: constant, value: 900}
-"""
+SMALL = (11, 38, 49)
+"""Seeds of trees of at most 8 joints, for quick tests."""
 
 
-def joint_text(name: str, dh: str, begin: str = "", mass: float = 1.0) -> str:
-    """An entry of `joints`; `begin` are its keys `parent` and `mount`."""
-    inertia = f"{{xx: {0.01 * mass:g}, yy: {0.01 * mass:g}, zz: {0.01 * mass:g}}}"
-    link = f"{{mass: {mass:g}, com: [-0.02, 0, 0], inertia: {inertia}}}"
-    rest = f"link: {link},\n     actuator: {ACTUATOR}"
-    return f"  - {{name: {name}, type: revolute, {begin}dh: {dh},\n     {rest}}}\n"
+def random_tree(seed: int, joints: int | None = None) -> Robot:
+    """A tree of 4 to 20 joints with up to three tools, on a tilted base."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(4, 21)) if joints is None else joints
+    members: list[Joint] = []
+    for number in range(count):
+        joint = random_joint(rng, f"joint_{number}", str(rng.choice(["R", "R", "R", "P"])))
+        parent = _random_parent(rng, members)
+        mount = random_pose(rng) if rng.random() < 0.5 else None
+        members.append(_random_drive(rng, replace(joint, parent=parent, mount=mount)))
+    robot = Robot(name=f"tree-{seed}", gravity=ODD_GRAVITY, base=random_pose(rng), joints=tuple(members))
+    return replace(robot, tools=_random_tools(rng, robot))
 
 
-def torso_text() -> str:
-    """A waist with an arm of three joints left and right of it, and a neck on the base."""
-    text = "format: vsacli-robot/1\nname: torso\njoints:\n" + joint_text("waist", "{a: 0, alpha: 0, d: 0.4}")
-    for side, sign in (("left", 1), ("right", -1)):
-        begin = f"parent: waist, mount: {{xyz: [0, {0.2 * sign}, 0], rpy: [{-90 * sign} deg, 0, 0]}}, "
-        text += joint_text(f"{side}_shoulder", "{a: 0, alpha: 90 deg}", begin)
-        text += joint_text(f"{side}_arm", "{a: 0.3, alpha: 0}") + joint_text(
-            f"{side}_elbow", "{a: 0.25, alpha: 0}"
-        )
-    begin = "parent: null, mount: {xyz: [-0.2, 0, 0.1]}, "
-    return (
-        f"{text}{joint_text('pole', '{a: 0.1, alpha: 0, d: 0.3}', begin)}tools:\n"
-        "  left_hand: {joint: left_elbow, xyz: [0, 0, 0.1]}\n  right_hand: {joint: right_elbow}\n"
-        "  lamp: {joint: pole, rpy: [0.1, 0.2, 0.3]}\n"
-    )
+def tree_cases(count: int) -> list[Any]:
+    """Seeds and numbers of joints, None for any: a small tree of two fingers, and slow cases of all sizes."""
+    quick = (0, 4)
+    return slow_but([quick], [quick, *((seed, None) for seed in range(count))])
 
 
-def hand_text(fingers: int = 5, joints: int = 4) -> str:
-    """A wrist with a palm and fingers; the first finger opposes the others."""
-    text = "format: vsacli-robot/1\nname: hand\njoints:\n"
-    text += joint_text("wrist", "{a: 0.02, alpha: 0}", mass=0.3)
-    tools = "tools:\n"
+def without_resistance(robot: Robot) -> Robot:
+    """The robot without friction and dampers between the links, which references of the links leave out."""
+    joints = tuple(replace(joint, friction=None, damper=None) for joint in robot.joints)
+    return replace(robot, joints=joints)
+
+
+def _random_parent(rng: np.random.Generator, before: list[Joint]) -> str | None:
+    """The joint before, by its name or by default, as often as any other."""
+    if not before or rng.random() < 0.2:
+        return FRAME_0
+    if rng.random() < 0.6:
+        return None if rng.random() < 0.7 else before[-1].name
+    return str(rng.choice([joint.name for joint in before]))
+
+
+def random_pose(rng: np.random.Generator) -> Pose:
+    """Any pose, one turned by right angles, or one on an axis."""
+    x, y, z = (rng.uniform(-0.5, 0.5, 3) * (rng.random(3) < 0.8)).tolist()
+    right = (math.pi / 2 * rng.integers(-1, 3, 3)).tolist()
+    roll, pitch, yaw = right if rng.random() < 0.5 else rng.uniform(-3, 3, 3).tolist()
+    return Pose(xyz=(x, y, z), rpy=(roll, pitch, yaw))
+
+
+def _random_tools(rng: np.random.Generator, robot: Robot) -> tuple[Tool, ...]:
+    """One to three, at tips as often as anywhere else; two may be on one link."""
+    tools = []
+    for number in range(int(rng.integers(1, MOST_TOOLS + 1))):
+        tip = bool(rng.random() < 0.5)
+        link = int(rng.choice(robot.tips)) if tip else int(rng.integers(len(robot.joints)))
+        pose = random_pose(rng)
+        joint = robot.joints[link].name
+        tools.append(Tool(name=f"tool_{number}", joint=joint, xyz=pose.xyz, rpy=pose.rpy))
+    return tuple(tools)
+
+
+def _random_drive(rng: np.random.Generator, joint: Joint) -> Joint:
+    """The joint with any kind of actuator that fits it; some with friction and dampers between the links."""
+    kind = rng.choice(["pair", "law", "rigid", "elastic", "serial", "losses"])
+    if kind == "losses":
+        like = _LOSSY[rng.integers(len(_LOSSY))]
+        drive = {"actuator": like.actuator, "friction": like.friction, "damper": like.damper}
+    else:
+        drive = {"actuator": _random_actuator(rng, str(kind))}
+    if drive["actuator"].unfit_for(joint.type):
+        return joint
+    return replace(joint, **drive)
+
+
+def _random_actuator(rng: np.random.Generator, kind: str) -> Actuator:
+    """An actuator that needs no file of its own."""
+    if kind == "pair":
+        return random_actuator(rng)
+    if kind == "serial":
+        devices = [device.actuator for device in DEVICES.values() if not any(tables(device.mechanism))]
+        return devices[rng.integers(len(devices))]
+    if kind == "law":
+        pairs = [(one, two) for (one, _), (two, _) in SPRINGS.values() if not any(tables(one))]
+        motor = Motor(inertia=0.1, damping=0.02)
+        return Antagonistic(motor=(motor, motor), spring=pairs[rng.integers(len(pairs))])
+    return random_drive(kind, rng)
+
+
+def random_wrenches(robot: Robot, samples: int, seed: int) -> Wrench:
+    """Unrelated random components on each tool, in either frame; on some nothing, but never on all."""
+    rng = np.random.default_rng(seed)
+    frames = [rng.choice(["end_effector", "base"]) for _ in robot.end_effectors]
+    idle = rng.random(len(frames)) < 0.25
+    idle[rng.integers(len(frames))] = False
+    components = 6 * len(frames)
+    acting = np.repeat(~idle, 6)
+    arrays = (acting * rng.uniform(-scale, scale, (samples, components)) for scale in SCALES)
+    by_tool = tuple(None if rests else str(frame) for frame, rests in zip(frames, idle, strict=True))
+    frame: WrenchFrame = by_tool if len(by_tool) > 1 else str(by_tool[0])
+    return Wrench(*arrays, frame=frame)
+
+
+def hand(fingers: int, joints: int, *, palm: bool = True) -> Robot:
+    """Equal fingers with a tool each, on seats of a palm that turns, or of the base."""
+    rng = np.random.default_rng(1)
+    members = [random_joint(rng, "palm", "R")] if palm else []
+    phalanges = [random_joint(rng, f"joint_{number}", "R") for number in range(joints)]
+    tools = []
     for number in range(fingers):
-        place = f"[0.02, {-0.04 if number == 0 else 0.06 - 0.025 * number:.3f}, 0]"
-        place = place if number == 0 else place.replace("0.02", "0.09", 1)
-        mount = f"{{xyz: {place}, rpy: [0, 0, {-60 if number == 0 else 8 * (2.5 - number):g} deg]}}"
-        text += joint_text(
-            f"f{number}_1", "{a: 0.01, alpha: 90 deg}", f"parent: wrist, mount: {mount}, ", 0.05
+        x, y, z, roll, pitch, yaw = rng.uniform(-0.5, 0.5, 6).tolist()
+        seat = {"parent": "palm" if palm else FRAME_0, "mount": Pose(xyz=(x, y, z), rpy=(roll, pitch, yaw))}
+        for place, joint in enumerate(phalanges):
+            name = f"finger_{number}_{joint.name}"
+            members.append(replace(joint, name=name, **({} if place else seat)))
+        tools.append(Tool(name=f"tip_{number}", joint=members[-1].name, xyz=(0.0, 0.1, 0.2)))
+    name = f"hand-{fingers}x{joints}"
+    return Robot(name=name, gravity=ODD_GRAVITY, joints=tuple(members), tools=tuple(tools))
+
+
+def reordered(robot: Robot, seed: int) -> Robot:
+    """The same tree with its branches in another order, each joint after the one that carries it.
+
+    There is no other order of a chain.
+    """
+    rng, joints, parents = np.random.default_rng(seed), robot.joints, robot.parents
+    order = list(range(len(joints)))
+    while order == sorted(order) and len(robot.tips) > 1:
+        order = _random_order(rng, parents)
+    names = {-1: FRAME_0, **dict(enumerate(robot.joint_names))}
+    members = (replace(joints[index], parent=names[parents[index]]) for index in order)
+    return replace(robot, joints=tuple(members))
+
+
+def _random_order(rng: np.random.Generator, parents: Sequence[int]) -> list[int]:
+    order = list[int]()
+    ready = [joint for joint, parent in enumerate(parents) if parent < 0]
+    while ready:
+        order.append(ready.pop(rng.integers(len(ready))))
+        ready += [joint for joint, parent in enumerate(parents) if parent == order[-1]]
+    return order
+
+
+def finger(robot: Robot, root: int) -> Robot:
+    """The part of a robot that joint `root`, on the base, moves: a robot of its own."""
+    moved = [index for index, path in enumerate(robot.paths) if path[0] == root]
+    parents = [robot.parents[index] for index in moved]
+    joints = [
+        replace(robot.joints[index], parent=robot.joints[parent].name if parent >= 0 else FRAME_0)
+        for index, parent in zip(moved, parents, strict=True)
+    ]
+    names = [joint.name for joint in joints]
+    tools = tuple(tool for tool in robot.tools if tool.joint in names)
+    return replace(robot, joints=tuple(joints), tools=tools)
+
+
+def tree_text(robot: Robot, convention: str = "standard") -> str:
+    """The robot file of these numbers, whose rows and link frames are meant in a convention."""
+    content: dict[str, Any] = {"format": file_formats.ROBOT, "convention": convention, **fields(robot)}
+    joints = content.pop("joints")
+    head = [f"{key}: {json.dumps(value)}" for key, value in content.items()]
+    return "\n".join([*head, "joints:", *(f"  - {json.dumps(joint)}" for joint in joints)]) + "\n"
+
+
+class TreeMotion(NamedTuple):
+    """First and last position and stiffness by joint, and wrench by tool, of a tree or more.
+
+    Between them everything moves along polynomials, for a second.
+    """
+
+    q: dict[str, FloatArray]
+    stiffness: dict[str, FloatArray]
+    wrenches: dict[str, FloatArray]
+    frames: dict[str, str | None]
+
+    def trajectory(self, robot: Robot) -> Trajectory:
+        """The trajectory of a robot with some of these joints and tools, in its order."""
+        position = _polynomial(POSITION, 9, [self.q[name] for name in robot.joint_names])
+        stiffness = _polynomial(STIFFNESS, 5, [self.stiffness[name] for name in robot.joint_names])
+        frames, wrench = tuple(self.frames.get(name) for name in robot.tool_names), None
+        if any(frames):
+            course = _polynomial(
+                WRENCH, 5, [each for name in robot.tool_names for each in self.wrenches[name]]
+            )
+            wrench = WrenchProfile(course, frames if len(frames) > 1 else str(frames[0]))
+        return Trajectory(
+            UniformTimes(1, 40), position, {"stiffness": stiffness}, wrench=wrench, name="polynomials"
         )
-        for joint in range(2, joints + 1):
-            text += joint_text(f"f{number}_{joint}", f"{{a: {0.06 - 0.01 * joint:g}, alpha: 0}}", mass=0.03)
-        tools += f"  tip_{number}: {{joint: f{number}_{joints}}}\n"
-    return text + tools
 
 
-def written(folder: Path, text: str) -> Path:
-    """The file of a robot."""
-    path = folder / "tree.yaml"
-    path.write_text(text)
-    return path
+def _polynomial(signal: Signal, degree: int, ends: Sequence[FloatArray]) -> RestToRest:
+    start, end = (tuple(each) for each in np.array(ends).T.tolist())
+    return RestToRest(signal=signal, span=(0, 1), degree=degree, start=start, end=end)
 
 
-def push(components: Sequence[float]) -> WrenchProfile:
-    """Constant wrenches on the tools of the torso."""
-    signal = WRENCH._replace(components=len(components))
-    value = tuple(map(float, components))
-    return WrenchProfile(ConstantProfile(signal=signal, span=(0.0, 1.0), value=value), FRAMES)
+def read_tree(robot: Robot, folder: Path, convention: str = "standard") -> Robot:
+    """The robot as the file `tree_text` is read."""
+    path = folder / f"{robot.name}_{convention}.yaml"
+    path.write_text(tree_text(robot, convention))
+    return load_robot(path)
 
 
-def torso(folder: Path) -> tuple[Robot, Trajectory]:
-    """The torso with a swing, pushed at two of its tools."""
-    robot = load_robot(written(folder, torso_text()))
-    path = folder / "swing.yaml"
-    path.write_text(SWING)
-    components = np.arange(1.0, 19.0)
-    components[6:12] = 0
-    swing = load_trajectory(path, robot)
-    swing.wrench = push(components)
-    return robot, swing
+def tree_run(seed: int, joints: int | None = None) -> tuple[Robot, TreeMotion]:
+    """A tree of light links, and a motion under small wrenches, too soft for some of its joints."""
+    robot = random_tree(seed, joints)
+    light = [replace(joint, link=replace(joint.link, mass=0.05 * joint.link.mass)) for joint in robot.joints]
+    robot = replace(robot, joints=tuple(light))
+    trial = _motion(robot, np.full(len(light), 1e9), seed).trajectory(robot)
+    least = np.fmax.reduce(inverse_dynamics(robot, trial).stiffness_min, axis=0)
+    factor = np.random.default_rng(seed).uniform(0.7, 3, len(least))
+    return robot, _motion(robot, np.where(least > 0, least, 300) * factor, seed)
 
 
-def torso_result(folder: Path) -> Result:
-    """The result of a run of the torso."""
-    return inverse_dynamics(*torso(folder))
+def _motion(robot: Robot, stiffness: FloatArray, seed: int) -> TreeMotion:
+    rng, joints = np.random.default_rng(seed), robot.joint_names
+    commanded = ["stiffness" in joint.commanded for joint in robot.joints]
+    levels = np.where(commanded, stiffness, math.nan)
+    wrench = random_wrenches(robot, 2, seed)
+    by_tool = np.split(0.02 * wrench.wrench.T, len(robot.tool_names))
+    return TreeMotion(
+        dict(zip(joints, rng.uniform(-0.3, 0.3, (len(joints), 2)), strict=True)),
+        dict(zip(joints, levels[:, None] * rng.uniform(1, 1.1, (len(joints), 2)), strict=True)),
+        dict(zip(robot.tool_names, by_tool, strict=True)),
+        dict(zip(robot.tool_names, frames_by_tool(wrench.frame), strict=True)),
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -55,19 +56,24 @@ def serial(letters: str, rpys: list[str] | None = None, xyz: str = "0.3 0 0.1") 
 
 def random_serial(letters: str, seed: int) -> str:
     """A chain of random geometry, axes and inertias; among its placements, right angles and none at all."""
+    return random_tree(letters, range(len(letters)), seed)
+
+
+def random_tree(letters: str, parents: Sequence[int], seed: int) -> str:
+    """Joints j1, j2, ... like those of `random_serial`, each between the link of its parent and its own."""
     rng = np.random.default_rng(seed)
     links = [link(f"l{number}", _random_inertial(rng)) for number in range(len(letters) + 1)]
     joints = [
         joint(
             f"j{number}",
-            f"l{number - 1}",
+            f"l{parent}",
             f"l{number}",
             letter,
             xyz=_words(rng.uniform(-0.5, 0.5, 3) * rng.integers(0, 2, 3)),
             rpy=_words(_random_angles(rng)),
             rest=f'<axis xyz="{_words(_random_axis(rng))}"/>',
         )
-        for number, letter in enumerate(letters, start=1)
+        for number, (letter, parent) in enumerate(zip(letters, parents, strict=True), start=1)
     ]
     return robot(*links, *joints)
 

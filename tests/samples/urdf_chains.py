@@ -83,6 +83,21 @@ REFUSED = (
 )
 """Files of which chains are refused, and part of the message."""
 
+WHOLE_REFUSED = (
+    ("baxter.urdf", "so it has no drive of its own"),  # a finger of each gripper
+    ("panda.urdf", "so it has no drive of its own"),  # right finger
+    ("panda_collision.urdf", "so it has no drive of its own"),  # right finger
+    ("pr2.urdf", "so it has no drive of its own"),  # fingers of both grippers
+    ("romeo_laas_small.urdf", "the tensor has the negative eigenvalue"),  # legs
+    ("talos_full_v2.urdf", "so it has no drive of its own"),  # fingers of both grippers
+    ("talos_full_v2_box.urdf", "so it has no drive of its own"),  # fingers of both grippers
+    ("tiago_pro.urdf", "so it has no drive of its own"),  # fingers of both grippers
+    ("ur3.urdf", "the file describes no links"),
+    ("iris_simple.urdf", "no joint moves below"),
+    ("quadrotor_base.urdf", "no joint moves below"),
+)
+"""Files that are refused as a whole, and part of the message; without a drive, fingers can be held."""
+
 WITHOUT_ARMS = (
     "a1.urdf",
     "alexander_v1.lowerBodyOnly.urdf",

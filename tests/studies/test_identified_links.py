@@ -25,6 +25,7 @@ from vsacli import (
 )
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
+from vsacli.robot.joint import Tool
 from vsacli.studies.identification import fitted_text
 from vsacli.studies.identification.conditioning import Signals, conditioned
 from vsacli.studies.identification.consistent_links import doubts_of, found_links
@@ -195,6 +196,12 @@ def test_links_are_left_out_with_a_reason(tmp_path: Path) -> None:
     assert pushed.notes == (f"{file}: {sentence}",)
     with pytest.raises(InputError, match=sentence):
         identify(robot, file, ["links"])
+    handed = dataclasses.replace(
+        robot, tools=(Tool(name="hand", joint="slide"), Tool(name="grip", joint="arm"))
+    )
+    file = written(robot, run, robot.joint_names, tmp_path, **{"hand.fx": 0 * run.time})
+    (note,) = identify(handed, file).notes
+    assert note == f"{file}: links are not identified, since a wrench acts on hand"
 
 
 def test_forces_that_no_body_exerts_are_told(tmp_path: Path) -> None:

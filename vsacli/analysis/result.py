@@ -58,7 +58,7 @@ class Result(Shown, Block):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, base to tip."""
+        """Names of the joints, in the order of the robot file."""
         return self.robot.joint_names
 
     def save(
@@ -143,7 +143,7 @@ class ResultFile(Shown, StoredResult):
 
     Attributes:
         report: Verdict and findings.
-        joint_names: Names of the joints, base to tip.
+        joint_names: Names of the joints, in the order of the robot file.
         variables: Names of the variables in the file.
     """
 

@@ -149,7 +149,7 @@ def finding_lines(reports: Sequence[JointReport | ToolReport], samples: int) -> 
     """Yield the problems of a run, the most critical first.
 
     Args:
-        reports: reports of the joints, base to tip, and of the tools.
+        reports: reports of the joints, in the order of the robot file, and of the tools.
         samples: number of samples of the run.
     """
     worst_findings = [
@@ -177,7 +177,7 @@ def group_findings(
 
     Args:
         findings: findings of all joints, each with the index of its joint, in any order.
-        names: names of the joints, base to tip.
+        names: names of the joints, in the order of the robot file.
         words: words for each of them; of equally bad ones, the finding at more samples comes first.
     """
     kinds: dict[str, list[tuple[int, Finding]]] = {}

@@ -29,6 +29,8 @@ class Signal(NamedTuple):
         components: number of components of a value; None: one a joint.
         device: key in the robot file of the joint's device that follows the signal, if that is not the
             actuator; a device without a command stays where it is.
+        tool: name of the tool on which a wrench acts, if it is given by tool.
+        first: index of the first component in `variables`, which hold the wrenches on all tools.
     """
 
     key: str
@@ -41,6 +43,23 @@ class Signal(NamedTuple):
     optional: bool = False
     components: int | None = None
     device: str | None = None
+    tool: str = ""
+    first: int = 0
+
+    @property
+    def is_wrench(self) -> bool:
+        """Whether it is a wrench, with its components instead of one value a joint."""
+        return self.components is not None
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of the result variables that hold value and derivatives."""
+        return WRENCH_NAMES if self.tool else self.names
+
+    @property
+    def columns(self) -> slice:
+        """Components that are its own in `variables`."""
+        return slice(self.first, self.first + len(WRENCH_AXES) if self.tool else None)
 
     @property
     def orders(self) -> int:
@@ -112,6 +131,20 @@ WRENCH = Signal(
     spline_degree=5,
     components=len(WRENCH_AXES),
 )
+
+WRENCHES = "wrenches"
+"""Key of the wrenches by tool in trajectory files."""
+
+
+def wrench_on(tool: str, index: int) -> Signal:
+    """Return the wrench on one of several tools, given by its name and its index among the robot's tools."""
+    return WRENCH._replace(
+        key=f"{WRENCHES}.{tool}",
+        names=tuple(f"{tool}.{name}" for name in WRENCH.names),
+        tool=tool,
+        first=len(WRENCH_AXES) * index,
+    )
+
 
 COMMANDED: dict[str, Signal] = {signal.key: signal for signal in (STIFFNESS, DAMPING)}
 """Signals other than the position that joints can be commanded by, by key."""

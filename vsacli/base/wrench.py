@@ -117,5 +117,8 @@ def check_wrench_frame(frame: WrenchFrame, tools: Sequence[str]) -> None:
 
 
 def wrench_columns(name: str) -> list[str]:
-    """Return the CSV headers of the wrench or of a derivative of it, e.g. `dfx` for `dwrench`."""
+    """Return the CSV headers of a wrench or of a derivative of it.
+
+    They are e.g. `dfx` for `dwrench`, and `hand.dfx` for `hand.dwrench`, that of one of several tools.
+    """
     return [name.removesuffix("wrench") + axis for axis in WRENCH_AXES]

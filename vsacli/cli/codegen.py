@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
 import click
 
 from vsacli.base.outputs import Outputs
@@ -10,6 +13,36 @@ from vsacli.cli.console import Exit, Talk, talk_options
 from vsacli.cli.file_names import FOLDER
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import Words
+
+if TYPE_CHECKING:
+    from vsacli.base.wrench import WrenchFrame
+    from vsacli.robot.model import Robot
+
+FRAMES = ("end_effector", "base")
+"""Frames of a wrench."""
+
+
+class _ToolFrame(Words):
+    """A frame, which the name of a tool may precede."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """See `click.Choice.convert`."""
+        tool, colon, frame = value.rpartition(":")
+        return f"{tool}{colon}{super().convert(frame, param, ctx)}"
+
+
+def _wrench_frame(robot: Robot, wrenches: Sequence[str]) -> WrenchFrame | None:
+    """Return the frame of the wrench on each tool from the option; None if nothing acts.
+
+    Raises:
+        InputError: there is no such tool, or which one is not said.
+    """
+    frames: list[str | None] = [None] * len(robot.tool_names)
+    for tool, _, frame in (each.rpartition(":") for each in wrenches):
+        frames[robot.end_effector(tool or None)] = frame
+    if not wrenches:
+        return None
+    return tuple(frames) if len(frames) > 1 else frames[0]
 
 
 @click.command(
@@ -27,9 +60,12 @@ from vsacli.cli.option_types import Words
 )
 @click.option(
     "--wrench",
-    metavar="FRAME",
-    type=Words(["end_effector", "base"]),
-    help="Add a wrench at the end effector as an input, in the axes of this frame.",
+    "wrenches",
+    metavar="[TOOL:]FRAME",
+    type=_ToolFrame(FRAMES),
+    multiple=True,
+    help="Add a wrench at the end effector as an input, in the axes of this frame; for a robot with several "
+    "tools with the name of one, e.g. left_hand:base, and may be repeated.",
 )
 @click.option(
     "--parameters",
@@ -46,7 +82,7 @@ def codegen(
     robot: str,
     output: str,
     precision: str,
-    wrench: str | None,
+    wrenches: tuple[str, ...],
     patterns: tuple[str, ...],
     no_loops: bool,
     overwrite: bool,
@@ -64,7 +100,9 @@ def codegen(
     arm = read_robot(robot)
     with naming_option("--parameters"):
         parameters(arm, patterns)
-    project = generate(arm, precision, wrench, patterns, loops=not no_loops)
+    with naming_option("--wrench"):
+        frame = _wrench_frame(arm, wrenches)
+    project = generate(arm, precision, frame, patterns, loops=not no_loops)
     with Outputs(overwrite=overwrite, inputs=[source.path for source in arm.sources]) as outputs:
         write(project, output, outputs)
     talk.wrote(outputs)

@@ -1,4 +1,4 @@
-"""`vsacli import-urdf`: a robot file from a serial chain of a URDF."""
+"""`vsacli import-urdf`: a robot file from a URDF, all of it or the part before chosen tips."""
 
 from __future__ import annotations
 
@@ -50,9 +50,13 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     "--base", metavar="LINK", help="Link that is fixed to the ground.", show_default="the root link"
 )
 @click.option(
-    "--tip", metavar="LINK", help="Link of the end effector; required if the URDF has several candidates."
+    "--tip",
+    metavar="LINK",
+    multiple=True,
+    help="Link of an end effector: only joints between the base and it move; may be repeated.",
+    show_default="the end of each branch, so that all joints move",
 )
-@click.option("--srdf", type=FILE, help="SRDF file with a group that names base and tip.")
+@click.option("--srdf", type=FILE, help="SRDF file with a group that names base and tips.")
 @click.option(
     "--group", metavar="NAME", help="Name of the group in the SRDF file.", show_default="the only group"
 )
@@ -97,9 +101,9 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     metavar="JOINT=VALUE",
     multiple=True,
     callback=_hold,
-    help="Position of a joint outside the chain, in rad or m, or with a unit as in elbow='30 deg'; "
-    "may be repeated.",
-    show_default="0",
+    help="Position of a joint that is held, in rad or m, or with a unit as in elbow='30 deg'; may be "
+    "repeated.",
+    show_default="0 for joints outside the path to a --tip",
 )
 @click.option(
     "--snap",
@@ -115,7 +119,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 def import_urdf(
     urdf: str,
     base: str | None,
-    tip: str | None,
+    tip: tuple[str, ...],
     srdf: str | None,
     group: str | None,
     output: str | None,
@@ -128,19 +132,20 @@ def import_urdf(
     overwrite: bool,
     talk: Talk,
 ) -> None:
-    """Convert a serial chain of a URDF to a robot file with standard Denavit-Hartenberg rows.
+    """Convert a URDF to a robot file with standard Denavit-Hartenberg rows.
 
-    Links behind fixed joints, and side branches, whose joints are held, are merged with their parent links.
-    The command prints the rows, the elements that were ignored or changed, and the largest deviation from the
-    kinematics of the URDF. A URDF does not describe motors and springs: the robot file has placeholders,
-    marked as such, which are sized to the load of each joint.
+    All joints below the base move, or those between it and each --tip. Links behind fixed joints, and joints
+    that are held, are merged with their parent links. The command prints the rows, the elements that were
+    ignored or changed, and the largest deviation from the kinematics of the URDF. A URDF does not describe
+    motors and springs: the robot file has placeholders, marked as such, which are sized to the load of each
+    joint.
     """
     from vsacli.robot import urdf as conversions
 
     if srdf is None and group is not None:
         raise click.UsageError("--group needs --srdf FILE")
     if srdf is not None and (base or tip):
-        raise click.UsageError("--srdf names base and tip; leave out --base and --tip")
+        raise click.UsageError("--srdf names base and tips; leave out --base and --tip")
     _check_placeholders(actuator, stiffness, spring)
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
     placeholders = conversions.Placeholders(actuator, motor_inertia, stiffness, spring)

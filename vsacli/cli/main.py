@@ -52,7 +52,7 @@ _SECTIONS = {
     "Files": {
         "new": "Create a commented robot or trajectory file.",
         "examples": "List the bundled robots and trajectories, or copy them.",
-        "import-urdf": "Convert a serial chain of a URDF to a robot file.",
+        "import-urdf": "Convert a URDF to a robot file.",
         "validate": "Report every problem of files of any kind.",
         "info": "Describe a robot, trajectory, recording or result.",
         "schema": "Print the JSON Schema of a YAML format, for editors.",

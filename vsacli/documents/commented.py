@@ -119,7 +119,7 @@ class _Commented:
         self, field: Field, name: str, default: Any, comment: str, variant: str
     ) -> Iterator[_YamlLine]:
         """Yield a field without a value, inactive; of a record its example."""
-        if isinstance(field.kind, ItemsByName):
+        if isinstance(field.kind, ItemsByName) and "" in field.kind.records:
             entry = dict(field.kind.records[""].example(variant))  # type: ignore[attr-defined]
             by_name = {entry.pop(field.kind.unique): entry}
             yield _YamlLine(f"{name}: {on_one_line(by_name)}", comment, active=False)

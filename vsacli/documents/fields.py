@@ -7,8 +7,8 @@ numbers in `record_values`.
 A record class is a frozen dataclass that derives from `record_checks.DeclaredRecord` and whose attributes are
 made by the functions at the end. It may have these class attributes: `not_yet` names keys of the format that
 this version does not support; `unit_variant` names the choice that determines the units in the record and in
-nested records; `keyed_by` names the field that is the record's key in `ItemsByName`; `unit_variants` maps its
-words to unit variants, and words without one keep that of the enclosing record (without the mapping, the
+nested records; `keyed_by` names the field that is the record's key, see `ItemsByName`; `unit_variants` maps
+its words to unit variants, and words without one keep that of the enclosing record (without the mapping, the
 words are the variants); `required_unless` maps a key to another one and a number: the first is required with
 the second unless that has this number.
 """
@@ -182,10 +182,10 @@ class Items(ValueKind):
 
 
 class ItemsByName(Items):
-    """A mapping from names to records, read as a tuple of records whose field `keyed_by` is the name."""
+    """A mapping from names to records, read as a tuple of records whose field `name` is the key of each."""
 
     def __init__(self, item: ValueKind) -> None:
-        super().__init__(item, unique=next(iter(item.records.values())).keyed_by)  # type: ignore[attr-defined]
+        super().__init__(item, unique="name")
 
 
 class OneOrMore(Items):

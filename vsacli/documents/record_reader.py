@@ -293,10 +293,13 @@ def _read_items_by_name(kind: ItemsByName, node: Node, label: str, scope: Scope)
     assert kind.unique is not None, "see ItemsByName"
     records = []
     for name, entry in node.entries.items():
-        named, line = entry, node.key_lines[name]
-        if isinstance(entry, tree.MapNode) and kind.unique not in entry.entries:
-            entries = {kind.unique: TextNode(line, name, plain=False), **entry.entries}
-            named = entry._replace(entries=entries, key_lines={kind.unique: line, **entry.key_lines})
+        line, named = node.key_lines[name], entry
+        if isinstance(entry, tree.MapNode):
+            if kind.unique in entry.entries:
+                message = f"{label}.{name}: leave out {kind.unique!r}; the key {name!r} is the {kind.unique}"
+                scope.problems.add(entry.key_lines[kind.unique], message)
+            entries = {**entry.entries, kind.unique: TextNode(line, name, plain=False)}
+            named = entry._replace(entries=entries, key_lines={**entry.key_lines, kind.unique: line})
         records.append(read_value(kind.item, named, f"{label}.{name}", scope))
     return all_valid(records)
 
@@ -400,7 +403,8 @@ def _check_names(node: tree.MapNode, label: str, scope: Scope, exempt: Mapping[s
 def _read_mapping(kind: RecordOf, node: Node, label: str, scope: Scope) -> Any:
     if isinstance(node, tree.MapNode):
         return read_record(kind.cls, node, label, scope)
-    keys = [name for name, (_, default) in declared_fields(kind.cls).items() if default is REQUIRED]
+    required = (name for name, (_, default) in declared_fields(kind.cls).items() if default is REQUIRED)
+    keys = [name for name in required if name != getattr(kind.cls, "keyed_by", None)]
     needed = f" with the {'key' if len(keys) == 1 else 'keys'} {', '.join(keys)}" if keys else ""
     return scope.unexpected(node, f"a mapping{needed}", label)
 

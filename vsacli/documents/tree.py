@@ -81,7 +81,7 @@ class MapNode(NamedTuple):
     key_lines: Mapping[str, int]
 
     def __str__(self) -> str:
-        return "a mapping"
+        return "a mapping" if self.entries else "an empty mapping"
 
 
 Node: TypeAlias = TextNode | ListNode | MapNode

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -30,6 +31,7 @@ from vsacli.compute.engine import KEPT_PROGRAMS, NUMBERS, Engine, engine_of_call
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import (
     ZERO,
+    Matrix,
     Scalar,
     SymmetricTensor,
     Vector,
@@ -78,15 +80,29 @@ def link_constants(joint: Joint) -> LinkConstants:
 
 
 def carriers(robot: Robot) -> list[Carrier]:
-    """Return what carries each joint of a robot."""
-    return [
-        Carrier(parent, None if joint.mount is None else _seat(joint.mount))
-        for parent, joint in zip(robot.parents, robot.joints, strict=True)
-    ]
+    """Return what carries each joint of a robot.
+
+    Exact zeros and ones of a seat are those of all seats on the same link, so that equal fingers at different
+    mounts share their compiled code.
+    """
+    numbers = {
+        index: [*chain.from_iterable(rotation_matrix(joint.mount)), *_exact_position(joint.mount)]
+        for index, joint in enumerate(robot.joints)
+        if joint.mount is not None
+    }
+    seats = dict[int, Seat]()
+    for index, own in numbers.items():
+        beside = [others for at, others in numbers.items() if robot.parents[at] == robot.parents[index]]
+        common = list(map(_common_exact, own, zip(*beside, strict=True)))
+        *axes, lever = (Vector(*common[start : start + 3]) for start in range(0, len(common), 3))
+        seats[index] = Seat(Matrix(*axes), lever)
+    return [Carrier(parent, seats.get(index)) for index, parent in enumerate(robot.parents)]
 
 
-def _seat(mount: Pose) -> Seat:
-    return Seat(rotation_matrix(mount), _exact_position(mount))
+def _common_exact(number: Scalar, beside: Sequence[Scalar]) -> Scalar:
+    """Return a number that is exact, a Python integer, only if it is the same in all places beside it."""
+    equal = all(type(other) is int and other == number for other in beside)
+    return float(number) if type(number) is int and not equal else number
 
 
 def tool_loads(robot: Robot, frame: WrenchFrame, wrench: Sequence[Sequence[Scalar]]) -> list[ToolLoad]:

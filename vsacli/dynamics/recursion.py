@@ -144,12 +144,12 @@ def backward(inputs: RecursionInputs, bodies: Sequence[MovingBody]) -> list[Torq
     """Run (52)-(60) from the tips to the base; result as for `recursion`."""
     links, states, carriers, _, loads = inputs
     beyond: list[list[_Reaction]] = [[] for _ in links]
-    for load in loads:
-        beyond[load.joint].append(_tool_reaction(load, carriers, bodies))
     torques: list[TorqueDerivatives] = []
     for index in reversed(range(len(links))):
         (parent, seat), row = carriers[index], states[index].rates[0]
-        on_link = _total_reaction(row, beyond[index])
+        # Reactions of tools are computed next to their link, so that equal fingers share this code as well.
+        of_tools = [_tool_reaction(load, carriers, bodies) for load in loads if load.joint == index]
+        on_link = _total_reaction(row, [*of_tools, *beyond[index]])
         torque, reaction = call(
             row, _backward, links[index], states[index], bodies[index], on_link, parent < 0
         )

@@ -16,7 +16,7 @@ import numpy as np
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli.base.errors import InputError, Problem
 from vsacli.base.wrench import WRENCH_NAMES, Wrench, WrenchFrame, wrench_components
 from vsacli.compute.tracing import Symbol, Tape, TracedArray
 from vsacli.compute.tracing.python_functions import StateFunction
@@ -98,41 +98,73 @@ class LinkDynamics:
             torque: ([samples,] joints).
 
         Raises:
-            InputError: The matrix is not positive definite; names the first joint whose leading minor fails.
-                A traced program gives NaN instead.
+            InputError: The matrix is not positive definite; names the first joint of each subtree on the base
+                whose pivot fails. A traced program gives NaN instead.
         """
         if isinstance(matrix, TracedArray):
-            return self._solve_traced(matrix, torque)
+            return _solve_positive_definite(
+                matrix,
+                torque,
+                SMALLEST_PIVOT,
+                self._elimination,
+                lambda row, column: row in self._coupled[column],
+            )
         self._check_positive_definite(matrix)
         return np.asarray(np.linalg.solve(matrix, torque[..., None])[..., 0], dtype=np.float64)
 
-    def _solve_traced(self, matrix: Any, torque: Any) -> Any:
-        """Return matrix^-1 torque: a chain from the base; a tree from the tips, so that nothing fills in."""
-        paths = self._robot.paths
-        joints = range(len(paths))
-        if len(self._robot.tips) == 1:
-            return _solve_positive_definite(matrix, torque, SMALLEST_PIVOT, joints, lambda *_: True)
-        return _solve_positive_definite(
-            matrix, torque, SMALLEST_PIVOT, joints[::-1], lambda row, column: row in paths[column]
+    @cached_property
+    def _elimination(self) -> tuple[int, ...]:
+        """Order in which M is factored: chains on the base from it, branched subtrees from their tips.
+
+        Then nothing fills in, and the pivot of a joint depends only on the joints that it carries.
+        """
+        return tuple(
+            joint
+            for subtree in self._robot.subtrees
+            for joint in (subtree if self._is_chain(subtree) else subtree[::-1])
         )
 
+    def _is_chain(self, subtree: Sequence[int]) -> bool:
+        return len(set(subtree) & set(self._robot.tips)) == 1
+
+    @cached_property
+    def _coupled(self) -> list[set[int]]:
+        """Joints with which M couples each joint: those that carry it, itself, and those it carries."""
+        paths = self._robot.paths
+        return [
+            {*paths[joint], *(far for far, path in enumerate(paths) if joint in path)}
+            for joint in range(len(paths))
+        ]
+
     def _check_positive_definite(self, matrices: FloatArray) -> None:
+        order = list(self._elimination)
+        ordered = matrices if len(self._robot.tips) == 1 else matrices[..., order, :][..., order]
         try:
-            pivots = np.diagonal(np.linalg.cholesky(matrices), axis1=-2, axis2=-1) ** 2
+            pivots = np.diagonal(np.linalg.cholesky(ordered), axis1=-2, axis2=-1) ** 2
         except np.linalg.LinAlgError:
             raise self._indefinite(matrices) from None
-        if (pivots <= SMALLEST_PIVOT * np.diagonal(matrices, axis1=-2, axis2=-1)).any():
+        if (pivots <= SMALLEST_PIVOT * np.diagonal(ordered, axis1=-2, axis2=-1)).any():
             raise self._indefinite(matrices)
 
     def _indefinite(self, matrices: FloatArray) -> InputError:
-        joint = next(
-            index
-            for index in range(len(self._names))
-            if not _last_pivot(matrices[..., : index + 1, : index + 1]) > SMALLEST_PIVOT
-        )
-        return InputError.one(
-            f"joint {self._names[joint]}: the inertia it moves is not positive (leading minor {joint + 1} of "
-            "the mass matrix), so a torque gives no acceleration; give this link, or one beyond it, mass"
+        """Return the error with the first joint of each subtree, or branch of one, whose pivot fails."""
+        failed: dict[int, str] = {}
+        for place, joint in enumerate(self._elimination):
+            before = [earlier for earlier in self._elimination[:place] if earlier in self._coupled[joint]]
+            here = [*before, joint]
+            if failed.keys().isdisjoint(before) and not (
+                _last_pivot(matrices[..., here, :][..., here]) > SMALLEST_PIVOT
+            ):
+                minor = f" (leading minor {len(here)} of the mass matrix)"
+                failed[joint] = minor if len(self._robot.tips) == 1 else ""
+        return InputError(
+            Problem(
+                "",
+                0,
+                f"joint {self._names[joint]}: the inertia it moves is not positive{minor}, so a torque "
+                "gives no acceleration; give this link, or one beyond it, mass",
+            )
+            for joint, minor in failed.items()
         )
 
 

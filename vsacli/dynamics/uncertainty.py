@@ -16,9 +16,9 @@ import numpy as np
 
 from vsacli.actuators.reach import margin
 from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, of_joint
-from vsacli.base.signals import COMMANDED, WRENCH, Signal, orders_of_derivation
+from vsacli.base.signals import COMMANDED, Signal, orders_of_derivation
 from vsacli.base.variables import UNCERTAIN
-from vsacli.base.wrench import WRENCH_NAMES, Wrench
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.drive import drive
@@ -209,7 +209,7 @@ def deviations_of_joint(
         for signal, covariance in covariances.items()
     }
     computed = _propagate(variables, motion, estimates, covariances, components)
-    of_joints = {signal: each for signal, each in covariances.items() if signal is not WRENCH}
+    of_joints = {signal: each for signal, each in covariances.items() if not signal.is_wrench}
     of_signals = _signal_deviations(robot, estimates, of_joints)
     return Deviations(
         {**of_joint(computed.deviations, 0), **of_joint(of_signals.deviations, index)},
@@ -236,10 +236,10 @@ def _propagate(
     covariances = {signal: covariances[signal][list(several)] for signal, several in components.items()}
     spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
     shifts = [
-        _Shift(name, component, bool(estimates[signal].stated[component]), row)
+        _Shift(name, signal.first + component, bool(estimates[signal].stated[component]), row)
         for signal, spread in spreads.items()
         for component, rows in zip(components[signal], spread, strict=True)
-        for name, row in zip(signal.names, rows, strict=True)
+        for name, row in zip(signal.variables, rows, strict=True)
     ]
     values, gradients = _values_and_gradients(variables, motion, shifts)
     spreads_by_name, unstated = {}, {}
@@ -261,13 +261,21 @@ def _propagate(
 def _signal_deviations(
     robot: Robot, estimates: Mapping[Signal, SampledProfile], covariances: Mapping[Signal, FloatArray]
 ) -> Deviations:
-    """Return the deviations of the recorded signals themselves, and of their derivatives."""
-    spreads_by_name, unstated = {}, {}
+    """Return the deviations of the recorded signals themselves, and of their derivatives.
+
+    They are NaN for wrenches on tools that were not recorded.
+    """
+    spreads_by_name: dict[str, FloatArray] = {}
+    unstated: dict[str, BoolArray] = {}
     for signal, covariance in covariances.items():
-        for name, rows in zip(signal.names, np.moveaxis(_spreads(covariance), 1, 0), strict=True):
+        for name, rows in zip(signal.variables, np.moveaxis(_spreads(covariance), 1, 0), strict=True):
             if name in estimates[signal].estimated:
                 rows[_joints_without_signal(robot, signal)] = np.nan
-                spreads_by_name[name], unstated[name] = rows.T, ~estimates[signal].stated
+                components = len(WRENCH_AXES) * len(robot.tool_names) if signal.tool else len(rows)
+                spread = spreads_by_name.setdefault(name, np.full((rows.shape[1], components), np.nan))
+                spread[:, signal.columns] = rows.T
+                hidden = unstated.setdefault(name, np.zeros(components, dtype=bool))
+                hidden[signal.columns] = ~estimates[signal].stated
     return Deviations(spreads_by_name, unstated)
 
 

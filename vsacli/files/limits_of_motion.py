@@ -12,6 +12,7 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import together
 from vsacli.base.units import time_text
 from vsacli.robot.model import Robot
+from vsacli.robot.plausibility.checked_robot import UnloadedStiffnessRange
 from vsacli.trajectory.trajectory import Trajectory
 
 BLOCK_SAMPLES = 8192
@@ -33,13 +34,18 @@ def unattainable(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
         fault = f"is {value:.4g} {unit} at t = {time_text(time)}, outside {ends}; {ADVICE}"
         groups.setdefault(f"position of {{}} {fault}", []).append(index)
     if not any(warning.message.startswith(STIFFNESS.key) for warning in trajectory.located_warnings):
-        for index, (joint, found) in enumerate(zip(robot.joints, robot.checked.unloaded_ranges, strict=True)):
+        for index, found in sorted(_unloaded_ranges(robot)):
             if found is not None and low[index] < found.lower:
-                unit = units.STIFFNESS.unit(joint.type)
+                unit = units.STIFFNESS.unit(robot.joint_types[index])
                 minimum = f"below the minimum of {found.lower:.4g} {unit} without load"
                 fault = f"is {low[index]:.4g} {unit} at its lowest, {minimum}; {ADVICE}"
                 groups.setdefault(f"stiffness of {{}} {fault}", []).append(index)
     yield from (fault.format(together(joints, robot.joint_names)) for fault, joints in groups.items())
+
+
+def _unloaded_ranges(robot: Robot) -> Iterator[tuple[int, UnloadedStiffnessRange | None]]:
+    for subtree in robot.checked_subtrees:
+        yield from zip(subtree.numbers_in_robot, subtree.unloaded_ranges, strict=True)
 
 
 def _extremes(robot: Robot, trajectory: Trajectory) -> tuple[list[tuple[int, float, float]], FloatArray]:

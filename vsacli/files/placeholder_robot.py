@@ -16,13 +16,13 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
-from vsacli.base.signals import COMMANDED
+from vsacli.base.signals import COMMANDED, WRENCHES
 from vsacli.documents import tree
 from vsacli.documents.csv_file import read_header
 from vsacli.documents.fields import IDENTIFIER, LARGEST
 from vsacli.documents.reading import survey_document
 from vsacli.documents.source import is_table
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
+from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link, Tool
 from vsacli.robot.model import Robot
 from vsacli.trajectory.file import OF_ANY_ROBOT
 
@@ -50,7 +50,7 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
 
     Names and number of joints are taken from the file; one joint if it has no information. Joints without
     stiffness are elastic, or rigid if the file has neither stiffness nor damping. Joints with a damping have
-    a damper.
+    a damper. Tools are those that `wrenches` names.
 
     Raises:
         InputError: the file, or a CSV file that it names, cannot be read.
@@ -81,7 +81,9 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
         )
     )
     ordered = bool(columns or _keys(positions)) or not _keys([*stiffnesses, *dampings])
-    return PlaceholderRobot(_robot(names, stiffened, damped), ordered)
+    wrenches = root.entries.get(WRENCHES)
+    tools = _names(wrenches.entries) if isinstance(wrenches, tree.MapNode) else ()
+    return PlaceholderRobot(_robot(names, stiffened, damped, tools), ordered)
 
 
 def _tables(root: tree.MapNode) -> dict[str, list[str]]:
@@ -158,10 +160,13 @@ def _taking(
     return tuple(names)
 
 
-def _robot(names: Sequence[str], stiffened: Sequence[str], damped: Sequence[str]) -> Robot:
+def _robot(
+    names: Sequence[str], stiffened: Sequence[str], damped: Sequence[str], tools: Sequence[str] = ()
+) -> Robot:
     return Robot(
         name="stand-in",
         placeholder=True,
+        tools=tuple(Tool(name=tool, joint=names[-1]) for tool in tools),
         joints=tuple(_joint(name, _actuator(name, stiffened, damped), damped) for name in names),
     )
 

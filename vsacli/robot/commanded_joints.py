@@ -7,23 +7,25 @@ from dataclasses import dataclass
 from typing import Self
 
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.base.signals import COMMANDED, Signal
+from vsacli.base.signals import COMMANDED, Signal, wrench_on
 from vsacli.robot.model import Robot
 
 
 @dataclass(frozen=True)
 class CommandedJoints:
-    """The joints that a trajectory commands.
+    """The joints that a trajectory commands, and the tools on which it may let wrenches act.
 
     Attributes:
         types: joint types by joint name, from the base to the tip.
         exempt: joints that a signal does not command, by signal key; each name with the reason, a clause.
         rigid: whether all joints are rigid, so that torques do not depend on jerk and snap.
+        tools: names of the tools on which wrenches may act.
     """
 
     types: Mapping[str, str]
     exempt: Mapping[str, Mapping[str, str]]
     rigid: bool = False
+    tools: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, robot: Robot) -> Self:
@@ -35,12 +37,19 @@ class CommandedJoints:
             for key, signal in COMMANDED.items()
         }
         rigid = not any(joint.actuator.sprung for joint in robot.joints)
-        return cls(dict(zip(robot.joint_names, robot.joint_types, strict=True)), exempt, rigid)
+        return cls(
+            dict(zip(robot.joint_names, robot.joint_types, strict=True)), exempt, rigid, robot.tool_names
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the joints."""
         return tuple(self.types)
+
+    @property
+    def wrenches(self) -> dict[str, Signal]:
+        """The wrench on each tool, by the name of the tool."""
+        return {tool: wrench_on(tool, index) for index, tool in enumerate(self.tools)}
 
     @property
     def commanding_signals(self) -> frozenset[str]:

@@ -99,9 +99,8 @@ class Robot(DeclaredRecord):
                     "(a cycle has no such order)"
                 )
             else:
-                earlier = names[:number]
-                hint = did_you_mean(str(joint.parent), earlier) if earlier else ""
-                reason = f"no earlier joint is called {joint.parent!r}{hint or '; null is the base'}"
+                hint = did_you_mean(str(joint.parent), names[:number]) if number else ""
+                reason = f"no earlier joint is called {joint.parent!r} (null stands for the base){hint}"
             yield FieldProblem(("joints", number, "parent"), reason)
 
     def _tool_problems(self) -> Iterator[FieldProblem]:
@@ -158,7 +157,7 @@ class Robot(DeclaredRecord):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, base to tip."""
+        """Names of the joints, in the order of the file: each after the one that carries it."""
         return tuple(joint.name for joint in self.joints)
 
     @property
@@ -187,6 +186,16 @@ class Robot(DeclaredRecord):
         for number, parent in enumerate(self.parents):
             paths.append((*(paths[parent] if parent >= 0 else ()), number))
         return tuple(paths)
+
+    @cached_property
+    def subtrees(self) -> tuple[tuple[int, ...], ...]:
+        """Joints that stand on the base together, because one on the base carries the others."""
+        numbers = range(len(self.joints))
+        return tuple(
+            tuple(number for number in numbers if self.paths[number][0] == first)
+            for first in numbers
+            if self.parents[first] < 0
+        )
 
     @property
     def is_plain_chain(self) -> bool:
@@ -262,19 +271,11 @@ class Robot(DeclaredRecord):
         return tuple(dict.fromkeys(sources))
 
     @cached_property
-    def checked(self) -> CheckedRobot:
-        """The robot's data that plausibility rules need."""
-        from vsacli.documents.record_values import numbers_in_record
-        from vsacli.robot.plausibility.checked_robot import CheckedRobot
+    def checked_subtrees(self) -> tuple[CheckedRobot, ...]:
+        """The data that plausibility rules need, of each of `subtrees`."""
+        from vsacli.robot.plausibility.checked_robot import checked_subtrees
 
-        return CheckedRobot(
-            self.joints,
-            self.parents,
-            self.base,
-            self.gravity,
-            tuple(numbers_in_record(self)),
-            self.placeholder,
-        )
+        return checked_subtrees(self)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -290,7 +291,7 @@ class Robot(DeclaredRecord):
         of_robot = {OF_PLACEHOLDERS: self.placeholder, WITHOUT_MASSES: massless}
         of_joints = (warning for joint in self.joints for warning in joint.warnings())
         whole = (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
-        return (*(Problem("", 0, warning) for warning in whole), *robot_findings(self.checked, self.sources))
+        return (*(Problem("", 0, warning) for warning in whole), *robot_findings(self))
 
 
 def check_robot(value: object) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, make_dataclass
 from functools import cache
@@ -13,10 +13,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from vsacli.base import file_formats, units
+from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError, Problem, check_path
 from vsacli.base.progress import Progress, unseen
-from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
-from vsacli.documents.fields import POSITIVE, REQUIRED, Name, number, value
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, WRENCHES, Signal, wrench_on
+from vsacli.documents.fields import POSITIVE, REQUIRED, ItemsByName, Name, number, value
 from vsacli.documents.reading import ChangeError, Changes, apply_changes, format_changes, read_document
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_values import numbers_in_record
@@ -25,7 +26,7 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.curves.types import Declaration, Formula, Recorded, Use, declared_as
 from vsacli.trajectory.devices import set_uncommanded_dampers
-from vsacli.trajectory.plausibility import CheckedTrajectory, trajectory_findings
+from vsacli.trajectory.plausibility import trajectory_findings
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -70,14 +71,22 @@ class TrajectoryFile(DeclaredRecord):
     untaken: ClassVar[tuple[Signal, ...]] = ()
     """Signals of devices that are on no joint of the robot."""
 
+    tools: ClassVar[tuple[str, ...] | None] = None
+    """Names of the robot's tools; None if the robot is unknown."""
+
     def _problems(self) -> Iterator[FieldProblem]:
-        yield from (*self._time_problems(), *self._device_problems())
+        yield from (*self._time_problems(), *self._device_problems(), *self._wrench_problems())
 
     @property
     def declared(self) -> dict[Signal, Declaration]:
         """Declarations of the signals that have one."""
         signals = (POSITION, *COMMANDED.values(), WRENCH)
         declarations = {signal: getattr(self, signal.key) for signal in signals}
+        by_tool: tuple[Declaration, ...] = getattr(self, WRENCHES) or ()
+        tools = self.tools or tuple(each.name for each in by_tool)
+        declarations |= {
+            wrench_on(each.name, tools.index(each.name)): each for each in by_tool if each.name in tools
+        }
         return {
             signal: declaration for signal, declaration in declarations.items() if declaration is not None
         }
@@ -101,7 +110,25 @@ class TrajectoryFile(DeclaredRecord):
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
         """Yield the problems of formulas that cannot last this long, in s."""
         for signal, formula in self.formulas.items():
-            yield from (problem.inside(signal.key) for problem in formula.problems_over(duration))
+            place = signal.key.split(".")
+            yield from (problem.inside(*place) for problem in formula.problems_over(duration))
+
+    def _wrench_problems(self) -> Iterator[FieldProblem]:
+        """Yield the problems of wrenches on tools that the robot does not have, or that are not named."""
+        declared: tuple[Declaration, ...] = getattr(self, WRENCHES) or ()
+        key = WRENCH.key if getattr(self, WRENCH.key) else WRENCHES
+        if declared and key == WRENCH.key:
+            yield FieldProblem((key,), f"give `{key}` or `{WRENCHES}`, not both")
+        elif self.tools == () and (declared or key == WRENCH.key):
+            yield FieldProblem((key,), "the robot has no tools; name them by `tools` in its file")
+        elif self.tools is not None and len(self.tools) > 1 and key == WRENCH.key:
+            example = f"{WRENCHES}: {{{self.tools[0]}: {{type: ..., frame: ..., ...}}}}"
+            yield FieldProblem((key,), f"the robot has the tools {', '.join(self.tools)}; give `{example}`")
+        elif self.tools is not None:
+            for each in declared:
+                if each.name not in self.tools:
+                    hint = did_you_mean(each.name, self.tools)
+                    yield FieldProblem((key, each.name), f"the robot has no tool {each.name!r}{hint}")
 
     def _device_problems(self) -> Iterator[FieldProblem]:
         for signal in self.declared:
@@ -134,7 +161,11 @@ class TrajectoryFile(DeclaredRecord):
 
 @cache
 def trajectory_file_class(
-    taken: frozenset[str], *, rigid: bool, untaken: tuple[Signal, ...] = ()
+    taken: frozenset[str],
+    *,
+    rigid: bool,
+    untaken: tuple[Signal, ...] = (),
+    tools: tuple[str, ...] | None = None,
 ) -> type[TrajectoryFile]:
     """Return the class of trajectory files for joints that need these signals.
 
@@ -142,6 +173,7 @@ def trajectory_file_class(
         taken: keys of the signals that command some joint. They are required, except those of devices.
         rigid: whether all joints are rigid.
         untaken: signals of devices that are on no joint. They must be absent.
+        tools: names of the robot's tools; None for an unknown robot, which has those of the file.
     """
     fields = {POSITION.key: value(declared_as(Use(POSITION, rigid)), POSITION.meaning)}
     for key, signal in COMMANDED.items():
@@ -149,8 +181,11 @@ def trajectory_file_class(
         meaning = signal.meaning + ("; may be absent if there are none" if needed else "")
         fields[key] = value(declared_as(Use(signal)), meaning, default=REQUIRED if needed else None)
     fields[WRENCH.key] = value(declared_as(Use(WRENCH)), WRENCH.meaning, default=None)
+    by_tool = ItemsByName(declared_as(Use(WRENCH, by_tool=True)))
+    meaning = "wrenches by tool, for a robot with several: each as `wrench`, with its own frame"
+    fields[WRENCHES] = value(by_tool, meaning, default=None)
     signals = [(name, Any, field) for name, field in fields.items()]
-    further = {"__doc__": TrajectoryFile.__doc__, "untaken": untaken}
+    further = {"__doc__": TrajectoryFile.__doc__, "untaken": untaken, "tools": tools}
     return make_dataclass("TrajectoryFile", signals, bases=(TrajectoryFile,), namespace=further, frozen=True)
 
 
@@ -191,7 +226,10 @@ def read_trajectory(path: str | os.PathLike[str], joints: CommandedJoints) -> tu
         InputError: the file has problems; lists each with its line.
     """
     cls = trajectory_file_class(
-        joints.commanding_signals, rigid=joints.rigid, untaken=joints.absent_device_signals
+        joints.commanding_signals,
+        rigid=joints.rigid,
+        untaken=joints.absent_device_signals,
+        tools=joints.tools,
     )
     return read_document(path, cls, file_formats.TRAJECTORY, joints.types, joints.exempt)
 
@@ -229,19 +267,18 @@ def declared_trajectory(
     times, profiles = _stretch_profiles(
         document.slow_down, declared, _declared_profiles(document, declared, recordings)
     )
-    wrench = document.declared.get(WRENCH)
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
-    checked = CheckedTrajectory(robot, tuple(numbers_in_record(document, joints.types)), times, motion)
+    numbers = tuple(numbers_in_record(document, joints.types))
     return Trajectory(
         times,
         profiles[POSITION.key],
         profiles,
-        wrench=None if wrench is None else WrenchProfile(profiles[WRENCH.key], wrench.frame),
+        wrench=_declared_wrench(document, profiles, joints),
         name=document.name,
         warnings=[
             *(warning for recording in recordings for warning in recording.warnings),
             *_formula_warnings(document, declared, joints),
-            *trajectory_findings(checked, source),
+            *trajectory_findings(robot, numbers, times, motion, source),
         ],
         notes=[
             *(note for recording in recordings for note in recording.notes),
@@ -333,6 +370,20 @@ def _declared_profiles(
         signal.key: each.profile_over((0.0, last - first)) for signal, each in document.formulas.items()
     }
     return {**formulas, **{each.signal.key: each for one in recordings for each in one.profiles}}
+
+
+def _declared_wrench(
+    document: TrajectoryFile, profiles: Mapping[str, Profile], joints: CommandedJoints
+) -> WrenchProfile | None:
+    """Return the wrenches on the tools; None without any."""
+    declared = {signal: each for signal, each in document.declared.items() if signal.components}
+    if not declared:
+        return None
+    frames = dict.fromkeys(joints.wrenches.values()) | {
+        signal: each.frame for signal, each in declared.items()
+    }
+    frame = next(iter(declared.values())).frame if len(joints.tools) == 1 else tuple(frames.values())
+    return WrenchProfile({signal: profiles[signal.key] for signal in declared}, frame)
 
 
 def _stretch_profiles(

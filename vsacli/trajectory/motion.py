@@ -19,7 +19,7 @@ class Motion:
         q, dq, ddq, d3q, d4q: position and its four derivatives, (samples, joints), rad (m) per s^k.
         commanded: signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`, (samples, joints);
             NaN for a joint without this command.
-        wrench: wrench of the environment on the end effector; None without one.
+        wrench: wrench of the environment on the tools; None without one.
     """
 
     time: FloatArray

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -28,7 +27,12 @@ from vsacli.robot.plausibility.bodies import (
     SIZES,
     turns,
 )
-from vsacli.robot.plausibility.checked_robot import BodySizes, UnloadedStiffnessRange, ratio_or_nan
+from vsacli.robot.plausibility.checked_robot import (
+    BodySizes,
+    CheckedRobot,
+    UnloadedStiffnessRange,
+    ratio_or_nan,
+)
 from vsacli.robot.plausibility.springs import NEWTON_MILLIMETERS, TOO_SOFT
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import Times
@@ -62,52 +66,70 @@ RANGES = ("ranges of revolute joints", "ranges of prismatic joints")
 POSITIONS = ("positions of revolute joints", "positions of prismatic joints", *RANGES)
 
 
-def trajectory_findings(checked: CheckedTrajectory, source: Source) -> tuple[Problem, ...]:
-    """Return the findings of the rules, each with its line of the trajectory file."""
-    robot_rules = robot_rules_with_findings(checked.robot.checked, checked.robot.sources)
-    return implausible_values(TRAJECTORY_RULES, checked, ValuesInFile(source), robot_rules)
+def trajectory_findings(
+    robot: Robot, numbers: Sequence[NumberAtPath], times: Times, motion: Profile | None, source: Source
+) -> tuple[Problem, ...]:
+    """Return the findings of the rules, each with its line of the trajectory file.
+
+    Args:
+        robot: robot that executes the trajectory; each of its subtrees is judged by itself.
+        numbers: all numbers of the file.
+        times: sample times.
+        motion: profile of the position if a formula gives it; None if recorded, which is checked elsewhere.
+        source: the file.
+    """
+    with np.errstate(all="ignore"):  # extreme values may be infinite in between
+        sampled = None if motion is None else motion.at(np.linspace(*times.span, INSTANTS))
+    file_lines, findings = ValuesInFile(source), list[Problem]()
+    for subtree in robot.checked_subtrees:
+        checked = CheckedTrajectory(robot, subtree, numbers, times, sampled)
+        robot_rules = robot_rules_with_findings(robot, subtree)
+        findings += implausible_values(TRAJECTORY_RULES, checked, file_lines, robot_rules)
+    return tuple(dict.fromkeys(findings))
 
 
 @dataclass(frozen=True)
 class CheckedTrajectory:
-    """A trajectory file with the data that plausibility rules need.
+    """A trajectory file with the data that plausibility rules need, for a subtree of the robot.
 
     Attributes:
         robot: robot that executes the trajectory.
+        subtree: joints that are judged.
         numbers: all numbers of the file.
         times: sample times.
-        motion: profile of the position if a formula gives it; None if recorded, which is checked elsewhere.
+        motion_of_robot: position and its derivatives, (orders, joints of the robot, instants); None if they
+            are recorded.
     """
 
     robot: Robot
+    subtree: CheckedRobot
     numbers: Sequence[NumberAtPath]
     times: Times
-    motion: Profile | None
+    motion_of_robot: FloatArray | None
 
     @property
     def sizes(self) -> BodySizes:
         """Body sizes of the robot."""
-        return self.robot.checked.sizes
-
-    @cached_property
-    def sampled_motion(self) -> FloatArray | None:
-        """Position and its derivatives, (orders, joints, instants); None if they are recorded."""
-        return None if self.motion is None else self.motion.at(np.linspace(*self.times.span, INSTANTS))
+        return self.subtree.sizes
 
     @property
-    def unloaded_ranges(self) -> tuple[UnloadedStiffnessRange | None, ...]:
-        """Attainable stiffness of each joint at rest; None if it has no commanded stiffness."""
-        return self.robot.checked.unloaded_ranges
+    def sampled_motion(self) -> FloatArray | None:
+        """Position and its derivatives, (orders, joints, instants); None if they are recorded."""
+        motion = self.motion_of_robot
+        return None if motion is None else motion[:, list(self.subtree.numbers_in_robot)]
 
     @property
     def revolute(self) -> BoolArray:
         """Mask of the revolute joints, (joints,)."""
-        return np.array([joint.is_revolute for joint in self.robot.joints])
+        return np.array([joint.is_revolute for joint in self.subtree.joints])
 
-    @property
-    def travels(self) -> FloatArray:
-        """Usual travel of each joint, (joints,): 1 rad, or the reach of the robot, m."""
-        return np.where(self.revolute, 1.0, self.sizes.extent or math.nan)
+    def mean_velocities(self, subtree: CheckedRobot) -> FloatArray:
+        """Return the mean velocity of each joint of a subtree, (joints,), in rad (reaches) a second."""
+        assert self.motion_of_robot is not None, "of motions by a formula"
+        position = self.motion_of_robot[0, list(subtree.numbers_in_robot)]
+        usual = [1.0 if joint.is_revolute else subtree.sizes.extent or math.nan for joint in subtree.joints]
+        velocities: FloatArray = np.abs(np.diff(position)).sum(axis=1) / usual / self.duration
+        return velocities
 
     @property
     def duration(self) -> float:
@@ -117,10 +139,11 @@ class CheckedTrajectory:
 
     def of_joints(self, quantity: Quantity) -> Iterator[tuple[Measured, int]]:
         """Yield the numbers with this quantity, with magnitude as size, and the index of the joint."""
+        place = {number: joint for joint, number in enumerate(self.subtree.numbers_in_robot)}
         for path, measured, value, _ in self.numbers:
-            if measured == quantity and isinstance(path[-1], PathIndex):
-                joint = path[-1].number
-                unit = quantity.unit(self.robot.joints[joint].type)
+            if measured == quantity and isinstance(path[-1], PathIndex) and path[-1].number in place:
+                joint = place[path[-1].number]
+                unit = quantity.unit(self.subtree.joints[joint].type)
                 yield Measured(path, value, unit, abs(value)), joint
 
     def measure_timing(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
@@ -131,7 +154,7 @@ class CheckedTrajectory:
         longest = max(timings, key=lambda each: each.value, default=None)
         if longest is not None and longest.quantity == quantity:
             joint = int(np.argmax(sizes))
-            names = {"joint": self.robot.joint_names[joint], **beside}
+            names = {"joint": self.subtree.joints[joint].name, **beside}
             unit = "s" if quantity == units.TIME else PER_SECOND
             yield Measured(longest.path, longest.value, unit, float(sizes[joint]), names)
 
@@ -139,18 +162,22 @@ class CheckedTrajectory:
 def _measure_joint_positions(checked: CheckedTrajectory, unit: str) -> Iterator[Measured]:
     """Yield positions in a unit, in turns or reaches of the robot, except those within joint limits."""
     for measured, joint in checked.of_joints(units.POSITION):
-        low, high = checked.robot.joints[joint].limits.position
+        low, high = checked.subtree.joints[joint].limits.position
         if measured.unit == unit and not -math.inf < low <= measured.value <= high < math.inf:
             in_reaches = ratio_or_nan(measured.size, checked.sizes.extent)
             yield measured._replace(size=turns(measured.value) if unit == "rad" else in_reaches)
 
 
 def _measure_slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
-    """Yield the mean velocity of the joint that moves most, of prismatic ones in reaches of the robot."""
+    """Yield the mean velocity of the joint that moves most, of prismatic ones in reaches of the robot.
+
+    A subtree may move slowly while another one does not.
+    """
     if checked.sampled_motion is not None and checked.duration > LONG:
-        travel = np.abs(np.diff(checked.sampled_motion[0])).sum(axis=1) / checked.travels
-        if travel.any():
-            yield from checked.measure_timing(units.TIME, travel / checked.duration)
+        velocities = checked.mean_velocities(checked.subtree)
+        of_robot = [np.max(checked.mean_velocities(subtree)) for subtree in checked.robot.checked_subtrees]
+        if velocities.any() and not np.max(velocities) < np.max(of_robot):
+            yield from checked.measure_timing(units.TIME, velocities)
 
 
 def _measure_accelerations(checked: CheckedTrajectory, quantity: Quantity) -> Iterator[Measured]:
@@ -170,9 +197,12 @@ def _measure_rate(checked: CheckedTrajectory) -> Iterator[Measured]:
 def _measure_wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[Measured]:
     """Yield force components relative to the robot's weight, or moments relative to weight times reach."""
     scale = checked.sizes.weight * (1.0 if forces else checked.sizes.extent)
+    tools = {checked.robot.tool_names[tool] for tool in checked.subtree.tools}
     common, unit = (COMMON_FORCE, "N") if forces else (COMMON_MOMENT, "N m")
     for path, quantity, value, _ in checked.numbers if not checked.robot.placeholder else ():
-        if quantity == units.WRENCH and isinstance(path[-1], PathIndex) and (path[-1].number < 3) == forces:
+        of_kind = isinstance(path[-1], PathIndex) and (path[-1].number < 3) == forces
+        tool = str(path[1]) if path[0] == "wrenches" else checked.robot.tool_names[0]
+        if quantity == units.WRENCH and of_kind and tool in tools:
             size = ratio_or_nan(abs(value), scale) if value else math.nan
             yield Measured(path, value, unit, min(size, 1.0) if abs(value) < common else size)
 
@@ -182,14 +212,14 @@ def _commanded_stiffness(
 ) -> Iterator[tuple[Measured, Joint, UnloadedStiffnessRange]]:
     """Yield every stiffness except amplitudes, with its joint and the attainable range at rest."""
     for measured, number in checked.of_joints(units.STIFFNESS) if not checked.robot.placeholder else ():
-        attainable = checked.unloaded_ranges[number]
+        attainable = checked.subtree.unloaded_ranges[number]
         if attainable is not None and AMPLITUDES.isdisjoint(measured.path):
             ends = {
                 "lower": f"{attainable.lower:.4g}",
                 "upper": f"{attainable.upper:.4g}",
                 "unit": measured.unit,
             }
-            yield measured._replace(beside=ends), checked.robot.joints[number], attainable
+            yield measured._replace(beside=ends), checked.subtree.joints[number], attainable
 
 
 def _stiffness_over_minimum(checked: CheckedTrajectory, *, linear: bool) -> Iterator[Measured]:

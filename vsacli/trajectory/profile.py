@@ -1,12 +1,16 @@
-"""Signals over time: the interface of profiles, and the profile of a wrench with its frame."""
+"""Signals over time: the interface of profiles, and the profile of the wrenches with their frames."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.signals import WRENCH, Signal
 from vsacli.base.wrench import WRENCH_AXES, WrenchFrame, check_frame, frames_by_tool, wrench_components
 
 if TYPE_CHECKING:
@@ -105,19 +109,52 @@ class WrenchProfile:
 
     Attributes:
         profile: force and moment about the origin of the tool frame, `WRENCH_AXES`, N and N m; of several
-            tools the six components of each in turn.
+            tools the six components of each in turn. Or the profile for each tool on which a wrench acts, by
+            `wrench_on`.
         frame: frame along whose axes the components are, "end_effector" or "base"; for several tools that of
             each, None for a tool on which nothing acts.
     """
 
-    profile: Profile
+    profile: Profile | Mapping[Signal, Profile]
     frame: WrenchFrame = "end_effector"
 
     def __post_init__(self) -> None:
         for frame in frames_by_tool(self.frame):
             if frame is not None:
                 check_frame(frame)
-        if self.profile.components != wrench_components(self.frame):
-            of_tool = f"({', '.join(WRENCH_AXES)}{'' if isinstance(self.frame, str) else ', of each tool'})"
-            expected = f"{wrench_components(self.frame)} {of_tool}"
-            raise InputError.one(f"the wrench has {self.profile.components} components, not {expected}")
+        by_tool = isinstance(self.profile, Mapping)
+        expected = len(WRENCH_AXES) if by_tool else wrench_components(self.frame)
+        for profile in self.profiles.values():
+            if profile.components != expected:
+                each = "" if by_tool or isinstance(self.frame, str) else ", of each tool"
+                of_tool = f"{expected} ({', '.join(WRENCH_AXES)}{each})"
+                raise InputError.one(f"the wrench has {profile.components} components, not {of_tool}")
+
+    @property
+    def profiles(self) -> Mapping[Signal, Profile]:
+        """Profile by signal: of each tool on which a wrench acts, or of all tools if not given by tool."""
+        return self.profile if isinstance(self.profile, Mapping) else {WRENCH: self.profile}
+
+    def frame_of(self, signal: Signal) -> str:
+        """Return the frame of one of `profiles`."""
+        return frames_by_tool(self.frame)[signal.first // len(WRENCH_AXES)] or ""
+
+    def rows(self, rows: Callable[[Profile], FloatArray]) -> FloatArray:
+        """Return value and derivatives, (orders, components, samples), from those of each profile.
+
+        They are zero on tools on which nothing acts.
+        """
+        parts = {signal: rows(profile) for signal, profile in self.profiles.items()}
+        if WRENCH in parts:
+            return parts[WRENCH]
+        orders, _, samples = next(iter(parts.values())).shape
+        joined = np.zeros((orders, wrench_components(self.frame), samples))
+        for signal, part in parts.items():
+            joined[:, signal.columns] = part
+        return joined
+
+    def changed(self, change: Callable[[Signal, Profile], Profile]) -> WrenchProfile:
+        """Return the wrenches with `change` applied to each of `profiles`."""
+        if not isinstance(self.profile, Mapping):
+            return replace(self, profile=change(WRENCH, self.profile))
+        return replace(self, profile={each: change(each, profile) for each, profile in self.profile.items()})

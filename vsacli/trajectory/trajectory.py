@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, over_time
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal, commanded_names
+from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal, commanded_names, wrench_on
 from vsacli.base.variables import UNCERTAIN
-from vsacli.base.wrench import Wrench
+from vsacli.base.wrench import WRENCH_AXES, Wrench, WrenchFrame
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.motion import Motion
@@ -31,14 +30,14 @@ NARROWEST_PIECE = 1e-9
 
 
 class Trajectory:
-    """Motion and commanded signals of all joints, and the wrench at the end effector, over the same times.
+    """Motion and commanded signals of all joints, and the wrenches on the tools, over the same times.
 
     Attributes:
         times: sample times.
         position: profile of the motion. All profiles count time from the first sample: stamps since 1970 are
             rounded to 2.4e-7 s, too coarse for knots, integrators and finite differences.
         commanded: profiles of signals by their keys in `COMMANDED`, e.g. `stiffness`; NaN if not commanded.
-        wrench: profile of the wrench of the environment; None without one.
+        wrench: profile of the wrenches of the environment; None without one.
         name: name for reports and for the result file.
         sources: files that the trajectory was read from.
     """
@@ -106,7 +105,7 @@ class Trajectory:
         yield POSITION, self.position
         yield from ((COMMANDED[key], profile) for key, profile in self.commanded.items())
         if self.wrench is not None:
-            yield WRENCH, self.wrench.profile
+            yield from self.wrench.profiles.items()
 
     def _check(self) -> None:
         for key, profile in self.commanded.items():
@@ -138,7 +137,7 @@ class Trajectory:
         wrench: ArrayLike | None = None,
         dwrench: ArrayLike | None = None,
         ddwrench: ArrayLike | None = None,
-        wrench_frame: str = "end_effector",
+        wrench_frame: WrenchFrame = "end_effector",
         fit: str | None = None,
         name: str = "samples",
         **commanded: ArrayLike | None,
@@ -159,10 +158,12 @@ class Trajectory:
             d3q: third derivative of q.
             d4q: fourth derivative of q.
             wrench: wrench of the environment on the end effector, (samples, 6): force and moment about the
-                origin of the tool frame, N and N m, as are its derivatives per s^k; None without one.
+                origin of the tool frame, N and N m, as are its derivatives per s^k; None without one. Of a
+                robot with several tools (samples, tools, 6), or (samples, 6 tools).
             dwrench: first derivative of its components.
             ddwrench: second derivative of its components.
-            wrench_frame: frame along whose axes the components are, "end_effector" or "base".
+            wrench_frame: frame along whose axes the components are, "end_effector" or "base"; for several
+                tools a tuple with the frame of each, None for a tool on which nothing acts.
             fit: kind of spline: "interpolate" goes through the samples; "lsq" fits noisy samples by least
                 squares, with knots by generalized cross-validation; "smooth" is a smoothing spline for noise
                 of any color. With the last two the values at samples are also those of the spline. By default
@@ -180,10 +181,15 @@ class Trajectory:
         arrays_by_signal = {
             POSITION: (q, dq, ddq, d3q, d4q),
             **_arrays_by_signal({"stiffness": stiffness, **commanded}),
-            WRENCH: (wrench, dwrench, ddwrench),
+            **_wrenches_by_tool(wrench_frame, np.size(time), (wrench, dwrench, ddwrench)),
         }
         times, profiles, warnings = profiles_of_arrays(time, arrays_by_signal, fit)
-        exerted = WrenchProfile(profiles[WRENCH.key], wrench_frame) if WRENCH.key in profiles else None
+        wrenches = {
+            signal: profiles[signal.key]
+            for signal in arrays_by_signal
+            if signal.is_wrench and signal.key in profiles
+        }
+        exerted = WrenchProfile(wrenches, wrench_frame) if wrenches else None
         return cls(times, profiles[POSITION.key], profiles, wrench=exerted, name=name, warnings=warnings)
 
     @property
@@ -246,7 +252,7 @@ class Trajectory:
         }
         wrench = None
         if self.wrench is not None:
-            wrench = Wrench(*map(over_time, rows(self.wrench.profile)), frame=self.wrench.frame)
+            wrench = Wrench(*map(over_time, self.wrench.rows(rows)), frame=self.wrench.frame)
         return Motion.of(time, arrays, wrench)
 
     @property
@@ -304,7 +310,7 @@ class Trajectory:
         derived, wrench = copy(self), self.wrench
         derived.times, derived.position = times, change(POSITION, self.position)
         derived.commanded = {key: change(COMMANDED[key], each) for key, each in self.commanded.items()}
-        derived.wrench = wrench and replace(wrench, profile=change(WRENCH, wrench.profile))
+        derived.wrench = wrench and wrench.changed(change)
         return derived
 
     @property
@@ -337,6 +343,36 @@ class Trajectory:
         left, right = starts[piece][which], stops[piece][which]
         time = left + (right - left) * (rank + 0.5) / hits[which]
         return time, np.minimum(time - left, right - time)
+
+
+def _wrenches_by_tool(
+    frame: WrenchFrame, samples: int, arrays: Sequence[ArrayLike | None]
+) -> dict[Signal, tuple[ArrayLike | None, ...]]:
+    """Return the arrays of the wrench on each tool that has a frame, from those of all tools.
+
+    Raises:
+        InputError: an array has a wrong shape, or a wrench acts on a tool without a frame.
+    """
+    if isinstance(frame, str):
+        return {WRENCH: tuple(arrays)}
+    shape = (samples, len(frame), len(WRENCH_AXES))
+    by_tool: dict[str, FloatArray | None] = dict.fromkeys(WRENCH.names)
+    for name, array in zip(WRENCH.names, arrays, strict=True):
+        if array is not None:
+            numbers = np.asarray(array, dtype=np.float64)
+            if numbers.shape not in (shape, (samples, shape[1] * shape[2])):
+                raise InputError.one(f"{name} has the shape {numbers.shape}, expected {shape}")
+            by_tool[name] = numbers = numbers.reshape(shape)
+            for tool, of_tool in enumerate(frame):
+                if of_tool is None and numbers[:, tool].any():
+                    raise InputError.one(f"a {name} is given for tool {tool}, which has no frame")
+    return {
+        wrench_on(f"tool_{tool}", tool): tuple(
+            None if rows is None else rows[:, tool] for rows in by_tool.values()
+        )
+        for tool, of_tool in enumerate(frame)
+        if of_tool is not None
+    }
 
 
 def _arrays_by_signal(

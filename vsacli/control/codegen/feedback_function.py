@@ -9,10 +9,15 @@ import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.flags import Flag, finite, marked, not_finite_flags
-from vsacli.base.wrench import Wrench
+from vsacli.base.wrench import Wrench, WrenchFrame
 from vsacli.compute.rows import RowLayout
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
-from vsacli.control.codegen.robot_functions import command_structure, variable_array, wrench_argument
+from vsacli.control.codegen.robot_functions import (
+    command_structure,
+    variable_array,
+    wrench_argument,
+    wrench_by_tool,
+)
 from vsacli.control.gains import STIFFNESS_ORDER, Gains, Integral
 from vsacli.control.linearization import control_law, position_order
 from vsacli.dynamics.forward import Plant
@@ -33,12 +38,12 @@ class _GainInputs(NamedTuple):
     stiffness_integral: Any
 
 
-def feedback_linearization_function(robot: Robot, frame: str | None = None) -> Function:
+def feedback_linearization_function(robot: Robot, frame: WrenchFrame | None = None) -> Function:
     """Return the function of feedback linearization, (32)-(35), (60), (69)-(74).
 
     Args:
         robot: robot.
-        frame: frame of `WRENCH_FRAMES` along whose axes a wrench is given; None without a wrench.
+        frame: frame along whose axes a wrench is given, see `WrenchFrame`; None without a wrench.
 
     Raises:
         InputError: the robot mixes rigid joints with others, or has a damped transmission; no law exists.
@@ -67,7 +72,7 @@ class _Law:
         arguments: arguments of the generated function.
     """
 
-    def __init__(self, robot: Robot, frame: str | None) -> None:
+    def __init__(self, robot: Robot, frame: WrenchFrame | None) -> None:
         self._robot = robot
         self._frame = frame
         self._plant = Plant(robot, frame)
@@ -98,7 +103,7 @@ class _Law:
                     (Array("q", joints, "of the position"), Array("stiffness", joints, "of the stiffness")),
                 ),
             ),
-            *wrench_argument(frame),
+            *wrench_argument(robot, frame),
         )
 
     def __call__(self, rows: Rows) -> list[Any]:
@@ -109,7 +114,10 @@ class _Law:
         theta, dtheta = (
             drivetrain.of_motors(state[name])[..., drivetrain.sprung] for name in ("theta", "dtheta")
         )
-        acting = Wrench(**wrench[0], frame=self._frame) if self._frame else None
+        acting = None
+        if self._frame is not None:
+            by_tool = wrench_by_tool(self._robot, wrench[0])
+            acting = Wrench(*map(np.concatenate, by_tool.values()), frame=self._frame)
         command = Motion.of(np.zeros(1), reference, acting)
         torque = law.torque(state["q"], state["dq"], theta, dtheta, command, Integral(**integral))
         tau_motor = self._of_joints(torque)

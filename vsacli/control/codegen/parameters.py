@@ -6,13 +6,14 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.tracing import Program, Symbol
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, with_numbers
 
-Maker = Callable[[Robot, str | None], Function]
+Maker = Callable[[Robot, WrenchFrame | None], Function]
 """Factory of a generated function, called with a robot and the frame of a wrench (None without one)."""
 
 PARAMETERS = "parameters"
@@ -30,7 +31,9 @@ def _meaning(parameter: Parameter) -> str:
     return ", ".join(filter(None, (str(parameter), unit, parameter.requirement)))
 
 
-def with_parameters(make: Maker, robot: Robot, frame: str | None, chosen: Sequence[Parameter]) -> Function:
+def with_parameters(
+    make: Maker, robot: Robot, frame: WrenchFrame | None, chosen: Sequence[Parameter]
+) -> Function:
     """Return the function with chosen parameters as an argument, or without if it depends on none of them.
 
     `make` is called again with symbols for the parameters, so that one implementation serves both cases.
@@ -58,7 +61,7 @@ def _reads(program: Program, last: int) -> bool:
     return any(isinstance(each, Symbol) and each in operands for each in program.inputs[-last:])
 
 
-def check_parameters(robot: Robot, frame: str | None, chosen: Sequence[Parameter]) -> None:
+def check_parameters(robot: Robot, frame: WrenchFrame | None, chosen: Sequence[Parameter]) -> None:
     """Raise an error for parameters whose values select code or enter precomputed tables.
 
     Raises:
@@ -76,7 +79,7 @@ def check_parameters(robot: Robot, frame: str | None, chosen: Sequence[Parameter
         raise InputError(Problem("", 0, f"{each} of {robot.name} {reason}") for each in refused)
 
 
-def _may_vary(robot: Robot, frame: str | None, parameter: Parameter) -> bool:
+def _may_vary(robot: Robot, frame: WrenchFrame | None, parameter: Parameter) -> bool:
     try:
         with_parameters(inverse_dynamics_function, robot, frame, [parameter])
     except NotImplementedError:

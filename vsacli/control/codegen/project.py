@@ -13,6 +13,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.texts import counted, sentence
 from vsacli.base.version import __version__
+from vsacli.base.wrench import WrenchFrame, check_wrench_frame
 from vsacli.compute.tracing import TooLongError
 from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
@@ -55,7 +56,7 @@ class Project(NamedTuple):
 def generate(
     robot: Robot,
     precision: str = "double",
-    wrench: str | None = None,
+    wrench: WrenchFrame | None = None,
     patterns: Sequence[str] = (),
     *,
     loops: bool = True,
@@ -66,7 +67,7 @@ def generate(
         robot: robot.
         precision: type of the numbers, one of `vsacli.control.codegen.scalar.PRECISIONS`.
         wrench: frame of a wrench at the end effector that the functions take as an argument, one of
-            `vsacli.base.wrench.WRENCH_FRAMES`; None for no such argument.
+            `vsacli.base.wrench.WRENCH_FRAMES`, or that of each of several tools; None for no such argument.
         patterns: patterns of paths as in `vsacli.robot.parameters`; matching parameters become arguments.
         loops: whether loops are allowed; without them every call executes the same operations.
 
@@ -81,10 +82,12 @@ def generate(
     about = " ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)])
     chosen = parameters(robot, patterns) if patterns else ()
     try:
+        if wrench is not None:
+            check_wrench_frame(wrench, robot.tool_names)
         functions, omitted = _functions(robot, wrench, chosen)
         if not loops:
             _check_loops(robot, functions)
-        reference = ReferenceResults(robot, chosen)
+        reference = ReferenceResults(robot, chosen, wrench)
         if precision == "float":
             check_single_precision(robot, functions, reference)
         files = {
@@ -104,7 +107,7 @@ def generate(
 
 
 def _functions(
-    robot: Robot, wrench: str | None, chosen: Sequence[Parameter]
+    robot: Robot, wrench: WrenchFrame | None, chosen: Sequence[Parameter]
 ) -> tuple[list[Function], list[str]]:
     """Return the functions that can be generated, and the reasons for missing ones.
 
@@ -146,7 +149,8 @@ def _check_loops(robot: Robot, functions: Sequence[Function]) -> None:
     """
     if not any(worst_cost(function.program).loops for function in functions):
         return
-    alone = (dataclasses.replace(robot, joints=(joint,)) for joint in robot.joints)
+    on_base = (dataclasses.replace(joint, parent=None, mount=None) for joint in robot.joints)
+    alone = (dataclasses.replace(robot, joints=(joint,), tools=()) for joint in on_base)
     names = [
         each.joints[0].name for each in alone if worst_cost(inverse_dynamics_function(each).program).loops
     ]

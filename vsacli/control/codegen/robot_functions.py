@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.reach import margin
+from vsacli.base.errors import InputError
 from vsacli.base.flags import finite, not_finite_flags
 from vsacli.base.signals import POSITION
 from vsacli.base.variables import VARIABLES
-from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, WrenchFrame, frames_by_tool
 from vsacli.compute.vector import Scalar
-from vsacli.control.codegen.interface import Array, Function, Rows, Structure, unpacked
+from vsacli.control.codegen.interface import Arguments, Array, Function, Rows, Structure, unpacked
 from vsacli.dynamics.deflection_rows import INTERNAL, InternalRows
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
@@ -43,29 +47,68 @@ def command_structure(robot: Robot) -> Structure:
     return Structure("command", meaning, _arrays(robot, tuple(names)))
 
 
-def wrench_structure(frame: str) -> Structure:
-    """Return the structure of the wrench of the environment on the end effector."""
-    meaning = (
-        "Wrench that the environment exerts on the end effector: force and moment about the origin of the "
-        f"tool frame, along the axes of the {frame.replace('_', ' ')} frame."
-    )
-    components = f"{', '.join(WRENCH_AXES)}; N and N m"
-    units = (components, f"{components} per s", f"{components} per s^2")
-    arrays = (Array(name, (len(WRENCH_AXES),), unit) for name, unit in zip(WRENCH_NAMES, units, strict=True))
+def wrench_structure(robot: Robot, frame: WrenchFrame) -> Structure:
+    """Return the structure of the wrench of the environment on each tool that has a frame.
+
+    Raises:
+        InputError: two tools have the same name in C.
+    """
+    axes, units = ", ".join(WRENCH_AXES), ("N and N m", "N and N m per s", "N and N m per s^2")
+    exerted = "the environment exerts on the"
+    about = "force and moment about the origin of the tool frame"
+    if isinstance(frame, str):
+        along = frame.replace("_", " ")
+        meaning = f"Wrench that {exerted} end effector: {about}, along the axes of the {along} frame."
+        names = {name: f"{axes}; {unit}" for name, unit in zip(WRENCH_NAMES, units, strict=True)}
+    else:
+        meaning = f"Wrenches that {exerted} tools: {about}."
+        frames = zip(robot.tool_names, frames_by_tool(frame), strict=True)
+        loaded = {tool: along for tool, along in frames if along is not None}
+        names = {
+            _name_in_c(name, tool): f"{axes} along the axes of the {along.replace('_', ' ')} frame; {unit}"
+            for tool, along in loaded.items()
+            for name, unit in zip(WRENCH_NAMES, units, strict=True)
+        }
+        if len(names) < len(loaded) * len(units):
+            tools = ", ".join(loaded)
+            raise InputError.one(f"two of the tools {tools} have the same name in C, where - becomes _")
+    arrays = (Array(name, (len(WRENCH_AXES),), each) for name, each in names.items())
     return Structure("wrench", meaning, tuple(arrays))
 
 
-def wrench_argument(frame: str | None) -> tuple[tuple[str, Structure], ...]:
+def _name_in_c(name: str, tool: str) -> str:
+    return f"{name}_{tool.replace('-', '_')}"
+
+
+def wrench_by_tool(robot: Robot, arrays: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Return wrench and derivatives of each tool from the arrays of a `wrench_structure`, zero if idle."""
+    idle = np.zeros(len(WRENCH_AXES))
+    if WRENCH_NAMES[0] in arrays:
+        return {name: [arrays[name]] for name in WRENCH_NAMES}
+    return {
+        name: [arrays.get(_name_in_c(name, tool), idle) for tool in robot.tool_names] for name in WRENCH_NAMES
+    }
+
+
+def _kernel_inputs(robot: Robot, arguments: Arguments, rows: Rows) -> dict[str, Any]:
+    """Return the rows of all arguments by the names of the kernel's inputs."""
+    values = dict(unpacked(arguments, rows))
+    by_tool = wrench_by_tool(robot, values) if "wrench" in dict(arguments) else {}
+    return values | {name: [row for tool in tools for row in tool] for name, tools in by_tool.items()}
+
+
+def wrench_argument(robot: Robot, frame: WrenchFrame | None) -> tuple[tuple[str, Structure], ...]:
     """Return the wrench as an argument; empty if `frame` is None."""
-    return () if frame is None else (("wrench", wrench_structure(frame)),)
+    return () if frame is None else (("wrench", wrench_structure(robot, frame)),)
 
 
-def link_torques_function(robot: Robot, frame: str | None = None) -> Function:
+def link_torques_function(robot: Robot, frame: WrenchFrame | None = None) -> Function:
     """Return the function of link torques (36)-(60), with a wrench if its frame is given."""
     kernel = LinkTorques(robot, frame)
+    arguments = (("motion", motion_structure(robot)), *wrench_argument(robot, frame))
 
     def compute(rows: Rows) -> Rows:
-        torques = kernel(rows)
+        torques = kernel(kernel.arguments.pack(_kernel_inputs(robot, arguments, rows)))
         of_joints = zip(*kernel.results.unpack(torques).values(), strict=True)
         return [*torques, *(not_finite_flags(~finite(of_joint)) for of_joint in of_joints)]
 
@@ -75,20 +118,20 @@ def link_torques_function(robot: Robot, frame: str | None = None) -> Function:
             "Torques that the links demand of the joints, and their first two derivatives; returns the flags "
             "of all joints, 0 if all numbers are finite."
         ),
-        arguments=(("motion", motion_structure(robot)), *wrench_argument(frame)),
+        arguments=arguments,
         result=Structure("torques", "Torques of the joints.", _arrays(robot, (*TORQUES, "flags"))),
         compute=compute,
     )
 
 
-def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Function:
+def inverse_dynamics_function(robot: Robot, frame: WrenchFrame | None = None) -> Function:
     """Return the function of inverse dynamics (36)-(74).
 
     Deflections inside damped transmissions are inputs, and outputs together with their rates.
 
     Args:
         robot: robot.
-        frame: frame of `WRENCH_FRAMES` along whose axes a wrench is given; None without one.
+        frame: frame along whose axes a wrench is given, see `WrenchFrame`; None without one.
     """
     damped = tuple(index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission"))
     kernel = InverseDynamics(robot, frame, prescribed=(InternalRows(damped, INTERNAL[:1]),))
@@ -96,11 +139,11 @@ def inverse_dynamics_function(robot: Robot, frame: str | None = None) -> Functio
     arguments = (
         ("command", command_structure(robot)),
         *([] if inside is None else [("internal", inside)]),
-        *wrench_argument(frame),
+        *wrench_argument(robot, frame),
     )
 
     def compute(rows: Rows) -> Rows:
-        values = unpacked(arguments, rows)
+        values = _kernel_inputs(robot, arguments, rows)
         deflections = values.get(INTERNAL[0], ())
         values[INTERNAL[0]] = [deflections[SIDES * index + side] for index in damped for side in range(SIDES)]
         computed = kernel.results.unpack(kernel(kernel.arguments.pack(values)))

@@ -11,10 +11,11 @@ from vsacli.base.arrays import FloatArray, over_time
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.signals import DAMPING, POSITION
-from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
+from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.tracing.single_precision import in_single_precision
 from vsacli.control.codegen.interface import Array, Function
 from vsacli.control.codegen.parameters import PARAMETERS, parameters_structure
+from vsacli.control.codegen.robot_functions import wrench_argument
 from vsacli.control.gains import STIFFNESS_ORDER
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import compute_block, internal_equilibrium
@@ -55,8 +56,16 @@ class ArrayComparison(NamedTuple):
 class ReferenceResults:
     """Inputs and results of the generated functions of a robot."""
 
-    def __init__(self, robot: Robot, chosen: Sequence[Parameter] = ()) -> None:
-        """Draw the inputs; `chosen` are the parameters that the functions have as an argument."""
+    def __init__(
+        self, robot: Robot, chosen: Sequence[Parameter] = (), wrench: WrenchFrame | None = None
+    ) -> None:
+        """Draw the inputs.
+
+        Args:
+            robot: robot of the functions.
+            chosen: parameters that the functions have as an argument.
+            wrench: frame of the wrench that they have as an argument; None without one.
+        """
         self._robot = robot
         self._rng = np.random.default_rng(1)
         self._results: dict[str, Arrays] = {}
@@ -67,7 +76,10 @@ class ReferenceResults:
             "state": self._state(command),
             "internal": self._internal(command),
             "integral": {name: self._drawn(scale) for name, scale in (("q", 1e-3), ("stiffness", 1.0))},
-            "wrench": {name: self._rng.uniform(-1, 1, (CASES, len(WRENCH_AXES))) for name in WRENCH_NAMES},
+            **{
+                name: {each.name: self._rng.uniform(-1, 1, (CASES, *each.shape)) for each in structure.arrays}
+                for name, structure in wrench_argument(robot, wrench)
+            },
             PARAMETERS: _two_sets(chosen),
         }
 

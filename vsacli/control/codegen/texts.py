@@ -74,13 +74,14 @@ def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precis
 def _conventions(robot: Robot, functions: Sequence[Function]) -> str:
     acted_on = any(structure.name == "wrench" for structure in structures(functions))
     acting = "the argument wrench acts" if acted_on else "nothing acts"
+    where = "end effector" if len(robot.tool_names) == 1 else "tools that it names" if acted_on else "tools"
     names = ", ".join(
         f"{index} {joint.name} ({joint.type}, {joint.actuator_type})"
         for index, joint in enumerate(robot.joints)
     )
     return (
         f"Joints: {names}. Motors 0 and 1 of a joint; what an actuator does not have is NaN. SI units; "
-        f"signs, frames and gravity as in the robot file; {acting} on the end effector. Functions keep "
+        f"signs, frames and gravity as in the robot file; {acting} on the {where}. Functions keep "
         "nothing between calls."
     )
 
@@ -233,6 +234,15 @@ def _constant(prefix: str, structure: Structure) -> str:
 NOMINAL_{structure.name.upper()} = np.frombuffer(_CONSTANT.raw, {kind})[0]"""
 
 
+def _wrenches(robot: Robot, functions: Sequence[Function]) -> str:
+    """Return the sentence on the wrenches on several tools; empty otherwise."""
+    structure = next((each for each in structures(functions) if each.name == "wrench"), None)
+    if structure is None or len(robot.tool_names) == 1:
+        return ""
+    members = ", ".join(f"`{array.name}`" for array in structure.arrays)
+    return f"The argument `wrench` has the members {members}; nothing acts on other tools.\n"
+
+
 def readme_text(
     prefix: str, robot: Robot, functions: Sequence[Function], precision: str, omitted: Sequence[str]
 ) -> str:
@@ -253,6 +263,7 @@ def readme_text(
             for function in functions
         ),
         joints=for_markdown(", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names))),
+        wrenches=_wrenches(robot, functions),
         omitted="".join(f"There is {for_markdown(sentence(reason))}\n" for reason in omitted),
         numbers="".join(
             filled("parameters.md", prefix, first=next(each.entries))

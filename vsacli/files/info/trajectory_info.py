@@ -12,7 +12,7 @@ from vsacli.base import file_formats
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.progress import Progress
-from vsacli.base.signals import COMMANDED, orders_of_derivation
+from vsacli.base.signals import COMMANDED, WRENCH, WRENCHES, Signal, orders_of_derivation
 from vsacli.base.tables import aligned
 from vsacli.base.texts import counted, for_yaml, warnings_and_notes
 from vsacli.base.units import POSITION
@@ -21,6 +21,7 @@ from vsacli.files.info.numbers_in_text import range_text, short
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory
+from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.trajectory import Trajectory
 
 BLOCK_SAMPLES = 8192
@@ -87,13 +88,21 @@ def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> d
         "notes": list(trajectory.notes),
     }
     if trajectory.wrench is not None:
-        axes = {axis: _axis(ranges, index) for index, axis in enumerate(WRENCH_AXES)}
-        description["wrench"] = {"frame": trajectory.wrench.frame, **axes}
+        described = {
+            signal: _describe_wrench(trajectory.wrench, signal, ranges)
+            for signal in trajectory.wrench.profiles
+        }
+        by_tool = {signal.tool: each for signal, each in described.items() if signal.tool}
+        description |= {WRENCHES: by_tool} if by_tool else {WRENCH.key: described[WRENCH]}
     return description
 
 
-def _axis(ranges: _Ranges, index: int) -> dict[str, Any]:
-    return {name: ranges.of(name, index) for name in WRENCH_NAMES}
+def _describe_wrench(wrench: WrenchProfile, signal: Signal, ranges: _Ranges) -> dict[str, Any]:
+    axes = {
+        axis: {name: ranges.of(name, signal.first + index) for name in WRENCH_NAMES}
+        for index, axis in enumerate(WRENCH_AXES)
+    }
+    return {"frame": wrench.frame_of(signal), **axes}
 
 
 class _Ranges:
@@ -139,12 +148,14 @@ def trajectory_lines(trajectory: Mapping[str, Any]) -> Iterator[str]:
     yield from aligned(rows)
     units = (f"; {key} {COMMANDED[key].quantities[0]}" for key in commanded)
     yield f"units: q {POSITION}, its k-th derivative per s^k{''.join(units)}"
-    if "wrench" in trajectory:
-        yield from _wrench(trajectory["wrench"])
+    if WRENCH.key in trajectory:
+        yield _wrench("wrench", trajectory[WRENCH.key])
+    for tool, wrench in trajectory.get(WRENCHES, {}).items():
+        yield _wrench(f"wrench on {tool}", wrench)
     yield from warnings_and_notes(trajectory["warnings"], trajectory["notes"])
 
 
-def _wrench(wrench: Mapping[str, Any]) -> Iterator[str]:
+def _wrench(title: str, wrench: Mapping[str, Any]) -> str:
     axes = [axis for axis in wrench if axis != "frame"]
     ranges = ", ".join(f"{axis} {range_text(wrench[axis]['wrench'])}" for axis in axes)
-    yield f"wrench along the axes of {wrench['frame']}, N and N m: {ranges}"
+    return f"{title} along the axes of {wrench['frame']}, N and N m: {ranges}"

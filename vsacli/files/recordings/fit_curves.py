@@ -15,7 +15,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.progress import Progress, unseen
-from vsacli.base.signals import COMMANDED, POSITION, WRENCH
+from vsacli.base.signals import COMMANDED, POSITION, Signal
 from vsacli.documents.csv_file import read_header
 from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
 from vsacli.results.charts.reduction import Curve
@@ -93,7 +93,7 @@ def recorded_curves(
     """
     curves = []
     for profile in (each for each in profiles if each.estimate is not None):
-        record, wanted = profile.record, () if profile.signal is WRENCH else shown
+        record, wanted = profile.record, () if profile.signal.is_wrench else shown
         members = {record.labels[number] for number in joint_numbers(record.labels, wanted, file)}
         steps = steps_between(record.start + record.time, span, file)
         curves += [
@@ -102,6 +102,12 @@ def recorded_curves(
             if stated["name"] in members
         ]
     return curves
+
+
+def _curve_name(signal: Signal, component: str) -> str:
+    if signal.is_wrench:
+        return f"{signal.tool}.{component}" if signal.tool else component
+    return f"{component}.{signal.names[0]}"
 
 
 def _curve(
@@ -130,7 +136,7 @@ def _curve(
     fine = shown if len(shown) >= FEWEST_POINTS else np.linspace(shown[0], shown[-1], FEWEST_POINTS)
     ends = stated["unreliable"]
     return RecordedCurve(
-        name=stated["name"] if profile.signal is WRENCH else f"{stated['name']}.{profile.signal.names[0]}",
+        name=_curve_name(profile.signal, stated["name"]),
         unit=profile.signal.quantities[0].of_component(member, joint_types),
         fit=FITS.get(stated["method"], stated["method"]),
         knots=stated["knots"],

@@ -41,7 +41,7 @@ def parameter_words(path: str, unit: str, joints: Sequence[str]) -> str:
     Args:
         path: path of the parameter in the file of a robot or a trajectory; `*` matches anything.
         unit: unit of the parameter, which says what a symbol such as k is; empty if unknown.
-        joints: names of the joints, base to tip.
+        joints: names of the joints, in the order of the robot file.
     """
     keys, where = path.split("."), ""
     of_joint = keys[0] == "joints" and len(keys) > 2

@@ -42,7 +42,7 @@ class Ranking(NamedTuple):
 
         Args:
             report: report of a sensitivity analysis as JSON.
-            joints: names of the joints, base to tip.
+            joints: names of the joints, in the order of the robot file.
 
         Raises:
             LookupError, TypeError, AttributeError, ArithmeticError: the content is not such a report.

@@ -57,7 +57,7 @@ class Difference:
 
     Attributes:
         time: common times, (samples,), s; empty if the files do not overlap.
-        joint_names: names of the joints, base to tip.
+        joint_names: names of the joints, in the order of the robot file.
     """
 
     def __init__(self, result: StoredResult, other: StoredResult) -> None:

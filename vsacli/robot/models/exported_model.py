@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import NamedTuple, TypeAlias
 from xml.etree import ElementTree
 
+from vsacli.robot.joint import Joint, Pose
 from vsacli.robot.model import Robot
 
 Element: TypeAlias = ElementTree.Element
@@ -55,15 +56,34 @@ THICKNESS_SHARE = 0.07
 WITHOUT_LENGTH = 0.5
 """Length, m, of an arm whose frame origins all coincide."""
 
+TOOL = "tool"
+"""Name of the tool of a robot without `tools`."""
+
 
 def arm_length(robot: Robot) -> float:
-    """Return the sum of the distances from origin to origin at q = 0, m."""
-    return math.fsum(math.hypot(joint.dh.a, joint.dh.d) for joint in robot.joints) or WITHOUT_LENGTH
+    """Return the largest sum of distances from origin to origin between base and tip at q = 0, m."""
+    return math.fsum(_longest_path(robot)) or WITHOUT_LENGTH
 
 
 def rod_radius(robot: Robot) -> float:
     """Return the radius of the rods from origin to origin, m."""
-    return THICKNESS_SHARE * arm_length(robot) / len(robot.joints)
+    return THICKNESS_SHARE * arm_length(robot) / len(_longest_path(robot))
+
+
+def _longest_path(robot: Robot) -> list[float]:
+    """Return the distances from origin to origin, over mounts, along the longest path to a tip, m."""
+    paths = ([_joint_length(robot.joints[index]) for index in robot.paths[tip]] for tip in robot.tips)
+    return max(paths, key=math.fsum)
+
+
+def _joint_length(joint: Joint) -> float:
+    mount = Pose() if joint.mount is None else joint.mount
+    return math.hypot(*mount.xyz) + math.hypot(joint.dh.a, joint.dh.d)
+
+
+def exported_tool_names(robot: Robot) -> tuple[str, ...]:
+    """Return the names of `end_effectors` in other programs."""
+    return robot.tool_names if robot.tools else (TOOL,) * len(robot.end_effectors)
 
 
 class ExportedModel(NamedTuple):

@@ -18,6 +18,7 @@ from vsacli.robot.models.exported_model import (
     ExportedModel,
     add_element,
     arm_length,
+    exported_tool_names,
     rod_radius,
     set_attributes,
     xml_document,
@@ -64,13 +65,16 @@ def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     add_element(root, "statistic", center=robot.base.xyz, extent=SEEN * arm_length(robot))
     _add_light(root)
     sections = Sections(*(add_element(root, tag) for tag in ("worldbody", "tendon", "actuator")))
-    body = _add_body(sections.world, "base", robot.base)
+    bodies = {-1: _add_body(sections.world, "base", robot.base)}
     radius = rod_radius(robot)
-    for joint in robot.joints:
-        below, body = body, _add_link_body(body, joint, radius)
-        add_drive(sections, joint, below, body)
+    for index, (joint, parent) in enumerate(zip(robot.joints, robot.parents, strict=True)):
+        below = _add_mount(bodies[parent], joint, radius)
+        bodies[index] = _add_link_body(below, joint, radius)
+        add_drive(sections, joint, below, bodies[index])
     add_dampers(sections, robot.joints)
-    add_element(body, "site", name="tool", pos=robot.tool.xyz, quat=_quaternion(robot.tool), size=DRAWN)
+    tools = zip(exported_tool_names(robot), robot.end_effectors, robot.tool_joints, strict=True)
+    for name, tool, carrier in tools:
+        add_element(bodies[carrier], "site", name=name, pos=tool.xyz, quat=_quaternion(tool), size=DRAWN)
     if start is not None:
         add_start(root, sections.world, robot, start)
     return ExportedModel(xml_document(root, _header_comment(robot)), forces_text(robot), ())
@@ -93,6 +97,15 @@ def _header_comment(robot: Robot) -> str:
 
 def _add_body(parent: Element, name: str, pose: Pose) -> Element:
     return add_element(parent, "body", name=name, pos=pose.xyz, quat=_quaternion(pose))
+
+
+def _add_mount(parent: Element, joint: Joint, radius: float) -> Element:
+    """Return the body at which the row of a joint begins: a new one for a mount, drawn with a rod to it."""
+    if joint.mount is None:
+        return parent
+    if math.hypot(*joint.mount.xyz) > radius:
+        draw_rod(parent, joint.mount.xyz, radius, LINK_COLOR)
+    return _add_body(parent, f"{joint.name}.mount", joint.mount)
 
 
 def _add_link_body(parent: Element, joint: Joint, radius: float) -> Element:

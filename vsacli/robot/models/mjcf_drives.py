@@ -161,7 +161,7 @@ def draw_rod(body: Element, end: Sequence[float], radius: float, color: Sequence
 
 
 def add_lever(below: Element, joint: Joint, spring: LeverSpring, rotors: Sequence[Rotor]) -> None:
-    """Add both motors to the link before the joint; at zero, the lever is aligned with the link."""
+    """Add both motors to the body at the joint's row; at zero, the lever is aligned with the link."""
     first, second = rotors
     half = joint.dh.theta / 2
     lever = add_rotor(below, first, type="hinge")
@@ -213,7 +213,7 @@ def springs_are_expressible(joint: Joint) -> bool:
 
 
 def add_drive(sections: Sections, joint: Joint, below: Element, body: Element) -> None:
-    """Add motors, springs and torques of a joint; `below` is the body before the joint, `body` its link's."""
+    """Add motors, springs and torques of a joint; `below` is the body at its row, `body` its link's."""
     rotors = rotors_of(joint, sections.tendons)
     for rotor in rotors:
         _add_actuator(sections.actuators, rotor)

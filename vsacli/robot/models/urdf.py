@@ -21,6 +21,7 @@ from vsacli.robot.models.exported_model import (
     Element,
     ExportedModel,
     add_element,
+    exported_tool_names,
     rod_radius,
     set_attributes,
     xml_document,
@@ -28,8 +29,8 @@ from vsacli.robot.models.exported_model import (
 from vsacli.robot.models.mjcf_drives import Start
 from vsacli.robot.urdf.link_tree import pose_matrix, roll_pitch_yaw
 
-ROOT, TOOL = "world", "tool"
-"""Names of the first and last link; others are named `<joint>_link`."""
+ROOT = "world"
+"""Name of the first link; those of joints are named `<joint>_link`, those of tools as the tools."""
 
 STANDARD_GRAVITY = (0.0, 0.0, -9.81)
 """Gravity, m/s^2, that most readers of a URDF assume."""
@@ -47,26 +48,47 @@ def urdf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     if start is not None:
         raise InputError.one("--start needs --format mjcf; a URDF has no initial state")
     root = ElementTree.Element("robot", name=robot.name)
-    add_element(root, "link", name=ROOT)
-    parent, end = ROOT, pose_matrix(robot.base.xyz, robot.base.rpy)
-    for joint in robot.joints:
-        link = f"{joint.name}_link"
-        dh = joint.dh
-        _add_link(root, link, joint, rod_radius(robot))
-        moving = _add_joint(root, joint.name, _urdf_joint_type(joint), parent, link)
-        _add_origin(moving, end @ pose_matrix((0, 0, dh.d), (0, 0, dh.theta)))
+    links = {-1: add_element(root, "link", name=ROOT)}
+    frames = {-1: pose_matrix(robot.base.xyz, robot.base.rpy)}
+    radius = rod_radius(robot)
+    for index, (joint, parent) in enumerate(zip(robot.joints, robot.parents, strict=True)):
+        dh, seat = joint.dh, _seat_pose(frames[parent], joint)
+        if math.dist(seat[:3, 3], frames[parent][:3, 3]) > radius:
+            _add_rod(links[parent], frames[parent][:3, 3], seat[:3, 3], radius)
+        links[index] = _add_link(root, joint, radius)
+        moving = _add_joint(root, joint.name, _urdf_joint_type(joint), links[parent], links[index])
+        _add_origin(moving, seat @ pose_matrix((0, 0, dh.d), (0, 0, dh.theta)))
         _add_joint_properties(moving, joint)
-        parent, end = link, pose_matrix((dh.a, 0, 0), (dh.alpha, 0, 0))
-    add_element(root, "link", name=TOOL)
-    fixed = _add_joint(root, "tool.mount", "fixed", parent, TOOL)
-    _add_origin(fixed, end @ pose_matrix(robot.tool.xyz, robot.tool.rpy))
+        frames[index] = pose_matrix((dh.a, 0, 0), (dh.alpha, 0, 0))
+    for name, tool, carrier in zip(_tool_links(robot), robot.end_effectors, robot.tool_joints, strict=True):
+        link = add_element(root, "link", name=name)
+        fixed = _add_joint(root, f"{name}.mount", "fixed", links[carrier], link)
+        _add_origin(fixed, frames[carrier] @ pose_matrix(tool.xyz, tool.rpy))
     notes = tuple(_describe_losses(robot))
     return ExportedModel(xml_document(root, f"{robot.name}, by vsacli {__version__}"), None, notes)
 
 
-def _add_link(root: Element, name: str, joint: Joint, radius: float) -> None:
-    """Add a link; the inertia tensor keeps the axes of the Denavit-Hartenberg frame, and so its entries."""
-    link, whole = joint.link, add_element(root, "link", name=name)
+def _seat_pose(frame: FloatArray, joint: Joint) -> FloatArray:
+    """Return the pose at which the row of a joint begins, from the frame of the link that carries it."""
+    return frame if joint.mount is None else frame @ pose_matrix(joint.mount.xyz, joint.mount.rpy)
+
+
+def _tool_links(robot: Robot) -> list[str]:
+    """Return a link name for each tool; with a dot, which no name in a robot has, if it is taken."""
+    taken = {ROOT, *map(_link_name, robot.joints)}
+    return [f"{name}.tool" if name in taken else name for name in exported_tool_names(robot)]
+
+
+def _link_name(joint: Joint) -> str:
+    return f"{joint.name}_link"
+
+
+def _add_link(root: Element, joint: Joint, radius: float) -> Element:
+    """Add a link and return it.
+
+    The inertia tensor keeps the axes of the Denavit-Hartenberg frame, and so its entries.
+    """
+    link, whole = joint.link, add_element(root, "link", name=_link_name(joint))
     body = add_element(whole, "inertial")
     end = pose_matrix((joint.dh.a, 0, 0), (joint.dh.alpha, 0, 0))
     com = end[:3, :3] @ np.array(link.com) + end[:3, 3]
@@ -75,25 +97,27 @@ def _add_link(root: Element, name: str, joint: Joint, radius: float) -> None:
     inertia = link.inertia
     entries = {f"i{name}": getattr(inertia, name) for name in ("xx", "xy", "xz", "yy", "yz", "zz")}
     add_element(body, "inertia", **entries)
-    _add_visual(whole, joint, radius)
+    _add_rod(whole, np.array([0, 0, -joint.dh.d]), np.array([joint.dh.a, 0, 0]), radius)
+    return whole
 
 
-def _add_visual(link: Element, joint: Joint, radius: float) -> None:
-    """Draw a rod from origin to origin of the Denavit-Hartenberg frames, without collision geometry."""
-    a, d = joint.dh.a, joint.dh.d
+def _add_rod(link: Element, start: FloatArray, end: FloatArray, radius: float) -> None:
+    """Draw a rod from point to point, a ball if they are close, without collision geometry."""
+    x, y, z = map(float, end - start)
     visual = add_element(link, "visual")
-    add_element(visual, "origin", xyz=(a / 2, 0, -d / 2), rpy=(0, math.atan2(a, d), 0))
-    length = math.hypot(a, d)
+    slope = (math.atan2(-y, math.hypot(x, z)), math.atan2(x, z), 0)
+    add_element(visual, "origin", xyz=(start + end) / 2, rpy=slope)
+    length = math.hypot(x, y, z)
     if length > radius:
         add_element(add_element(visual, "geometry"), "cylinder", radius=radius, length=length)
     else:
         add_element(add_element(visual, "geometry"), "sphere", radius=radius)
 
 
-def _add_joint(root: Element, name: str, kind: str, parent: str, child: str) -> Element:
+def _add_joint(root: Element, name: str, kind: str, parent: Element, child: Element) -> Element:
     joint = add_element(root, "joint", name=name, type=kind)
-    add_element(joint, "parent", link=parent)
-    add_element(joint, "child", link=child)
+    add_element(joint, "parent", link=parent.get("name", ""))
+    add_element(joint, "child", link=child.get("name", ""))
     return joint
 
 

@@ -2,54 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 from vsacli.base.errors import Problem
 from vsacli.documents import tree
 from vsacli.documents.plausibility import ValuesInFile, implausible_measurements, implausible_values
 from vsacli.documents.record_values import NumberPath, PathIndex
-from vsacli.documents.source import Source
 from vsacli.robot.plausibility.bodies import BODY_RULES
 from vsacli.robot.plausibility.checked_robot import CheckedRobot
 from vsacli.robot.plausibility.drives import DRIVE_RULES
 from vsacli.robot.plausibility.links import impossible_links
 from vsacli.robot.plausibility.springs import SPRING_RULES
 
+if TYPE_CHECKING:
+    from vsacli.robot.model import Robot
+
 ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
 
 
-def robot_findings(checked: CheckedRobot, sources: Sequence[Source]) -> tuple[Problem, ...]:
+def robot_findings(robot: Robot) -> tuple[Problem, ...]:
     """Return impossible links and the findings of the rules, with lines of the robot file.
 
-    The robot file is the first of the sources.
+    The robot file is the first of the sources. Each of `Robot.subtrees` is judged by itself, as if it stood
+    alone: one with a number in another unit neither explains nor hides the findings of the others.
     """
-    lines = _robot_file_lines(checked, sources)
-    return (*impossible_links(checked.joints, lines), *implausible_values(ROBOT_RULES, checked, lines))
+    findings = [
+        *impossible_links(robot.joints, ValuesInFile(robot.sources[0]) if robot.sources else None),
+        *(
+            problem
+            for subtree in robot.checked_subtrees
+            for problem in implausible_values(ROBOT_RULES, subtree, _robot_file_lines(robot, subtree))
+        ),
+    ]
+    return tuple(dict.fromkeys(findings))
 
 
-def robot_rules_with_findings(checked: CheckedRobot, sources: Sequence[Source]) -> frozenset[str]:
-    """Return the names of the rules that have findings."""
-    lines = _robot_file_lines(checked, sources)
-    return frozenset(implausible_measurements(ROBOT_RULES, checked, lines))
+def robot_rules_with_findings(robot: Robot, subtree: CheckedRobot) -> frozenset[str]:
+    """Return the names of the rules that have findings in one of `Robot.checked_subtrees`."""
+    return frozenset(implausible_measurements(ROBOT_RULES, subtree, _robot_file_lines(robot, subtree)))
 
 
-def _robot_file_lines(checked: CheckedRobot, sources: Sequence[Source]) -> ValuesInFile | None:
-    return ValuesInFile(sources[0], partial(_path_in_robot_file, checked)) if sources else None
+def _robot_file_lines(robot: Robot, subtree: CheckedRobot) -> ValuesInFile | None:
+    translate = partial(_path_in_robot_file, robot, subtree)
+    return ValuesInFile(robot.sources[0], translate) if robot.sources else None
 
 
-def _path_in_robot_file(checked: CheckedRobot, root: tree.Node, path: NumberPath) -> NumberPath:
-    """Return the path in the robot file for a path of the robot; modified rows become standard ones.
+def _path_in_robot_file(robot: Robot, subtree: CheckedRobot, root: tree.Node, path: NumberPath) -> NumberPath:
+    """Return the path in the robot file for a path of a subtree; modified rows become standard ones.
 
     The standard row of a joint has a and alpha of the modified row of the next one; those of the first one
     are in the base, and those of a joint with a mount in its mount.
     """
+    match path:
+        case ("joints", PathIndex(number, name), *inner):
+            path = ("joints", PathIndex(subtree.numbers_in_robot[number], name), *inner)
     convention = root.entries.get("convention") if isinstance(root, tree.MapNode) else None
     if not (isinstance(convention, tree.TextNode) and convention.text == "modified"):
         return path
     from vsacli.robot.modified_dh import joints_without_mount
 
-    following = joints_without_mount(checked.joints, checked.parents)
+    following = joints_without_mount(robot.joints, robot.parents)
     match path:
         case ("joints", PathIndex(number=number), "dh", "a" | "alpha" as word) if number in following:
             return ("joints", PathIndex(following[number]), "dh", word)

@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
+from vsacli.documents.record_values import PathIndex
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, density_of_sphere, joint_path, ratio_or_nan
 
 TURN = 2 * math.pi
@@ -92,11 +93,15 @@ def _speed_of_limit(_: CheckedRobot, velocity: float) -> float:
 
 
 def _measure_lengths(checked: CheckedRobot) -> Iterator[Measured]:
-    largest = float(np.max(checked.sizes.gyrations))
-    in_gyrations = _measure_numbers(
-        "m", "dh", "com", "tool", size=lambda _, length: ratio_or_nan(abs(length), largest)
-    )
-    return (number._replace(beside={"gyration": f"{largest:.3g}"}) for number in in_gyrations(checked))
+    """Yield lengths over the largest gyration; mounts on the base, where all may stand, over the reach."""
+    largest, reach = float(np.max(checked.sizes.gyrations)), checked.sizes.reach
+    for number in _measure_numbers("m", "dh", "com", "tool", "tools", "mount")(checked):
+        if "mount" in number.path and number.path[1] == PathIndex(0, checked.joints[0].name):
+            size, reference = ratio_or_nan(number.size, reach), f"the reach of what it carries, {reach:.3g} m"
+        else:
+            size = ratio_or_nan(number.size, largest)
+            reference = f"the largest radius of gyration of a link, {largest:.3g} m"
+        yield number._replace(size=size, beside={"reference": reference})
 
 
 def _measure_link_masses(size: Callable[[CheckedRobot, int], float]) -> Measure:
@@ -113,7 +118,7 @@ def _measure_link_masses(size: Callable[[CheckedRobot, int], float]) -> Measure:
 def _relative_gyration(checked: CheckedRobot, index: int) -> float:
     """Return the radius of gyration over the reach from the base frame; single wheels have little reach."""
     return ratio_or_nan(
-        float(checked.sizes.gyrations[index]), checked.sizes.reach + math.hypot(*checked.base.xyz)
+        float(checked.sizes.gyrations[index]), checked.sizes.reach + checked.distance_from_base_frame
     )
 
 
@@ -157,10 +162,10 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("velocities of prismatic joints", "`limits.velocity`", _measure_numbers("m/s", "limits"),
         size="m/s", high=20, usual=0.5, reason="linear motors are slower",
         finding="is faster than linear motors are", units=(OtherUnit("mm/s", 1e-3),)),
-    Rule("lengths", "`dh.a`, `dh.d`, `com`, `tool.xyz`", _measure_lengths,
-        size="over the largest radius of gyration", high=30, usual=0.8,
+    Rule("lengths", "`dh.a`, `dh.d`, `com`, `xyz` of `mount`, `tool`, `tools`", _measure_lengths,
+        size="over the largest radius of gyration; of mounts on the base, over the reach", high=30, usual=0.8,
         reason="real robots: up to 8",
-        finding="is {size} times the largest radius of gyration of a link, {gyration} m",
+        finding="is {size} times {reference}",
         units=(MILLIMETERS, CENTIMETERS)),
     Rule("densities of links", "`mass`, `inertia`",
         _measure_link_masses(lambda checked, index: density_of_sphere(checked.joints[index].link)),

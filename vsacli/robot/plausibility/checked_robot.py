@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.plausibility import Measured
-from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex
+from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex, numbers_in_record
 from vsacli.robot.joint import Joint, Link, Pose
+
+if TYPE_CHECKING:
+    from vsacli.robot.model import Robot
 
 WEIGHT_PER_MASS = 9.81
 """Gravity, m/s^2; loads are compared with the weight on earth, also of robots in space."""
@@ -40,15 +43,17 @@ def unloaded_stiffness_range(joint: Joint) -> UnloadedStiffnessRange | None:
 
 @dataclass(frozen=True)
 class CheckedRobot:
-    """A robot with the data that plausibility rules need.
+    """A robot with the data that plausibility rules need; of one with several joints on its base, a subtree.
 
     Attributes:
         joints: joints, each after the one that carries it.
         parents: index of the joint whose link carries each joint; -1 for frame 0.
         base: pose of DH frame 0 in the base frame.
         gravity: gravity acceleration in the base frame, m/s^2.
-        numbers: all numbers of the file.
+        numbers: all numbers of the file that concern it.
         placeholder: whether springs and motors are placeholders.
+        numbers_in_robot: index of each joint in the whole robot.
+        tools: indices of its tools in the whole robot.
     """
 
     joints: tuple[Joint, ...]
@@ -57,11 +62,19 @@ class CheckedRobot:
     gravity: tuple[float, float, float]
     numbers: tuple[NumberAtPath, ...]
     placeholder: bool
+    numbers_in_robot: tuple[int, ...]
+    tools: tuple[int, ...]
 
     @cached_property
     def sizes(self) -> BodySizes:
         """Body sizes of the robot."""
-        return BodySizes(self.joints)
+        return BodySizes(self.joints, self.parents)
+
+    @property
+    def distance_from_base_frame(self) -> float:
+        """Largest distance of the first joint from the origin of the base frame, m."""
+        mount = self.joints[0].mount or Pose()
+        return math.hypot(*self.base.xyz) + math.hypot(*mount.xyz)
 
     @cached_property
     def unloaded_ranges(self) -> tuple[UnloadedStiffnessRange | None, ...]:
@@ -84,6 +97,39 @@ class CheckedRobot:
         if path[0] != "joints" or not isinstance(path[1], PathIndex):
             return "revolute"
         return self.joints[path[1].number].type
+
+
+def checked_subtrees(robot: Robot) -> tuple[CheckedRobot, ...]:
+    """Return the data of each of `Robot.subtrees`."""
+    numbers = tuple(numbers_in_record(robot))
+    return tuple(_checked_subtree(robot, joints, numbers) for joints in robot.subtrees)
+
+
+def _checked_subtree(robot: Robot, joints: tuple[int, ...], numbers: Sequence[NumberAtPath]) -> CheckedRobot:
+    """Return the data of some joints, which are renumbered; numbers of the whole robot stay with them."""
+    place = {-1: -1, **{number: index for index, number in enumerate(joints)}}
+    tools = tuple(tool for tool, joint in enumerate(robot.tool_joints) if joint in place)
+    inside = []
+    for number in numbers:
+        match number.path:
+            case ("joints", PathIndex(joint, name), *inner):
+                if joint in place:
+                    path = ("joints", PathIndex(place[joint], name), *inner)
+                    inside.append(number._replace(path=path))
+            case ("tools", PathIndex(tool), *_) if tool not in tools:
+                pass
+            case _:
+                inside.append(number)
+    return CheckedRobot(
+        tuple(robot.joints[joint] for joint in joints),
+        tuple(place[robot.parents[joint]] for joint in joints),
+        robot.base,
+        robot.gravity,
+        tuple(inside),
+        robot.placeholder,
+        joints,
+        tools,
+    )
 
 
 def joint_path(number: int, joint: Joint, *steps: str | PathIndex) -> NumberPath:
@@ -110,8 +156,9 @@ class BodySizes:
 
     Attributes:
         gyrations: radius of gyration of each link about its center of mass, m; 0 without mass or inertia.
-        reach: reach of the stretched robot, m, to the end of its rows or its farthest center of mass.
-        levers: distance from each joint to the farthest point of the stretched robot, m.
+        reach: reach of the stretched robot, m, to the end of its rows or its farthest center of mass; mounts
+            count as lengths, but on the base, from where the reach is measured.
+        levers: distance from each joint to the farthest point of its branches of the stretched robot, m.
         mass: mass of all links, kg.
         inertias: inertia of each link alone about its joint, kg m^2; for a prismatic joint the mass, kg.
         moved_inertias: inertia of all links that a joint of the stretched robot moves, kg m^2; for a
@@ -119,21 +166,28 @@ class BodySizes:
         loads: largest torque of the weight at each joint of the stretched robot, N m (N).
     """
 
-    def __init__(self, joints: Sequence[Joint]) -> None:
+    def __init__(self, joints: Sequence[Joint], parents: Sequence[int]) -> None:
         masses = np.array([joint.link.mass for joint in joints], dtype=np.float64)
         lengths = np.array([math.hypot(joint.dh.a, joint.dh.d) for joint in joints])
-        before = np.cumsum(lengths) - lengths
+        mounts = [math.hypot(*(joint.mount or Pose()).xyz) for joint in joints]
+        before = np.zeros(len(joints))
+        for joint, parent in enumerate(parents):
+            if parent >= 0:
+                before[joint] = before[parent] + lengths[parent] + mounts[joint]
         coms = np.array([_com_distance(joint) for joint in joints])
         extents = before + coms
         self.gyrations = np.array([_radius_of_gyration(joint.link) for joint in joints])
-        self.reach = float(max(np.max(extents), np.sum(lengths)))
-        self.levers = self.reach - before
-        mass, moment = _sums_from_tip(masses), _sums_from_tip(masses * extents)
+        farthest = np.maximum(extents, before + lengths)
+        self.reach = float(np.max(farthest))
+        self.levers = _largest_along_branches(farthest, parents) - before
+        mass, moment = _sums_from_tips(masses, parents), _sums_from_tips(masses * extents, parents)
         self.mass = float(mass[0])
         revolute = np.array([joint.is_revolute for joint in joints])
         self.inertias = masses * np.where(revolute, coms**2 + self.gyrations**2, 1.0)
         turned = (
-            _sums_from_tip(masses * (extents**2 + self.gyrations**2)) - 2 * before * moment + before**2 * mass
+            _sums_from_tips(masses * (extents**2 + self.gyrations**2), parents)
+            - 2 * before * moment
+            + before**2 * mass
         )
         self.moved_inertias = np.where(revolute, turned, mass)
         self.loads = WEIGHT_PER_MASS * np.where(revolute, moment - before * mass, mass)
@@ -153,10 +207,28 @@ class BodySizes:
         return self.weight * (self.extent if joint.is_revolute else 1.0)
 
 
-def _sums_from_tip(values: FloatArray) -> FloatArray:
-    """Return the sums from each entry to the last."""
-    sums: FloatArray = np.cumsum(values[::-1])[::-1]
-    return sums
+def _sums_from_tips(values: FloatArray, parents: Sequence[int]) -> FloatArray:
+    """Return the sum over each joint and those it carries."""
+    return _from_tips(np.add, values, parents)
+
+
+def _largest_along_branches(values: FloatArray, parents: Sequence[int]) -> FloatArray:
+    """Return the largest value of each joint, those that carry it, and those it carries."""
+    largest = _from_tips(np.maximum, values, parents)
+    carriers = values.copy()
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            carriers[joint] = max(carriers[joint], carriers[parent])
+    return np.maximum(largest, carriers)
+
+
+def _from_tips(combine: Callable[[Any, Any], Any], values: FloatArray, parents: Sequence[int]) -> FloatArray:
+    """Return the values of each joint combined with those of the joints it carries."""
+    combined = values.copy()
+    for joint in reversed(range(len(parents))):
+        if parents[joint] >= 0:
+            combined[parents[joint]] = combine(combined[parents[joint]], combined[joint])
+    return combined
 
 
 def _com_distance(joint: Joint) -> float:

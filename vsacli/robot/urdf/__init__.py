@@ -1,4 +1,4 @@
-"""Import of URDF files: a serial chain as a robot file with standard Denavit-Hartenberg rows."""
+"""Import of URDF files: a chain or tree of joints as a robot file with standard Denavit-Hartenberg rows."""
 
 from vsacli.robot.urdf.conversion import Conversion, import_urdf
 from vsacli.robot.urdf.placeholders import Placeholders

@@ -1,7 +1,7 @@
-"""Conversion of a serial chain of a URDF to a robot, with a report on parts left out and changed.
+"""Conversion of a URDF to a robot, with a report on parts left out and changed.
 
-The steps: read the file, find the chain, place Denavit-Hartenberg frames, move inertias into them, size
-placeholder actuators, and compare the forward kinematics of robot and URDF.
+The steps: read the file, choose the joints that move, place Denavit-Hartenberg frames, move inertias into
+them, size placeholder actuators, and compare the forward kinematics of robot and URDF.
 """
 
 from __future__ import annotations
@@ -18,10 +18,20 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InvalidRecordError, Problem
-from vsacli.base.texts import as_name, one_line
+from vsacli.base.texts import as_name, counted, joined, listed, one_line
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import quoted
-from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Inertia, Joint, Limits, Link, Pose
+from vsacli.robot.joint import (
+    FRAME_0,
+    UNBOUNDED,
+    DenavitHartenberg,
+    Inertia,
+    Joint,
+    Limits,
+    Link,
+    Pose,
+    Tool,
+)
 from vsacli.robot.model import Robot
 from vsacli.robot.urdf.dh import (
     SNAP_ANGLE,
@@ -34,16 +44,16 @@ from vsacli.robot.urdf.dh import (
     tidy_angle,
 )
 from vsacli.robot.urdf.link_tree import POSITION_LIMITS, RigidBody, UrdfJoint, inverse_pose, roll_pitch_yaw
-from vsacli.robot.urdf.placeholders import JointLoad, Placeholders, largest_joint_loads
-from vsacli.robot.urdf.reader import read_urdf
-from vsacli.robot.urdf.serial_chain import (
+from vsacli.robot.urdf.moving_tree import (
     STANDARD_GRAVITY,
-    ChainJoint,
     HeldJoint,
     Hold,
-    SerialChain,
-    serial_chain,
+    MovingJoint,
+    MovingTree,
+    moving_tree,
 )
+from vsacli.robot.urdf.placeholders import JointLoad, Placeholders, largest_joint_loads
+from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.srdf import ends_of_group
 
 EXACT_RESIDUAL = 1e-9
@@ -51,6 +61,9 @@ EXACT_RESIDUAL = 1e-9
 
 SMALLEST_RESIDUAL = 1e-12
 """Smallest residual reported, m and rad; smaller ones differ between machines."""
+
+MOST_ENDS = 12
+"""Most links that a note names as other possible tools."""
 
 _HEADER = ("joint", "a/m", "alpha/rad", "d/m", "theta/rad", "mass/kg", "links")
 
@@ -61,17 +74,17 @@ class Conversion:
 
     Attributes:
         file: path of the URDF as given.
-        chain: chain of the URDF; `chain.joints` correspond to `robot.joints` in order.
+        tree: moving joints of the URDF; `tree.joints` correspond to `robot.joints` in order.
         robot: converted robot.
         placeholders: requested actuators.
         loads: largest load of each joint, to which its actuator was sized.
         snaps: axes that were made parallel.
-        residual: deviation of the robot's tip from the chain's.
+        residual: deviation of the robot's tools from the URDF's tips.
         file_warnings: words of the file that are ignored, and implausible orientations, by line.
     """
 
     file: str
-    chain: SerialChain
+    tree: MovingTree
     robot: Robot
     placeholders: Placeholders
     loads: tuple[JointLoad, ...]
@@ -89,37 +102,54 @@ class Conversion:
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        robot, count = self.robot, len(self.robot.joints)
-        joints = f"{count} joint{'s' if count > 1 else ''}"
-        yield f"{robot.name}: {joints} from {self.chain.base} to {self.chain.tip}"
+        robot, tips = self.robot, ", ".join(tip.link for tip in self.tree.tips)
+        yield f"{robot.name}: {counted(len(robot.joints), 'joint')} from {self.tree.base} to {tips}"
         yield from _align_dh_table(self._rows())
         yield f"total mass of the moving links: {sum(joint.link.mass for joint in robot.joints):.6g} kg"
-        yield _describe_residual(self.residual)
+        yield self._describe_residual()
         yield from (f"warning: {warning}" for warning in self.warnings())
         yield from self.notes()
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
-        yield _HEADER
-        for joint, origin in zip(self.robot.joints, self.chain.joints, strict=True):
+        is_tree = self.tree.shape == "tree"
+        yield (_HEADER[0], *(["on"] if is_tree else []), *_HEADER[1:])
+        for joint, origin in zip(self.robot.joints, self.tree.joints, strict=True):
             row = (joint.dh.a, joint.dh.alpha, joint.dh.d, joint.dh.theta, joint.link.mass)
             further = len(origin.links) - 1
             carried = origin.links[0].name + (f" + {further}" if further else "")
-            yield (joint.name, *(f"{number:.6g}" for number in row), carried)
+            carrying = self.robot.joints[origin.parent].name if origin.parent >= 0 else "base"
+            seat = [carrying if joint.mount is None else f"{carrying}, mounted"] if is_tree else []
+            yield (joint.name, *seat, *(f"{number:.6g}" for number in row), carried)
+
+    def _describe_residual(self) -> str:
+        verdict = "the same as" if max(self.residual) <= EXACT_RESIDUAL else "not quite"
+        position, orientation = (max(error, SMALLEST_RESIDUAL) for error in self.residual)
+        ends = "tip" if len(self.tree.tips) == 1 else "tools"
+        errors = f"{position:.1e} m and {orientation:.1e} rad"
+        return f"forward kinematics: {verdict} the URDF's, the {ends} within {errors}"
 
     def warnings(self) -> Iterator[str]:
         """Yield sentences about implausible values, and parts of the file that are ignored."""
         yield from map(str, self.file_warnings)
-        yield from (warning for held in self.chain.held for warning in held.warnings())
+        for joint in self.tree.immobile:
+            reason = "a robot file has no such joint, so that what it carries does not move with it"
+            yield f"{joint.name} is {joint.type}, and held at zero: {reason}"
+        yield from (warning for held in self.tree.held for warning in held.warnings())
         yield from self.robot.warnings
 
     def notes(self) -> Iterator[str]:
         """Yield sentences on parts left out or changed."""
-        yield from _describe_held_joints("below the base", self.chain.held_below)
-        yield from _describe_held_joints("outside the chain, their links lumped", self.chain.held_beside)
+        outside = f"outside the {self.tree.shape}"
+        yield from _describe_held_joints("below the base", self.tree.held_below)
+        yield from _describe_held_joints(f"{outside}, their links lumped", self.tree.held_beside)
         if followers := [
-            f"{each.name} (follows {each.mimic.leader})" for each in self.chain.followers if each.mimic
+            f"{each.name} (follows {each.mimic.leader})" for each in self.tree.followers if each.mimic
         ]:
-            yield f"outside the chain, following it without mass, so without torque: {', '.join(followers)}"
+            yield f"{outside}, following it without mass, so without torque: {', '.join(followers)}"
+        for tip in self.tree.tips:
+            if tip.beyond:
+                others = listed(tip.beyond, MOST_ENDS)
+                yield f"tool at {tip.link}, beyond which several links end; choose others by --tip: {others}"
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
         yield from self._of_motors()
@@ -130,15 +160,15 @@ class Conversion:
 
     def _left_out(self) -> Iterator[tuple[UrdfJoint, str, str]]:
         """Yield properties of moving joints that are not taken over, and position limits of held ones."""
-        for joint in (*(joint.urdf for joint in self.chain.joints), *self.chain.followers):
+        for joint in (*(joint.urdf for joint in self.tree.joints), *self.tree.followers):
             yield from ((joint, *entry) for entry in dict.fromkeys(joint.left_out))
-        for joint in (held.urdf for held in self.chain.held):
+        for joint in (held.urdf for held in self.tree.held):
             yield from ((joint, *entry) for entry in joint.left_out if entry[0].startswith(POSITION_LIMITS))
-        yield from ((joint, "damping left out", "") for joint in self.chain.followers if joint.damping)
+        yield from ((joint, "damping left out", "") for joint in self.tree.followers if joint.damping)
 
     def _of_motors(self) -> Iterator[str]:
         """Yield notes on effort limits and gears, which apply to a single motor."""
-        joints = [joint.urdf for joint in self.chain.joints]
+        joints = [joint.urdf for joint in self.tree.joints]
         motor_data = {
             "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
             "gear reductions": [f"{joint.name} {joint.gear_ratio:g}" for joint in joints if joint.gear_ratio],
@@ -158,13 +188,6 @@ def _describe_held_joints(place: str, joints: Sequence[HeldJoint]) -> Iterator[s
         yield f"held {place}: {', '.join(elsewhere)}"
 
 
-def _describe_residual(residual: KinematicResidual) -> str:
-    verdict = "the same as" if max(residual) <= EXACT_RESIDUAL else "not quite"
-    position, orientation = (max(error, SMALLEST_RESIDUAL) for error in residual)
-    errors = f"{position:.1e} m and {orientation:.1e} rad"
-    return f"forward kinematics: {verdict} the URDF's, the tip within {errors}"
-
-
 def _align_dh_table(rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
     """Yield the lines of a table with aligned columns, numbers right-aligned."""
     table = list(rows)
@@ -181,78 +204,120 @@ NEGLIGIBLE_INERTIA = 1e-15
 def import_urdf(
     path: str | os.PathLike[str],
     base: str | None = None,
-    tip: str | None = None,
+    tip: str | Sequence[str] | None = None,
     placeholders: Placeholders | None = None,
     snap: float = SNAP_ANGLE,
     hold: Hold | None = None,
     srdf: str | os.PathLike[str] | None = None,
     group: str | None = None,
 ) -> Conversion:
-    """Convert a serial chain of a URDF file to a robot.
+    """Convert a URDF file to a robot: all joints below a link, or those between it and one or more tips.
 
     Args:
         path: path of the URDF file.
         base: name of the fixed link; the root by default.
-        tip: name of the end effector's link; by default the only possible one.
+        tip: name of the end effector's link, or several names; by default the end of each branch.
         placeholders: actuators, which a URDF does not describe; by default sized to their loads.
         snap: angle, rad; axes closer to parallel are made parallel if their common normal is far away.
-        hold: positions of joints not on the chain, by name, in rad (m) or as "30 deg"; zero for others.
-        srdf: path of an SRDF file, a group of which gives base and tip if these are not given.
+        hold: positions of joints that are held, by name, in rad (m) or as "30 deg". Without `tip`, all other
+            joints move that have a drive; else joints outside the path to a tip are held at zero by default.
+        srdf: path of an SRDF file, a group of which gives base and tips if these are not given.
         group: name of the group; the only one by default.
 
     Raises:
-        InputError: the file is not a URDF, has no such chain, or joints cannot be held as requested.
+        InputError: the file is not a URDF, has no such joints, or joints cannot be held as requested.
     """
     file, chosen = os.fspath(path), placeholders or Placeholders()
     urdf = read_urdf(path)
+    tips = (tip,) if isinstance(tip, str) else tuple(tip or ())
     if srdf is not None:
         ends = ends_of_group(srdf, group, urdf)
-        base, tip = base or ends.base, tip or ends.tip
-    chain = serial_chain(urdf, base, tip, hold)
-    frames = dh_frames(chain.joints, chain.tip_pose, snap)
-    links = _convert_links(file, chain.joints, frames)
-    loads = largest_joint_loads(chain.joints, frames.rows, links)
+        base, tips = base or ends.base, tips or ends.tips
+    tree = moving_tree(urdf, base, tips, hold)
+    frames = dh_frames(tree.joints, tree.tips, snap)
+    mounts = _mounts(tree.joints, frames)
+    links = _convert_links(file, tree.joints, frames)
+    loads = largest_joint_loads(tree.joints, frames.rows, mounts, links)
     actuators = [
         ACTUATORS[chosen.actuator].placeholder(chosen.constants(joint, load))
-        for joint, load in zip(chain.joints, loads, strict=True)
+        for joint, load in zip(tree.joints, loads, strict=True)
     ]
-    robot = _assemble_robot(file, chain, frames, links, actuators)
-    residual = kinematic_residual(chain, robot)
-    return Conversion(file, chain, robot, chosen, tuple(loads), frames.snaps, residual, urdf.warnings)
+    robot = _assemble_robot(file, tree, frames, mounts, links, actuators)
+    residual = kinematic_residual(tree, robot)
+    return Conversion(file, tree, robot, chosen, tuple(loads), frames.snaps, residual, urdf.warnings)
+
+
+def _mounts(joints: Sequence[MovingJoint], frames: Frames) -> list[Pose | None]:
+    """Return where each row begins in the frame of the link that carries the joint; None if at it."""
+    carrying = [frames.base if joint.parent < 0 else frames.poses[joint.parent] for joint in joints]
+    seats = zip(carrying, frames.seats, strict=True)
+    poses = [_tidy_pose(inverse_pose(frame) @ seat, frames.scale) for frame, seat in seats]
+    return [None if pose == Pose() else pose for pose in poses]
 
 
 def _assemble_robot(
-    path: str, chain: SerialChain, frames: Frames, links: Sequence[Link], actuators: Sequence[Actuator]
+    path: str,
+    tree: MovingTree,
+    frames: Frames,
+    mounts: Sequence[Pose | None],
+    links: Sequence[Link],
+    actuators: Sequence[Actuator],
 ) -> Robot:
-    names = identifiers([joint.urdf.name for joint in chain.joints])
-    parts = zip(names, chain.joints, frames.rows, links, actuators, strict=True)
-    x, y, z = (-STANDARD_GRAVITY * tidy(chain.up, 1.0) + 0.0).tolist()
+    names = identifiers([joint.urdf.name for joint in tree.joints])
+    x, y, z = (-STANDARD_GRAVITY * tidy(tree.up, 1.0) + 0.0).tolist()
+    tool, *others = tools = _convert_tips(tree, frames, names)
     return Robot(
-        name=as_name(chain.robot_name),
-        description=_describe_origin(path, chain),
+        name=as_name(tree.robot_name),
+        description=_describe_origin(path, tree),
         placeholder=True,
         gravity=(x, y, z),
         base=_tidy_pose(frames.base, frames.scale),
-        tool=_tidy_pose(frames.tool, frames.scale),
-        joints=tuple(_convert_joint(*part) for part in parts),
+        tool=Pose() if others else Pose(xyz=tool.xyz, rpy=tool.rpy),
+        joints=tuple(
+            _convert_joint(number, names, *parts)
+            for number, parts in enumerate(
+                zip(tree.joints, mounts, frames.rows, links, actuators, strict=True)
+            )
+        ),
+        tools=tuple(tools) if others else (),
     )
 
 
-def _describe_origin(path: str, chain: SerialChain) -> str:
+def _convert_tips(tree: MovingTree, frames: Frames, joint_names: Sequence[str]) -> list[Tool]:
+    names = identifiers([tip.link for tip in tree.tips])
+    poses = [_tidy_pose(pose, frames.scale) for pose in frames.tools]
+    return [
+        Tool(name=name, joint=joint_names[tip.joint], xyz=pose.xyz, rpy=pose.rpy)
+        for name, tip, pose in zip(names, tree.tips, poses, strict=True)
+    ]
+
+
+def _describe_origin(path: str, tree: MovingTree) -> str:
     """Return a description of the robot's origin, with joints held elsewhere than at zero."""
-    held = [f", {each}" for each in chain.held if each.position != 0 and not each.follows]
-    origin = f"converted from {one_line(os.path.basename(path))}, from link {chain.base} to link {chain.tip}"
+    held = [f", {each}" for each in tree.held if each.position != 0 and not each.follows]
+    tips = [tip.link for tip in tree.tips]
+    ends = f"{'link' if len(tips) == 1 else 'links'} {joined(tips)}"
+    origin = f"converted from {one_line(os.path.basename(path))}, from link {tree.base} to {ends}"
     return f"{origin}{''.join(held)}"
 
 
 def _convert_joint(
-    name: str, joint: ChainJoint, dh: DenavitHartenberg, link: Link, actuator: Actuator
+    number: int,
+    names: Sequence[str],
+    joint: MovingJoint,
+    mount: Pose | None,
+    dh: DenavitHartenberg,
+    link: Link,
+    actuator: Actuator,
 ) -> Joint:
     limit = joint.urdf.limit
     speed = limit.velocity
+    carrying = names[joint.parent] if joint.parent >= 0 else FRAME_0
     return Joint(
-        name=name,
+        name=names[number],
         type="revolute" if joint.is_revolute else "prismatic",
+        parent=None if joint.parent == number - 1 else carrying,
+        mount=mount,
         dh=dh,
         link=link,
         damping=joint.urdf.damping,
@@ -264,7 +329,7 @@ def _convert_joint(
     )
 
 
-def _convert_links(path: str, joints: Sequence[ChainJoint], frames: Frames) -> list[Link]:
+def _convert_links(path: str, joints: Sequence[MovingJoint], frames: Frames) -> list[Link]:
     """Return the links that each joint moves, in its Denavit-Hartenberg frame.
 
     Raises:

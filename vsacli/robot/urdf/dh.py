@@ -1,4 +1,4 @@
-"""Denavit-Hartenberg rows of a URDF's chain by common normals, and the deviation of the resulting robot.
+"""Denavit-Hartenberg rows of a URDF's joints by common normals, and the deviation of the resulting robot.
 
 Numbers that are short ones, or multiples of pi/2, but for rounding in the file are replaced by these.
 """
@@ -6,25 +6,25 @@ Numbers that are short ones, or multiples of pi/2, but for rounding in the file 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.robot.joint import DenavitHartenberg, Pose
-from vsacli.robot.kinematics import frames
+from vsacli.robot.joint import DenavitHartenberg
+from vsacli.robot.kinematics import forward_kinematics
 from vsacli.robot.model import Robot
-from vsacli.robot.urdf.link_tree import inverse_pose, pose_matrix, transform
-from vsacli.robot.urdf.serial_chain import ChainJoint, SerialChain
+from vsacli.robot.urdf.link_tree import inverse_pose, transform
+from vsacli.robot.urdf.moving_tree import MovingJoint, MovingTree, Tip
 
 SNAP_ANGLE = 1e-4
 """Default angle, rad; axes closer to parallel are made parallel if their common normal is far away."""
 
 FAR_NORMAL = 10.0
-"""Distance of a common normal from the joints, m, up to which no axis is made parallel at any angle."""
+"""Distance of a common normal from the joints, m, up to which no axis is made parallel at any angle, and a
+link with several joints may have its frame on it."""
 
 FILE_ROUNDING = 1e-11
 """Rounding of the file: difference from a right angle, rad, or from a short number, over the largest one."""
@@ -49,49 +49,72 @@ class Snap(NamedTuple):
 
 @dataclass(frozen=True)
 class Frames:
-    """The frames of a chain at position zero.
+    """The frames of a robot at position zero.
 
     Attributes:
         base: pose of frame 0 in the base, (4, 4).
-        rows: rows from each frame to the next.
-        poses: poses of frames 1 to N in the base, each (4, 4).
-        tool: pose of the tip in frame N, (4, 4).
+        seats: poses in the base of the frames at which the rows begin, each (4, 4).
+        rows: row of each joint, from its seat to its link frame.
+        poses: poses of the link frames 1 to N in the base, each (4, 4).
+        tools: pose of each tip in the frame of its link, (4, 4).
         snaps: axes that were made parallel.
         scale: largest coordinate, m.
     """
 
     base: FloatArray
+    seats: tuple[FloatArray, ...]
     rows: tuple[DenavitHartenberg, ...]
     poses: tuple[FloatArray, ...]
-    tool: FloatArray
+    tools: tuple[FloatArray, ...]
     snaps: tuple[Snap, ...]
     scale: float
 
 
-def dh_frames(joints: Sequence[ChainJoint], tip: FloatArray, snap: float) -> Frames:
-    """Return the Denavit-Hartenberg frames of a chain.
+def dh_frames(joints: Sequence[MovingJoint], tips: Sequence[Tip], snap: float) -> Frames:
+    """Return the Denavit-Hartenberg frames of a chain or tree.
+
+    The frame of a link is the seat of the first joint on it whose common normal is near; the seats of others
+    do not depend on that choice. So another order of the joints changes the frames of the links that carry
+    several, and nothing else.
 
     Args:
         joints: joints from the base.
-        tip: pose of the tip in the base at position zero, (4, 4).
+        tips: links of the end effectors.
         snap: angle, rad, below which axes are made parallel.
     """
-    axes, snaps = _make_parallel(joints, _axes(joints), snap)
-    frame = _first_frame(axes[0])
-    poses = [frame]
-    for axis in axes[1:]:
-        frame = _next_frame(frame, axis)
-        poses.append(frame)
-    poses.append(_last_frame(frame, tip))
-    scale = float(max(abs(pose[:3, 3]).max() for pose in (*poses, tip)))
+    children = _joints_on_links(joints)
+    axes, snaps = _make_parallel(joints, _axes(joints, children), children, snap)
+    is_near = [
+        joint.parent < 0 or len(children[joint.parent]) == 1 or not _normal_is_far(axes[joint.parent], axis)
+        for joint, axis in zip(joints, axes, strict=True)
+    ]
+    seats: list[FloatArray] = []
+    for joint, axis, near in zip(joints, axes, is_near, strict=True):
+        seats.append(_seat_on_axis(seats[joint.parent] if joint.parent >= 0 else None, axis, near))
+    poses: list[FloatArray] = []
+    for number, seat in enumerate(seats):
+        begun = [seats[child] for child in children[number] if is_near[child]]
+        ends = [_last_frame(seat, tip.pose) for tip in tips if tip.joint == number and not children[number]]
+        poses.append([*begun, *ends, seat][0])
+    scale = float(max(abs(pose[:3, 3]).max() for pose in (*seats, *poses, *(tip.pose for tip in tips))))
+    steps = (inverse_pose(seat) @ pose for seat, pose in zip(seats, poses, strict=True))
     return Frames(
-        base=poses[0],
-        rows=tuple(_dh_row(inverse_pose(pose) @ next_pose, scale) for pose, next_pose in pairwise(poses)),
-        poses=tuple(poses[1:]),
-        tool=inverse_pose(poses[-1]) @ tip,
+        base=seats[0],
+        seats=tuple(seats),
+        rows=tuple(_dh_row(step, scale) for step in steps),
+        poses=tuple(poses),
+        tools=tuple(inverse_pose(poses[tip.joint]) @ tip.pose for tip in tips),
         snaps=snaps,
         scale=scale,
     )
+
+
+def _joints_on_links(joints: Sequence[MovingJoint]) -> dict[int, list[int]]:
+    """Return the indices of the joints on the link of each joint, those on the base under -1."""
+    children: dict[int, list[int]] = {number: [] for number in range(-1, len(joints))}
+    for number, joint in enumerate(joints):
+        children[joint.parent].append(number)
+    return children
 
 
 def tidy(numbers: FloatArray, scale: float) -> FloatArray:
@@ -111,33 +134,46 @@ def tidy_angle(angle: float) -> float:
     return nearest if abs(angle - nearest) <= FILE_ROUNDING else angle
 
 
-def _axes(joints: Sequence[ChainJoint]) -> list[Axis]:
-    """Return the axes; a prismatic joint's, whose location is arbitrary, passes through the next joint."""
-    axes: list[Axis] = []
-    for joint in reversed(joints):
-        point = axes[-1].point if axes and not joint.is_revolute else joint.origin
-        axes.append(Axis(point, joint.direction))
-    return axes[::-1]
+def _axes(joints: Sequence[MovingJoint], children: Mapping[int, Sequence[int]]) -> list[Axis]:
+    """Return the axes; a prismatic joint's, whose location is arbitrary, passes through the only next one."""
+    axes: dict[int, Axis] = {}
+    for number, joint in reversed(list(enumerate(joints))):
+        further = children[number]
+        point = axes[further[0]].point if len(further) == 1 and not joint.is_revolute else joint.origin
+        axes[number] = Axis(point, joint.direction)
+    return [axes[number] for number in range(len(joints))]
 
 
 def _make_parallel(
-    joints: Sequence[ChainJoint], axes: Sequence[Axis], snap: float
+    joints: Sequence[MovingJoint], axes: Sequence[Axis], children: Mapping[int, Sequence[int]], snap: float
 ) -> tuple[list[Axis], tuple[Snap, ...]]:
-    """Return the axes, rotated about their own points if nearly parallel to the ones before."""
-    result, snaps = [axes[0]], []
-    for joint, axis in zip(joints[1:], axes[1:], strict=True):
-        before = result[-1]
-        sine = float(np.linalg.norm(np.cross(before.direction, axis.direction)))
-        if sine <= FILE_ROUNDING or (sine < snap and _normal_is_far(before, axis)):
-            direction = before.direction * math.copysign(1, before.direction @ axis.direction)
-            axis = Axis(axis.point, direction)
-            snaps += [Snap(joint.urdf.name, sine)] if sine > FILE_ROUNDING else []
+    """Return the axes, rotated about their own points if nearly parallel to the ones before.
+
+    Of several joints on a link, a mount takes those whose common normal is far away.
+    """
+    result: list[Axis] = []
+    snaps: list[Snap] = []
+    for joint, axis in zip(joints, axes, strict=True):
+        if joint.parent >= 0:
+            before = result[joint.parent]
+            sine = _sine_between(before, axis)
+            is_only = len(children[joint.parent]) == 1
+            if sine <= FILE_ROUNDING or (is_only and sine < snap and _normal_is_far(before, axis)):
+                direction = before.direction * math.copysign(1, before.direction @ axis.direction)
+                axis = Axis(axis.point, direction)
+                snaps += [Snap(joint.urdf.name, sine)] if sine > FILE_ROUNDING else []
         result.append(axis)
     return result, tuple(snaps)
 
 
+def _sine_between(first: Axis, second: Axis) -> float:
+    return float(np.linalg.norm(np.cross(first.direction, second.direction)))
+
+
 def _normal_is_far(first: Axis, second: Axis) -> bool:
-    return max(map(abs, _common_normal_feet(first, second))) > FAR_NORMAL
+    """Return whether the common normal is far away; that of parallel axes is not."""
+    is_parallel = _sine_between(first, second) <= FILE_ROUNDING
+    return not is_parallel and max(map(abs, _common_normal_feet(first, second))) > FAR_NORMAL
 
 
 def _common_normal_feet(first: Axis, second: Axis) -> tuple[float, float]:
@@ -151,17 +187,35 @@ def _common_normal_feet(first: Axis, second: Axis) -> tuple[float, float]:
     )
 
 
-def _first_frame(axis: Axis) -> FloatArray:
-    """Return the frame on the first axis with origin and x axis closest to the base frame's."""
-    origin = axis.point - (axis.point @ axis.direction) * axis.direction
-    x, y, _ = np.eye(3)
-    reference = x if abs(axis.direction[0]) < math.sqrt(0.5) else y
-    return _frame_from_axes(axis.direction, _perpendicular_part(reference, axis.direction), origin)
+def _axis_of(frame: FloatArray) -> Axis:
+    """Return the z axis of a frame."""
+    return Axis(frame[:3, 3], frame[:3, 2])
+
+
+def _seat_on_axis(carrying: FloatArray | None, axis: Axis, is_near: bool) -> FloatArray:
+    """Return the frame at which the row of a joint begins: on its axis, where the frames before suggest.
+
+    Args:
+        carrying: seat of the joint before; None on the base.
+        axis: axis of the joint.
+        is_near: whether the common normal with the axis before is to be used.
+    """
+    if carrying is None:
+        origin = axis.point - (axis.point @ axis.direction) * axis.direction  # the closest to the base's
+        return _frame_facing(np.eye(4), Axis(origin, axis.direction))
+    return _next_frame(carrying, axis) if is_near else _frame_facing(carrying, axis)
+
+
+def _frame_facing(frame: FloatArray, axis: Axis) -> FloatArray:
+    """Return the frame at the point of an axis with the x axis closest to a frame's x axis, or its y axis."""
+    x, y = frame[:3, 0], frame[:3, 1]
+    reference = x if abs(axis.direction @ x) < math.sqrt(0.5) else y
+    return _frame_from_axes(axis.direction, _perpendicular_part(reference, axis.direction), axis.point)
 
 
 def _next_frame(frame: FloatArray, axis: Axis) -> FloatArray:
     """Return the frame on an axis, at the common normal with the z axis of the frame before."""
-    before = Axis(frame[:3, 3], frame[:3, 2])
+    before = _axis_of(frame)
     normal = np.cross(before.direction, axis.direction)
     if np.linalg.norm(normal) <= FILE_ROUNDING:
         return _parallel_frame(frame, axis)
@@ -232,22 +286,22 @@ DRAWN_HALF_WIDTH = {True: np.pi, False: 1.0}
 
 
 class KinematicResidual(NamedTuple):
-    """Largest distance, m, and angle, rad, between the tips, over random joint positions."""
+    """Largest distance, m, and angle, rad, between tools and tips, over random joint positions."""
 
     position: float
     orientation: float
 
 
-def kinematic_residual(chain: SerialChain, robot: Robot) -> KinematicResidual:
-    """Compare the tips of chain and robot at random positions within the limits."""
-    q = _random_joint_positions(chain.joints)
-    expected, tips = _chain_tips(chain, q), _robot_tips(robot, q)
-    shift = np.linalg.norm(tips[:, :3, 3] - expected[:, :3, 3], axis=1)
-    turn = np.linalg.norm(tips[:, :3, :3] - expected[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
+def kinematic_residual(tree: MovingTree, robot: Robot) -> KinematicResidual:
+    """Compare the tools of the robot with the tips of the URDF at random positions within the limits."""
+    q = _random_joint_positions(tree.joints)
+    expected, tools = _tip_poses(tree, q), forward_kinematics(robot, q)[:, len(robot.joints) :]
+    shift = np.linalg.norm(tools[..., :3, 3] - expected[..., :3, 3], axis=-1)
+    turn = np.linalg.norm(tools[..., :3, :3] - expected[..., :3, :3], axis=(-1, -2)) / np.sqrt(2)
     return KinematicResidual(float(shift.max()), float(turn.max()))
 
 
-def _random_joint_positions(joints: Sequence[ChainJoint]) -> FloatArray:
+def _random_joint_positions(joints: Sequence[MovingJoint]) -> FloatArray:
     """Return random positions, (samples, joints), rad (m)."""
     rng = np.random.default_rng(SEED)
     reach = np.array([DRAWN_HALF_WIDTH[joint.is_revolute] for joint in joints])
@@ -257,24 +311,10 @@ def _random_joint_positions(joints: Sequence[ChainJoint]) -> FloatArray:
     return rng.uniform(lower, upper, (SAMPLES, len(joints)))
 
 
-def _chain_tips(chain: SerialChain, q: FloatArray) -> FloatArray:
-    """Return the poses of the tip, (samples, 4, 4), by moving every joint in its own URDF frame."""
-    poses = np.broadcast_to(np.eye(4), (len(q), 4, 4))
-    before = np.eye(4)
-    for joint, positions in zip(chain.joints, q.T, strict=True):
-        poses = poses @ (inverse_pose(before) @ joint.frame) @ joint.urdf.motions(positions)
-        before = joint.frame
-    result: FloatArray = poses @ (inverse_pose(before) @ chain.tip_pose)
-    return result
-
-
-def _robot_tips(robot: Robot, q: FloatArray) -> FloatArray:
-    last = frames(robot, q).links[-1]
-    poses = np.tile(np.eye(4), (len(q), 1, 1))
-    poses[:, :3, :3], poses[:, :3, 3] = last.axes, last.origin
-    result: FloatArray = _matrix_of_pose(robot.base) @ poses @ _matrix_of_pose(robot.tool)
-    return result
-
-
-def _matrix_of_pose(pose: Pose) -> FloatArray:
-    return pose_matrix(pose.xyz, pose.rpy)
+def _tip_poses(tree: MovingTree, q: FloatArray) -> FloatArray:
+    """Return the poses of the tips, (samples, tips, 4, 4), by moving every joint in its own URDF frame."""
+    poses: list[FloatArray] = []  # motion of each joint's link from its pose at position zero
+    for joint, positions in zip(tree.joints, q.T, strict=True):
+        carrying = poses[joint.parent] if joint.parent >= 0 else np.eye(4)
+        poses.append(carrying @ joint.frame @ joint.urdf.motions(positions) @ inverse_pose(joint.frame))
+    return np.stack([poses[tip.joint] @ tip.pose for tip in tree.tips], axis=1)

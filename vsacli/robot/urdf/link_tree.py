@@ -1,9 +1,9 @@
-"""The links and joints of a URDF as a tree, rigid motions of their frames, and the path of a chain in it."""
+"""Links and joints of a URDF as a tree, rigid motions of their frames, and which joints move."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -250,39 +250,56 @@ def joints_below(link: str, joints: Iterable[UrdfJoint]) -> Iterator[UrdfJoint]:
             waiting.append(joint.child)
 
 
-MAX_TIPS = 12
-"""Most links that a message offers as tip."""
+class MovingJoints(NamedTuple):
+    """The joints that move, and the links between which they are.
 
-
-class ChainPath(NamedTuple):
-    """The joints from one link to another, fixed ones included."""
+    Attributes:
+        base: link that is fixed to the ground.
+        tips: links of the end effectors.
+        joints: joints, each after the one that carries it, branch by branch in the order of the file.
+        names: names of the joints.
+        whole: whether all joints below the base move that can, rather than those before chosen tips.
+        shape: "chain" or "tree".
+    """
 
     base: str
-    tip: str
+    tips: tuple[str, ...]
     joints: tuple[UrdfJoint, ...]
-
-    @property
-    def moving(self) -> tuple[UrdfJoint, ...]:
-        """Joints of the path that are not fixed."""
-        return tuple(joint for joint in self.joints if not joint.is_fixed)
+    names: tuple[str, ...]
+    whole: bool
+    shape: str
 
 
-def find_path(urdf: Urdf, base: str | None, tip: str | None) -> ChainPath:
-    """Return the path from a base link (None: the root) to a tip link (None: the only possible one).
+def choose_moving_joints(
+    urdf: Urdf, base: str | None, tips: Collection[str], held: Collection[str]
+) -> MovingJoints:
+    """Return the joints between a base link (None: the root) and tip links (none: the end of each branch).
+
+    Args:
+        urdf: robot.
+        base: name of the base link.
+        tips: names of the tip links.
+        held: names of joints that do not move although nothing else prevents it, if there are no `tips`.
 
     Raises:
         InputError: a link or path does not exist, or no joint moves on it.
     """
     start = urdf.root if base is None else _check_link_name(urdf, base, "--base")
-    end = _only_tip(urdf, start) if tip is None else _check_link_name(urdf, tip, "--tip")
-    path = _chain_between(urdf, start, end)
-    if start == end:
-        same = f"--base and --tip are the same link, {quoted(start)}"
-        raise InputError.one(f"{same}; choose a base nearer to the root, or a tip below it", urdf.file)
-    if not path.moving:
-        message = f"no joint moves between {quoted(start)} and {quoted(end)}; choose another base or tip"
-        raise InputError.one(message, urdf.file)
-    return path
+    chosen = tuple(dict.fromkeys(_check_link_name(urdf, tip, "--tip") for tip in tips))
+    names = {joint.name for tip in chosen for joint in _moving_between(urdf, start, tip)}
+    joints = _sort_by_branch(urdf, names if chosen else _joints_of_whole_robot(urdf, start, held))
+    if not joints:
+        raise InputError.one(f"no joint moves below {quoted(start)}", urdf.file)
+    last = _last_joints(urdf, joints)
+    ends = chosen or tuple(_end_of_fixed_links(urdf, joint.child) for joint in last)
+    return MovingJoints(
+        base=start,
+        tips=ends,
+        joints=joints,
+        names=tuple(joint.name for joint in joints),
+        whole=not chosen,
+        shape="chain" if len(last) == 1 else "tree",
+    )
 
 
 def _check_link_name(urdf: Urdf, name: str, option: str) -> str:
@@ -292,51 +309,85 @@ def _check_link_name(urdf: Urdf, name: str, option: str) -> str:
     return name
 
 
-def _chain_between(urdf: Urdf, base: str, tip: str) -> ChainPath:
+def _moving_between(urdf: Urdf, base: str, tip: str) -> list[UrdfJoint]:
+    """Return the joints of the path from one link to another that are not fixed."""
     above = urdf.joints_above(tip)
     links = [joint.parent for joint in above] + [tip]
     if base not in links:
         raise InputError.one(f"the link {quoted(tip)} does not hang below {quoted(base)}", urdf.file)
-    return ChainPath(base, tip, tuple(above[links.index(base) :]))
+    if base == tip:
+        same = f"--base and --tip are the same link, {quoted(base)}"
+        raise InputError.one(f"{same}; choose a base nearer to the root, or a tip below it", urdf.file)
+    moving = [joint for joint in above[links.index(base) :] if not joint.is_fixed]
+    if not moving:
+        message = f"no joint moves between {quoted(base)} and {quoted(tip)}; choose another base or tip"
+        raise InputError.one(message, urdf.file)
+    return moving
 
 
-def _only_tip(urdf: Urdf, base: str) -> str:
-    """Return the end of the only branch that moves; raise an InputError if it is ambiguous."""
-    leaves = {leaf: _chain_between(urdf, base, leaf).moving for leaf in _leaves(urdf, base)}
-    longest = max(leaves.values(), key=len, default=())
-    tips = [leaf for leaf, moving in leaves.items() if moving and moving == longest]
-    straight = all(moving == longest[: len(moving)] for moving in leaves.values())
-    if not longest:
-        raise InputError.one(f"no joint moves below {quoted(base)}", urdf.file)
-    if not straight or len(tips) > 1:
-        offered = [*_forks(urdf, base), *(leaf for leaf, moving in leaves.items() if moving)]
-        raise InputError.one(_describe_possible_tips(urdf, base, list(dict.fromkeys(offered))), urdf.file)
-    return tips[0]
+def _joints_of_whole_robot(urdf: Urdf, base: str, held: Collection[str]) -> set[str]:
+    """Return the names of joints below a link that have a drive of their own, and are not held.
+
+    Joints beyond one that follows such a joint without mass are none: they are on a branch that is left out.
+    Joints of several degrees of freedom are none on the base, where they are held; elsewhere they are, and
+    refused.
+    """
+    below = list(joints_below(base, urdf.joints.values()))
+    driven = {
+        joint.name
+        for joint in below
+        if joint.type in MOVING and joint.mimic is None and joint.name not in held
+    }
+    left_out = {
+        further.name
+        for joint in below
+        if joint.name not in driven and urdf.relation_to_leader(joint, held).leader in driven
+        if is_massless(urdf, joint)
+        for further in joints_below(joint.child, below)
+    }
+    refused = {
+        joint.name
+        for joint in below
+        if not (joint.is_fixed or joint.type in MOVING)
+        and any(above.name in driven for above in urdf.joints_above(joint.parent))
+    }
+    return (driven | refused) - left_out
 
 
-def _leaves(urdf: Urdf, base: str) -> list[str]:
-    joints = list(joints_below(base, urdf.joints.values()))
-    parents = {joint.parent for joint in joints}
-    return [joint.child for joint in joints if joint.child not in parents]
+def is_massless(urdf: Urdf, joint: UrdfJoint) -> bool:
+    """Return whether a joint moves links without mass only, so that it exerts no torque on its leader."""
+    links = [urdf.links[moved.child] for moved in (joint, *joints_below(joint.child, urdf.joints.values()))]
+    return not any(link.flaw or (link.body and (link.body.mass or link.body.inertia.any())) for link in links)
 
 
-def _forks(urdf: Urdf, base: str) -> Iterator[str]:
-    """Yield links beyond a moving joint at which more than one branch with moving joints begins."""
-    branches: dict[str, set[str]] = {}
-    for moving in (joint for joint in joints_below(base, urdf.joints.values()) if not joint.is_fixed):
-        for joint in _chain_between(urdf, base, moving.child).joints:
-            branches.setdefault(joint.parent, set()).add(joint.child)
-    for link, ways in branches.items():
-        if len(ways) > 1 and _chain_between(urdf, base, link).moving:
-            yield link
+def _sort_by_branch(urdf: Urdf, names: Collection[str]) -> tuple[UrdfJoint, ...]:
+    """Return joints depth first, siblings in the order of the file."""
+    number = {name: index for index, name in enumerate(urdf.joints)}
+    paths = {name: urdf.joints_above(urdf.joints[name].child) for name in names}
+    order = sorted(names, key=lambda name: [number[joint.name] for joint in paths[name]])
+    return tuple(urdf.joints[name] for name in order)
 
 
-def _describe_possible_tips(urdf: Urdf, base: str, tips: list[str]) -> str:
-    counts = [len(_chain_between(urdf, base, tip).moving) for tip in tips]
-    tip_phrases = [
-        f"{tip} ({count} joint{'s'[: count > 1]})" for tip, count in zip(tips, counts, strict=True)
-    ]
-    more = f" and {len(tip_phrases) - MAX_TIPS} more" if len(tip_phrases) > MAX_TIPS else ""
-    offered = ", ".join(tip_phrases[:MAX_TIPS])
-    which = f"several links below {quoted(base)} could be the end effector"
-    return f"{which}; choose one with --tip: {offered}{more}"
+def _last_joints(urdf: Urdf, joints: Sequence[UrdfJoint]) -> list[UrdfJoint]:
+    """Return the joints that carry no other of them."""
+    carrying = {above.name for joint in joints for above in urdf.joints_above(joint.parent)}
+    return [joint for joint in joints if joint.name not in carrying]
+
+
+def _end_of_fixed_links(urdf: Urdf, link: str) -> str:
+    """Return the last of the links that are fixed one to the other, before they branch."""
+    while len(fixed := fixed_links(urdf, link)) == 1:
+        (link,) = fixed
+    return link
+
+
+def fixed_links(urdf: Urdf, link: str) -> list[str]:
+    """Return the links that fixed joints connect to their parent link."""
+    return [joint.child for joint in urdf.joints.values() if joint.parent == link and joint.is_fixed]
+
+
+def fixed_ends(urdf: Urdf, link: str) -> list[str]:
+    """Return the last links of the branches of fixed joints on a link; none without branches."""
+    fixed: Iterable[UrdfJoint] = [joint for joint in urdf.joints.values() if joint.is_fixed]
+    links = [joint.child for joint in joints_below(link, fixed)]
+    return [each for each in links if not fixed_links(urdf, each)]

@@ -16,8 +16,8 @@ from typing import NamedTuple
 from vsacli.actuators.actuator import PlaceholderConstants
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.units import TORQUE
-from vsacli.robot.joint import DenavitHartenberg, Link
-from vsacli.robot.urdf.serial_chain import STANDARD_GRAVITY, ChainJoint
+from vsacli.robot.joint import DenavitHartenberg, Link, Pose
+from vsacli.robot.urdf.moving_tree import STANDARD_GRAVITY, MovingJoint
 
 DEFLECTION = {True: 0.1, False: 0.01}
 """Deflection of springs under the largest load, of revolute (rad) and prismatic (m) joints."""
@@ -60,7 +60,7 @@ class Placeholders(NamedTuple):
     stiffness: float | None = None
     spring: tuple[float, float] | None = None
 
-    def constants(self, joint: ChainJoint, load: JointLoad) -> PlaceholderConstants:
+    def constants(self, joint: MovingJoint, load: JointLoad) -> PlaceholderConstants:
         """Return the constants of a joint from its load, its effort limit, and its gear."""
         gear = joint.urdf.gear_ratio if ACTUATORS[self.actuator].motor_count == 1 else None
         by_load = load.constants(DEFLECTION[joint.is_revolute], gear or 1.0)
@@ -72,7 +72,7 @@ class Placeholders(NamedTuple):
             gear_ratio=gear,
         )
 
-    def origin(self, field: str, joint: ChainJoint, load: JointLoad) -> str:
+    def origin(self, field: str, joint: MovingJoint, load: JointLoad) -> str:
         """Return a clause on the origin of the numbers in a field of the actuator."""
         sized = {"motor": self.motor_inertia, "stiffness": self.stiffness, "spring": self.spring}
         if not load.is_there or sized.get(field, ()) is not None:
@@ -138,6 +138,10 @@ class _Masses(NamedTuple):
         second = self.second + (2 * self.first + self.mass * distance) * distance
         return _Masses(self.mass, self.first + self.mass * distance, second)
 
+    def plus(self, other: _Masses) -> _Masses:
+        """Return the moments of these bodies and others about the same point."""
+        return _Masses(self.mass + other.mass, self.first + other.first, self.second + other.second)
+
     def with_link(self, link: Link, distance: float) -> _Masses:
         """Return the moments with a further link, whose center of mass is at this distance."""
         moment = link.mass * distance
@@ -148,31 +152,43 @@ class _Masses(NamedTuple):
 
 
 def largest_joint_loads(
-    joints: Sequence[ChainJoint], rows: Sequence[DenavitHartenberg], links: Sequence[Link]
+    joints: Sequence[MovingJoint],
+    rows: Sequence[DenavitHartenberg],
+    mounts: Sequence[Pose | None],
+    links: Sequence[Link],
 ) -> list[JointLoad]:
     """Return the largest load of each joint over all configurations.
 
     Args:
         joints: joints from the base.
         rows: rows of the joints.
+        mounts: where the rows begin on the links that carry the joints; None if at their frames.
         links: links that the joints move.
     """
-    loads, beyond = [], _Masses()  # beyond joint i, as seen from the origin of frame i
-    for joint, row, link in zip(reversed(joints), reversed(rows), reversed(links), strict=True):
-        radius, height = _cylindrical_center_of_mass(row, link)
-        about_axis = beyond.farther(abs(row.a)).with_link(link, radius)
-        inertia = about_axis.second if joint.is_revolute else about_axis.mass
-        weight = STANDARD_GRAVITY * math.sqrt(about_axis.mass * inertia)
+    loads = []
+    about_axis = [_Masses()] * len(joints)  # of what the joints on a link carry, about the axis of the link
+    about_seat = list(about_axis)  # and about the origin of the frame at which the link's row begins
+    for number, (joint, row, link) in reversed(list(enumerate(zip(joints, rows, links, strict=True)))):
+        radius, distance = _largest_distances(joint, row, link.com)
+        moved = about_axis[number].with_link(link, radius)
+        inertia = moved.second if joint.is_revolute else moved.mass
+        weight = STANDARD_GRAVITY * math.sqrt(moved.mass * inertia)
         loads.append(JointLoad(weight + SLOW[joint.is_revolute] * joint.urdf.damping, inertia))
-        strokes = (0.0,) if joint.is_revolute else joint.urdf.limit.position or (0.0,)
-        length = math.hypot(row.a, max(abs(row.d + stroke) for stroke in strokes))
-        distance = math.hypot(radius, max(abs(row.d + height + stroke) for stroke in strokes))
-        beyond = beyond.farther(length).with_link(link, distance)
+        if (parent := joint.parent) >= 0:
+            seat = (mounts[number] or Pose()).xyz
+            radius, length = _largest_distances(joints[parent], rows[parent], seat)
+            beyond = about_seat[number].with_link(link, distance)
+            about_axis[parent] = about_axis[parent].plus(beyond.farther(radius))
+            about_seat[parent] = about_seat[parent].plus(beyond.farther(length))
     return loads[::-1]
 
 
-def _cylindrical_center_of_mass(row: DenavitHartenberg, link: Link) -> tuple[float, float]:
-    """Return the distance of a link's center of mass from its joint axis, and its height along it above d."""
-    x, y, z = link.com
+def _largest_distances(
+    joint: MovingJoint, row: DenavitHartenberg, point: tuple[float, float, float]
+) -> tuple[float, float]:
+    """Return the distance of a point of a link from its axis, and the largest from where its row begins."""
+    x, y, z = point
     c, s = math.cos(row.alpha), math.sin(row.alpha)
-    return math.hypot(row.a + x, c * y - s * z), s * y + c * z
+    radius, height = math.hypot(row.a + x, c * y - s * z), s * y + c * z
+    strokes = (0.0,) if joint.is_revolute else joint.urdf.limit.position or (0.0,)
+    return radius, math.hypot(radius, max(abs(row.d + height + stroke) for stroke in strokes))

@@ -21,7 +21,8 @@ from vsacli.documents.fields import (
     WordChoice,
     declared_fields,
 )
-from vsacli.robot.joint import UNBOUNDED, DenavitHartenberg, Limits, Link, Pose
+from vsacli.robot.joint import FRAME_0, UNBOUNDED, DenavitHartenberg, Limits, Link, Pose
+from vsacli.robot.model import Robot
 from vsacli.robot.urdf.conversion import Conversion
 from vsacli.robot.urdf.link_tree import UrdfJoint
 
@@ -45,7 +46,7 @@ def converted_robot_text(conversion: Conversion) -> str:
             f"gravity: {_format_numbers(robot.gravity)}", "# m/s^2, in the axes of the base link"
         ),
         _append_comment(f"base: {_format_pose(robot.base)}", "# DH frame 0 in the base link; m, rad"),
-        _append_comment(f"tool: {_format_pose(robot.tool)}", "# tip link in the last DH frame"),
+        *_tool_lines(robot),
         "joints:",
     ]
     for index in range(len(robot.joints)):
@@ -53,11 +54,26 @@ def converted_robot_text(conversion: Conversion) -> str:
     return "\n".join([*lines, ""])
 
 
+def _tool_lines(robot: Robot) -> Iterator[str]:
+    if not robot.tools:
+        yield _append_comment(f"tool: {_format_pose(robot.tool)}", "# tip link in the last DH frame")
+        return
+    yield _append_comment("tools:", "# tip links in the DH frames of the links that carry them; m, rad")
+    for tool in robot.tools:
+        yield f"  {tool.name}: {{joint: {tool.joint}, {_format_pose(tool)[1:]}"
+
+
 def _joint_lines(conversion: Conversion, index: int) -> Iterator[str]:
-    joint, origin = conversion.robot.joints[index], conversion.chain.joints[index]
+    joint, origin = conversion.robot.joints[index], conversion.tree.joints[index]
     renamed = "" if origin.urdf.name == joint.name else f"# {json.dumps(origin.urdf.name)} in the URDF"
     yield _append_comment(f"  - name: {joint.name}", renamed)
     yield f"    type: {joint.type}"
+    if joint.parent is not None:
+        yield f"    parent: {'null' if joint.parent == FRAME_0 else joint.parent}"
+    if joint.mount is not None:
+        carrying = conversion.robot.joint_names[origin.parent] if origin.parent >= 0 else "the base"
+        comment = f"# where its row begins in the DH frame of {carrying}; m, rad"
+        yield _append_comment(f"    mount: {_format_pose(joint.mount)}", comment)
     yield f"    dh: {_format_dh_row(joint.dh)}"
     yield _append_comment("    link:", _links_comment([link.name for link in origin.links]))
     yield from _link_lines(joint.link)
@@ -96,7 +112,7 @@ def _link_lines(link: Link) -> Iterator[str]:
 
 def _origin_of(field: str, conversion: Conversion, index: int) -> str:
     """Return the origin of the numbers in a field of an actuator, with motor data of the URDF."""
-    joint, load = conversion.chain.joints[index], conversion.loads[index]
+    joint, load = conversion.tree.joints[index], conversion.loads[index]
     origin = conversion.placeholders.origin(field, joint, load)
     motor_data = " and ".join(_describe_urdf_motor(joint.urdf))
     if field != "motor" or not motor_data:

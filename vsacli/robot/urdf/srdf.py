@@ -1,12 +1,13 @@
-"""Groups of joints in an SRDF, the file of MoveIt: base and tip link of the chain of a group.
+"""Groups of joints in an SRDF, the file of MoveIt: base link and tip links of a group.
 
 The format: https://docs.ros.org/en/api/srdfdom/html/structsrdf_1_1Model_1_1Group.html
 """
 
 from __future__ import annotations
 
+import itertools
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
@@ -19,15 +20,15 @@ MAX_BYTES = 10_000_000
 """Largest file, as for a URDF; most of an SRDF are pairs of links that may collide."""
 
 
-class ChainEnds(NamedTuple):
-    """The base link and the tip link of a chain."""
+class GroupEnds(NamedTuple):
+    """The base link and the tip links of a group."""
 
     base: str
-    tip: str
+    tips: tuple[str, ...]
 
 
-def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -> ChainEnds:
-    """Return the base and tip link of the chain of a group.
+def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -> GroupEnds:
+    """Return the base link and the tip links of a group.
 
     Args:
         path: path of the SRDF file.
@@ -35,8 +36,7 @@ def ends_of_group(path: str | os.PathLike[str], group: str | None, urdf: Urdf) -
         urdf: robot.
 
     Raises:
-        InputError: the file is not an SRDF, or the group does not exist, or is not a serial chain of the
-            robot.
+        InputError: the file is not an SRDF, or the group does not exist, or leaves out joints between others.
     """
     source, text = read_source(path, MAX_BYTES)
     problems = Problems(source.path)
@@ -60,27 +60,43 @@ class _Groups:
     def __init__(self, groups: Mapping[str, Element], urdf: Urdf, problems: Problems) -> None:
         self._groups, self._urdf, self._problems = groups, urdf, problems
 
-    def ends(self, name: str) -> ChainEnds:
+    def ends(self, name: str) -> GroupEnds:
         group = self._groups[name]
         joints = self._joints(name, ())
         moving = [joint for joint in joints.values() if not joint.is_fixed]
         if not moving:
             self._problems.fail(group.line, f"no joint moves in the group {quoted(name)}")
         paths = {joint.child: self._urdf.joints_above(joint.child) for joint in joints.values()}
-        serial = [link for link, path in paths.items() if all(joint in path for joint in moving)]
-        if not serial:
-            names = ", ".join(quoted(joint.name) for joint in moving)
-            message = f"the joints of the group {quoted(name)} are no serial chain: {names}"
-            self._problems.fail(group.line, message)
-        tip = max(serial, key=lambda link: len(paths[link]))
-        first = next(joint for joint in paths[tip] if joint in moving)
-        between = paths[tip][paths[tip].index(first) :]
-        missing = [joint for joint in between if not joint.is_fixed and joint not in moving]
+        inner = {above.name for joint in moving for above in self._urdf.joints_above(joint.parent)}
+        tips = [
+            max((link for link, path in paths.items() if joint in path), key=lambda link: len(paths[link]))
+            for joint in moving
+            if joint.name not in inner
+        ]
+        base = self._common_base(group, [paths[tip] for tip in tips], moving)
+        above = self._urdf.joints_above(base)
+        between = {joint.name: joint for tip in tips for joint in paths[tip] if joint not in above}
+        missing = [joint for joint in between.values() if not joint.is_fixed and joint not in moving]
         if missing:
             names = ", ".join(quoted(joint.name) for joint in missing)
-            self._problems.fail(group.line, f"the group {quoted(name)} leaves out {names} within its chain")
+            shape = "chain" if len(tips) == 1 else "tree"
+            self._problems.fail(group.line, f"the group {quoted(name)} leaves out {names} within its {shape}")
+        return GroupEnds(base, tuple(tips))
+
+    def _common_base(
+        self, group: Element, paths: Sequence[Sequence[UrdfJoint]], moving: Sequence[UrdfJoint]
+    ) -> str:
+        """Return the last link before all moving joints; of a single chain, the base link if it names one."""
         chain = next(group.children_with_tag("chain"), None)
-        return ChainEnds(first.parent if chain is None else chain.attributes["base_link"], tip)
+        if chain is not None and len(paths) == 1:
+            return chain.attributes["base_link"]
+        before = [itertools.takewhile(lambda joint: joint not in moving, path) for path in paths]
+        base = self._urdf.root
+        for joint, *others in zip(*before, strict=False):
+            if any(other is not joint for other in others):
+                break
+            base = joint.child
+        return base
 
     def _joints(self, name: str, around: tuple[str, ...]) -> dict[str, UrdfJoint]:
         """Return the joints of a group by name: its own, and those of its links, chains and groups."""

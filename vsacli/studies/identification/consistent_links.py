@@ -95,7 +95,7 @@ class ConsistentLinks(NamedTuple):
     """Physically consistent links.
 
     Attributes:
-        links: links of all joints, base to tip; empty if nothing was identified, or if no consistent links
+        links: links of all joints; empty if nothing was identified, or if no consistent links
             agree with the result.
         off: deviation of the links from each identified value, in standard errors, (combinations,).
         parts: values of further parameters of the file by path, which have the identified sums.

@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.base.progress import Countdown, Progress, unseen
-from vsacli.base.wrench import wrench_columns
+from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.documents.columns_file import load_columns
 from vsacli.documents.edited import edited, moved_files, texts_at, unaliased, with_errors
 from vsacli.robot.file import text_to_change
@@ -76,10 +76,7 @@ from vsacli.studies.identification.torque_deviations import torque_deviations
 WORDS = (*GROUPS, LINKS)
 """Names of the groups of parameters."""
 
-FORCES = wrench_columns("wrench")
-"""Columns of the wrench on the end effector."""
-
-PUSHED = "links are not identified, since a wrench acts on the end effector"
+PUSHED = "links are not identified, since a wrench acts on {}"
 
 ABOVE_NOISE, ABOVE_TORQUE = 2.0, 0.01
 """Ratios of residual to noise and of residual to torque; beyond both, the equations do not hold: the residual
@@ -116,9 +113,9 @@ def identify(
     complete = {joint for record in records for joint in complete_joints(robot, record)}
     joints = [joint for joint in sorted(complete) if not robot.joints[joint].damper_at("transmission")]
     signals = [_condition_record(record, bandwidth) for record in records]
-    pushed = [each.path for each in records if not set(each.unused).isdisjoint(FORCES)]
+    pushed = {each.path: tools for each in records if (tools := _pushed_tools(robot, each))}
     if LINKS not in fit and all(robot.joints[index].actuator.sprung for index in joints):
-        pushed = []
+        pushed = {}
     sought = with_friction(robot, joints) if FRICTION in fit else robot
     first = solutions(sought, joints, fit, signals, pushed=bool(pushed))
     notes = list(_identification_notes(robot, joints, fit, signals, records, pushed))
@@ -166,6 +163,15 @@ def identify(
 
 
 _Result = TypeVar("_Result")
+
+
+def _pushed_tools(robot: Robot, record: Record) -> str:
+    """Return the tools on which a wrench is recorded, joined; "" if there are none."""
+    tools = robot.tool_names
+    words = {tool: wrench_columns(f"{tool}.{WRENCH_NAMES[0]}") for tool in tools}
+    if len(tools) <= 1:
+        words["the end effector"] = wrench_columns(WRENCH_NAMES[0])
+    return " and ".join(tool for tool, each in words.items() if not set(each).isdisjoint(record.unused))
 
 
 def _count_results(systems: Countdown, results: Iterable[_Result]) -> Iterator[_Result]:
@@ -282,7 +288,7 @@ def _identification_notes(
     fit: Sequence[str],
     signals: Sequence[Signals],
     records: Sequence[Record],
-    pushed: Sequence[str],
+    pushed: Mapping[str, str],
 ) -> Iterator[str]:
     left = [joint.name for index, joint in enumerate(robot.joints) if index not in joints]
     damped = [joint.name for joint in robot.joints if joint.damper_at("transmission")]
@@ -296,7 +302,7 @@ def _identification_notes(
             f"the parameters of {names} are not identified: the torque of the damper parallel to the springs "
             "is unknown"
         )
-    yield from (f"{path}: {PUSHED}" for path in pushed)
+    yield from (f"{path}: {PUSHED.format(tools)}" for path, tools in pushed.items())
     system = link_system(robot, fit, links=LINKS in fit, joints=joints)
     if pushed or not system.names:
         return

@@ -3,7 +3,7 @@
 Each link has ten standard inertial parameters, in its frame: m; m c, with c the center of mass; and the
 inertia tensor about the frame's origin (W. Khalil, E. Dombre, Modeling, Identification and Control of Robots,
 2002, section 9.2). Base parameters are the combinations that torques distinguish: columns of Y at random
-motions are processed one after the other, base to tip; a column that is a combination of previous ones is
+motions are processed one after the other, link by link; a column that is a combination of previous ones is
 regrouped into them (M. Gautier, "Numerical calculation of the base inertial parameters of robots", Journal of
 Robotic Systems 8 (1991)). So each base parameter is named after its first parameter, in spite of rounding.
 """
@@ -73,7 +73,7 @@ def link_of(parameters: FloatArray) -> Link:
 
 
 def all_parameters(robot: Robot) -> FloatArray:
-    """Return the parameters of all links, base to tip, (10 joints,)."""
+    """Return the parameters of all links, (10 joints,)."""
     return np.concatenate([parameters_of(joint.link) for joint in robot.joints])
 
 

@@ -6,7 +6,7 @@ import csv
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from vsacli.base import file_formats
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
-from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
+from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCHES, Signal, wrench_on
 from vsacli.base.texts import for_yaml
 from vsacli.base.wrench import wrench_columns
 from vsacli.documents.edited import edited, moved_files
@@ -23,10 +23,25 @@ from vsacli.robot.file import text_to_change
 from vsacli.studies.search.fix_report import Fix
 from vsacli.studies.search.fixed_text import TableFile, edited_text, formula
 from vsacli.studies.search.task import branch_path
-from vsacli.trajectory.profile import Profile
-from vsacli.trajectory.recorded.samples import SampledProfile
+from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import ResampledTimes, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
+
+
+class _TableColumns(NamedTuple):
+    """The columns of a signal or of a derivative.
+
+    Attributes:
+        signal: described signal.
+        variable: result variable with its values at the samples.
+        headers: header of each component.
+        raw: recorded values, (components, samples); None if those at the samples are written.
+    """
+
+    signal: Signal
+    variable: str
+    headers: list[str]
+    raw: FloatArray | None
 
 
 def fixed_paths(path: str | Path) -> tuple[Path, Path, Path]:
@@ -60,7 +75,7 @@ def write_fixed(fix: Fix, path: str | Path, outputs: Outputs) -> None:
     """
     document, table, robot = fixed_paths(path)
     trajectory, names = fix.declared, fix.robot.joint_names
-    declared = _signal_declarations(trajectory, table.name)
+    declared = _signal_declarations(trajectory, table.name, fix.robot.tool_names)
     recorded = [signal for signal, keys in declared.items() if keys["type"] == "csv"]
     beside = None
     if recorded:
@@ -77,29 +92,42 @@ def write_fixed(fix: Fix, path: str | Path, outputs: Outputs) -> None:
             write(stream)
 
 
-def _signal_declarations(trajectory: Trajectory, table: str) -> dict[Signal, dict[str, Any]]:
+def _signal_declarations(
+    trajectory: Trajectory, table: str, tools: Sequence[str]
+) -> dict[Signal, dict[str, Any]]:
     """Return the keys and values that declare each signal; signals without a formula refer to the table."""
-    profiles: dict[Signal, Profile] = {POSITION: trajectory.position}
+    profiles: dict[Signal, Profile | None] = {POSITION: trajectory.position}
     chosen = [key for key in trajectory.commanded if trajectory.chosen(key).any()]
     profiles |= {COMMANDED[key]: trajectory.commanded[key] for key in chosen}
-    if trajectory.wrench is not None:
-        profiles[WRENCH] = trajectory.wrench.profile
+    wrenches = {} if trajectory.wrench is None else _wrenches_on(tools, trajectory.wrench)
+    profiles |= {signal: profile for signal, (profile, _) in wrenches.items()}
     formulas = {signal: formula(profile) for signal, profile in profiles.items()}
     if None not in formulas.values() and not isinstance(trajectory.times, UniformTimes):
         formulas[POSITION] = None  # the table has the times
     declared = {
-        signal: {"type": "csv", "file": table, **_fit_options(profiles[signal].estimate)}
-        if keys is None
-        else keys
+        signal: {"type": "csv", "file": table, **_fit_options(profiles[signal])} if keys is None else keys
         for signal, keys in formulas.items()
     }
-    if trajectory.wrench is not None:
-        declared[WRENCH]["frame"] = trajectory.wrench.frame
+    for signal, (_, frame) in wrenches.items():
+        declared[signal]["frame"] = frame
     return declared
 
 
-def _fit_options(estimate: SampledProfile | None) -> dict[str, Any]:
+def _wrenches_on(tools: Sequence[str], wrench: WrenchProfile) -> dict[Signal, tuple[Profile | None, str]]:
+    """Return profile and frame of the wrench on each tool, named as in the robot's file.
+
+    The profile is None if one profile holds the wrenches on all tools.
+    """
+    if isinstance(wrench.frame, str):
+        return {signal: (profile, wrench.frame) for signal, profile in wrench.profiles.items()}
+    by_place = {signal.first: profile for signal, profile in wrench.profiles.items() if signal.tool}
+    frames = zip(map(wrench_on, tools, range(len(tools))), wrench.frame, strict=True)
+    return {signal: (by_place.get(signal.first), frame) for signal, frame in frames if frame is not None}
+
+
+def _fit_options(profile: Profile | None) -> dict[str, Any]:
     """Return the options of a recording's fit that were given, by key."""
+    estimate = None if profile is None else profile.estimate
     if estimate is None:
         return {}
     chosen = estimate.choice
@@ -123,8 +151,11 @@ def _document(
     if isinstance(trajectory.times, ResampledTimes) and trajectory.estimates:
         yield f"rate: {trajectory.times.rate!r}\n"
     for signal, keys in declared.items():
-        yield f"{signal.key}:\n"
-        yield from (f"  {key}: {_in_one_line(value)}\n" for key, value in keys.items())
+        if signal.tool and signal == next(each for each in declared if each.tool):
+            yield f"{WRENCHES}:\n"
+        indent = "  " if signal.tool else ""
+        yield f"{indent}{signal.tool or signal.key}:\n"
+        yield from (f"{indent}  {key}: {_in_one_line(value)}\n" for key, value in keys.items())
 
 
 def _in_one_line(content: Any) -> str:
@@ -143,20 +174,36 @@ def _write_table(
     trajectory: Trajectory, recorded: Sequence[Signal], joint_names: Sequence[str], stream: TextIO
 ) -> None:
     """Write fitted recordings as they were recorded, and other signals with derivatives at the samples."""
-    records = {signal: each.record.columns for signal, each in trajectory.estimates.items()}
-    names = [name for signal in recorded for name in records.get(signal, signal.names)]
-    raw = {name: rows for columns in records.values() for name, rows in columns.items()}
-    chosen = {name: trajectory.chosen(key) for key in trajectory.commanded for name in COMMANDED[key].names}
-    headers = [np.array(_signal_columns(name, joint_names))[chosen.get(name, ...)] for name in names]
+    raw = {
+        (variable, signal.first): each.record.columns[name]
+        for signal, each in trajectory.estimates.items()
+        for name, variable in zip(signal.names, signal.variables, strict=True)
+        if name in each.record.columns
+    }
+    columns = [
+        _TableColumns(
+            signal, variable, _headers(signal, name, joint_names), raw.get((variable, signal.first))
+        )
+        for signal in recorded
+        for name, variable in zip(signal.names, signal.variables, strict=True)
+        if (signal.variables[0], signal.first) not in raw or (variable, signal.first) in raw
+    ]
+    chosen = {key: trajectory.chosen(key) for key in trajectory.commanded}
+    masks = [chosen.get(each.signal.key, ...) for each in columns]
+    headers = [np.array(each.headers)[mask] for each, mask in zip(columns, masks, strict=True)]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *np.concatenate(headers).tolist()])
+    computing = any(each.raw is None for each in columns)
     stamps, samples = _stamps(trajectory), usual_block(len(joint_names))
     for start in range(0, len(stamps), samples):
         part = slice(start, start + samples)
-        computed = trajectory.block(start, start + samples).variables() if set(names) - set(raw) else {}
-        rows = (raw[name][:, part].T if name in raw else computed[name] for name in names)
-        columns = [each[:, chosen.get(name, ...)] for name, each in zip(names, rows, strict=True)]
-        writer.writerows(np.concatenate([stamps[part, None], *columns], axis=1).tolist())
+        computed = trajectory.block(start, start + samples).variables() if computing else {}
+        rows = (
+            computed[each.variable][:, each.signal.columns] if each.raw is None else each.raw[:, part].T
+            for each in columns
+        )
+        selected = [of_signal[:, mask] for of_signal, mask in zip(rows, masks, strict=True)]
+        writer.writerows(np.concatenate([stamps[part, None], *selected], axis=1).tolist())
 
 
 def _stamps(trajectory: Trajectory) -> FloatArray:
@@ -167,8 +214,8 @@ def _stamps(trajectory: Trajectory) -> FloatArray:
     return trajectory.times.block(0, trajectory.samples)
 
 
-def _signal_columns(name: str, joint_names: Sequence[str]) -> list[str]:
-    return wrench_columns(name) if name in WRENCH.names else [f"{joint}.{name}" for joint in joint_names]
+def _headers(signal: Signal, name: str, joint_names: Sequence[str]) -> list[str]:
+    return wrench_columns(name) if signal.is_wrench else [f"{joint}.{name}" for joint in joint_names]
 
 
 def robot_text(fix: Fix, folder: Path) -> str:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, TextIO
 import numpy as np
 
 from vsacli.base.errors import InputError
-from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal
+from vsacli.base.signals import COMMANDED, POSITION, Signal
 from vsacli.base.storage import reading_copies, temporary_folder
 from vsacli.documents.edited import MappingNode, Node, ScalarNode, edited, moved_files, node_at, root_of
 from vsacli.documents.source import is_table
@@ -33,7 +33,7 @@ SAME_TRANSITION = 1e-9
 """Largest relative difference of transition times that are equal but for rounding."""
 
 
-def formula(profile: Profile) -> dict[str, Any] | None:
+def formula(profile: Profile | None) -> dict[str, Any] | None:
     """Return the keys and values that declare a profile over its span; None if it has no formula."""
     match profile:
         case RestToRest(degree=degree, start=start, end=end):
@@ -207,10 +207,10 @@ def _changed_formulas(root: Node, asked: Trajectory, fixed: Trajectory, names: S
 
 
 def _profiles_by_signal(trajectory: Trajectory) -> dict[Signal, Profile]:
-    found = {POSITION: trajectory.position}
+    found: dict[Signal, Profile] = {POSITION: trajectory.position}
     found |= {COMMANDED[key]: profile for key, profile in trajectory.commanded.items()}
     if trajectory.wrench is not None:
-        found[WRENCH] = trajectory.wrench.profile
+        found |= trajectory.wrench.profiles
     return found
 
 

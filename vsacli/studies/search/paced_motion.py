@@ -13,7 +13,7 @@ import numpy as np
 
 from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, by_joint
-from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCH, Signal
+from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, Signal
 from vsacli.compute.duals import Dual, value_of
 from vsacli.dynamics.drive import driven_by
 from vsacli.dynamics.limits import limit_checks
@@ -31,7 +31,6 @@ from vsacli.studies.search.criteria import (
 )
 from vsacli.studies.search.loads import AT_REST
 from vsacli.studies.search.path_commands import PathCommands, Row, Speeds
-from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.recorded.hermite import HermiteSpline
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -290,10 +289,10 @@ def retimed(
             arrays[each][index] = spline(s, nu=order)
 
     def recorded(signal: Signal) -> HermiteSpline:
-        by_s = np.stack([arrays[each] for each in signal.names])
+        by_s = np.stack([arrays[each][signal.columns] for each in signal.variables])
         return HermiteSpline(signal=signal, time=time, rows=np.stack(speeds.rates(list(by_s))))
 
-    wrench = None if motion.wrench is None else WrenchProfile(recorded(WRENCH), motion.wrench.frame)
+    wrench = trajectory.wrench and trajectory.wrench.changed(lambda signal, _: recorded(signal))
     commanded = {
         key: recorded(COMMANDED[key]) for key in trajectory.commanded if trajectory.chosen(key).any()
     }

@@ -54,10 +54,12 @@ class Use:
     Attributes:
         signal: declared signal.
         rigid: whether all joints are rigid, so that torques do not depend on jerk and snap.
+        by_tool: whether it is declared for each of several tools, under the tool's name.
     """
 
     signal: Signal
     rigid: bool = False
+    by_tool: bool = False
 
     @property
     def smoothness(self) -> int:
@@ -78,11 +80,12 @@ class Use:
         return value(self._kind, doc, check=POSITIVE, default=None)
 
     def frame(self) -> dict[str, Any]:
-        """Return the field of a wrench's frame; empty for other signals."""
+        """Return the fields of a wrench's frame, and of its tool if there are several; else empty."""
         if self.signal is not WRENCH:
             return {}
         doc = f"frame in whose axes `{' '.join(WRENCH_AXES)}` are given"
-        return {"frame": choice(WRENCH_FRAMES, doc)}
+        tool = {"name": text("name of the tool", identifier=True)} if self.by_tool else {}
+        return {**tool, "frame": choice(WRENCH_FRAMES, doc)}
 
     def degree(self, degrees: range) -> Check:
         """Return the check of a degree: smooth enough for a motion that begins and ends at rest."""
@@ -115,10 +118,12 @@ class Declaration(DeclaredRecord, ABC):
     Attributes:
         use: use of the record classes that `record` returns.
         frame: frame along whose axes a wrench is given; only for wrenches.
+        name: name of the tool on which it acts; only for wrenches by tool.
     """
 
     use: ClassVar[Use]
     frame: str
+    name: str
 
     @classmethod
     @abstractmethod
@@ -140,8 +145,9 @@ class Declaration(DeclaredRecord, ABC):
 @cache
 def _declare_record(cls: type[Declaration], use: Use) -> Any:
     fields = [(name, Any, field) for name, field in cls.fields(use).items()]
-    name = f"{'Rigid' if use.rigid else ''}{use.signal.key.capitalize()}{cls.__name__}"
-    namespace = {"__doc__": cls.meaning(use), "use": use}
+    which = "Rigid" if use.rigid else "Tool" if use.by_tool else ""
+    name = f"{which}{use.signal.key.capitalize()}{cls.__name__}"
+    namespace = {"__doc__": cls.meaning(use), "use": use, **({"keyed_by": "name"} if use.by_tool else {})}
     return make_dataclass(name, fields, bases=(cls,), namespace=namespace, frozen=True)
 
 

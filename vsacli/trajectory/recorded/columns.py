@@ -24,8 +24,6 @@ Naming = dict[str, dict[int, str]]
 NAMINGS = ("{joint}.{name}{ending}", "{name}{number}{ending}")
 """Patterns of column names: by joint, and by the joint's number; motors have an ending, `_1` or `_2`."""
 
-_WRENCH_NAMING: Naming = {name: dict(enumerate(wrench_columns(name))) for name in WRENCH.names}
-
 
 @dataclass(frozen=True)
 class SignalColumn:
@@ -61,7 +59,7 @@ def trajectory_column_names(joints: CommandedJoints) -> set[str]:
     """Return all possible column names of a recorded trajectory of these joints."""
     return {
         TIME,
-        *_names_in_naming(_WRENCH_NAMING),
+        *_names_in_naming(_name_wrench_columns(joints)),
         *(name for naming in _namings_of_all_joints(joints) for name in _names_in_naming(naming)),
     }
 
@@ -81,7 +79,7 @@ def column_layout(
     """Return the columns of the quantities in a table.
 
     Columns of joints are named `<joint>.<quantity>`, or `<quantity><i>` with i counted from 1, in one way
-    throughout. Columns of the wrench are named by `wrench_columns`. A unit in brackets may follow any name.
+    throughout. Columns of wrenches are named by `wrench_columns`. A unit in brackets may follow any name.
 
     Args:
         header: names of all columns, without duplicates.
@@ -99,10 +97,11 @@ def column_layout(
     namings = [_name_columns(pattern, joints) for pattern in NAMINGS]
     used = [naming for naming in namings if any(column in names for column in _names_in_naming(naming))]
     naming = used[0] if used else namings[0]
+    wrenches = (name for signal in wanted if signal.is_wrench for name in signal.names)
     expected = [
         TIME,
         *_names_in_naming(naming),
-        *(_names_in_naming(_WRENCH_NAMING) if WRENCH in wanted else ()),
+        *(axis for name in wrenches for axis in wrench_columns(name)),
     ]
 
     renaming = f"use a trajectory file as printed by vsacli info {file}"
@@ -117,7 +116,7 @@ def column_layout(
         message = f"is not a trajectory: expected columns such as {examples}; {advice}"
         raise InputError.one(message, file, line)
     problems = list(column_names.naming_problems())
-    naming = naming | _WRENCH_NAMING
+    naming = naming | _name_wrench_columns(joints)
     if len(used) == len(namings):
         examples = " and ".join(
             repr(next(column for column in names if column in _names_in_naming(naming))) for naming in namings
@@ -174,6 +173,12 @@ def _name_columns(pattern: str, joints: CommandedJoints) -> Naming:
     }
 
 
+def _name_wrench_columns(joints: CommandedJoints) -> Naming:
+    """Return the columns of wrenches by tool, and those of the only tool, which need no name."""
+    signals = (*(() if len(joints.tools) > 1 else (WRENCH,)), *joints.wrenches.values())
+    return {name: dict(enumerate(wrench_columns(name))) for signal in signals for name in signal.names}
+
+
 def _names_in_naming(naming: Naming) -> list[str]:
     return [column for columns in naming.values() for column in columns.values()]
 
@@ -182,7 +187,7 @@ def _column_units(naming: Naming, joints: CommandedJoints) -> dict[str, str]:
     """Return the units of columns by name."""
     types = tuple(joints.types.values())
     return {TIME: VARIABLES[TIME].quantity.unit("")} | {
-        column: VARIABLES[quantity].quantity.of_component(index, types)
+        column: VARIABLES[quantity.rpartition(".")[2]].quantity.of_component(index, types)
         for quantity, columns in naming.items()
         for index, column in columns.items()
     }

@@ -143,7 +143,7 @@ class ColumnNames:
             elif name in needed:
                 yield f"{_describe_missing_columns(absent)}; {self._advise_combination(name)}"
             elif not whole:
-                every = "axes" if name in WRENCH.names else "joints"
+                every = "axes" if _is_of_wrench(name) else "joints"
                 yield f"{_describe_missing_columns(absent)}; {name} is given for all {every} or for none"
         if not renamed:
             yield from self.unknown_column_problems()
@@ -164,10 +164,14 @@ class ColumnNames:
 
     def _describe_joints_without_column(self, name: str, absent: Mapping[int, str]) -> str:
         """Return the meaning of missing columns in parentheses; empty for those of a wrench."""
-        if name in WRENCH.names:
+        if _is_of_wrench(name):
             return ""
         key = POSITION.key if name in POSITION.names else name
         return f" ({key} of joint{'s'[: len(absent) > 1]} {together(list(absent), self.joint_names)})"
+
+
+def _is_of_wrench(quantity: str) -> bool:
+    return quantity.rpartition(".")[2] in WRENCH.names
 
 
 def probable_column(column: str, missing: Sequence[str]) -> str | None:

@@ -104,7 +104,7 @@ class JointNames:
     """The joint names of a robot, to be found in column names.
 
     Args:
-        names: joint names, base to tip.
+        names: joint names, in the order of the robot file.
     """
 
     def __init__(self, names: Sequence[str]) -> None:

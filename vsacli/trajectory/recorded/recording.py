@@ -142,7 +142,11 @@ def read_recorded_signals(
     records, faults = check_health(time, records, list(joints.types.values()))
     faults += unit_doubts(records, _types_without_unit(table, layout, joints))
     warnings = tuple(str(_locate_problem(fault, table, layout)) for fault in faults)
-    clauses = (*turns, *_notes_on_reading(table, replaced), *_notes_on_unused_columns(layout, signals))
+    clauses = (
+        *turns,
+        *_notes_on_reading(table, replaced),
+        *_notes_on_unused_columns(layout, signals, joints),
+    )
     notes = tuple(f"{file}: {clause}" for clause in clauses)
     source, lines, first_stamp = table.source, table.lines, table.first_stamp
     rated = table.rated or replaced is not None
@@ -258,8 +262,10 @@ def _notes_on_reading(table: CsvTable, disorder: Disorder | None) -> Iterator[st
         yield f"ignored: {', '.join(names[:MOST_NAMED])}{f' and {more} more' if more > 0 else ''}"
 
 
-def _notes_on_unused_columns(layout: ColumnLayout, wanted: Sequence[Signal]) -> Iterator[str]:
-    for signal in (POSITION, *COMMANDED.values(), WRENCH):
+def _notes_on_unused_columns(
+    layout: ColumnLayout, wanted: Sequence[Signal], joints: CommandedJoints
+) -> Iterator[str]:
+    for signal in (POSITION, *COMMANDED.values(), WRENCH, *joints.wrenches.values()):
         if signal not in wanted and any(layout.quantities.get(name) for name in signal.names):
             yield f"its columns of {signal.names[0]} are not used"
     for key, columns in layout.unused.items():
@@ -273,7 +279,7 @@ def _notes_on_unused_columns(layout: ColumnLayout, wanted: Sequence[Signal]) -> 
 def _samples_from_table(
     signal: Signal, joint_names: tuple[str, ...], time: FloatArray, table: CsvTable, layout: ColumnLayout
 ) -> SignalSamples:
-    labels = WRENCH_AXES if signal is WRENCH else joint_names
+    labels = WRENCH_AXES if signal.is_wrench else joint_names
     values, *derivatives = (
         _rows_in_si_units(table, layout.quantities[name], len(labels)) if name in layout.quantities else None
         for name in signal.names

@@ -262,9 +262,11 @@ class SampledProfile:
 
     @property
     def estimated(self) -> tuple[str, ...]:
-        """Names of value and derivatives that come from the fit at the samples."""
-        value, *derivatives = self.signal.names
-        return value, *(derivatives if self.resampled else self.record.missing)
+        """Result variables of value and derivatives that come from the fit at the samples."""
+        signal, record = self.signal, self.record
+        value, *derivatives = zip(signal.variables, signal.names, strict=True)
+        fitted = (each for each, name in derivatives if self.resampled or name in record.missing)
+        return value[0], *fitted
 
     def covariance(self, time: FloatArray) -> FloatArray:
         """Return covariances of value and derivatives at times, (components, orders, orders, samples).
@@ -277,7 +279,7 @@ class SampledProfile:
             covariances[members] = covariance[..., None]
         for member, covariance in vibrations(self.fit, self.signal.orders):
             covariances[member] += covariance[..., None]
-        exact = [name not in self.estimated for name in self.signal.names]
+        exact = [name not in self.estimated for name in self.signal.variables]
         covariances[:, exact] = 0
         covariances[:, :, exact] = 0
         return covariances

@@ -1,12 +1,12 @@
-"""The serial chain of a URDF: joints of the path from base to tip, and held joints next to it.
+"""The chain or tree of moving joints of a URDF, with the links that each joint carries.
 
-Links on side branches move with the joint of the chain that carries them, with their own joints held.
+Links behind fixed and held joints move with the joint that carries them.
 """
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,13 +21,15 @@ from vsacli.documents.tree import quoted
 from vsacli.robot.urdf.link_tree import (
     LARGEST_NUMBER,
     MOVING,
-    ChainPath,
+    MovingJoints,
     RigidBody,
     Urdf,
     UrdfJoint,
     UrdfLink,
-    find_path,
+    choose_moving_joints,
+    fixed_ends,
     inverse_pose,
+    is_massless,
     joints_below,
     weld_bodies,
 )
@@ -46,7 +48,7 @@ class HeldJoint(NamedTuple):
         urdf: joint of the URDF.
         position: position at which it is held, rad (m).
         leader: name of the last leader in a chain of mimics; its own without an existing leader.
-        released: whether it is held although it follows a joint of the chain.
+        released: whether it is held although it follows a joint that moves.
     """
 
     urdf: UrdfJoint
@@ -79,14 +81,14 @@ class HeldJoint(NamedTuple):
 
 
 def held_joints(
-    urdf: Urdf, standing: Iterable[UrdfJoint], moving: Collection[str], hold: Hold
+    urdf: Urdf, standing: Iterable[UrdfJoint], moving: MovingJoints, hold: Hold
 ) -> list[HeldJoint]:
     """Return held joints, at their given position, at one that follows from a leader, or at zero.
 
     Args:
         urdf: robot.
         standing: joints to hold.
-        moving: names of joints that move.
+        moving: joints that move.
         hold: positions of joints that follow no other, or one that moves.
 
     Raises:
@@ -103,7 +105,7 @@ def held_joints(
             joint,
             mimic.multiplier * leaders[mimic.leader] + mimic.offset,
             mimic.leader,
-            joint.name in hold and urdf.relation_to_leader(joint).leader in moving,
+            joint.name in hold and urdf.relation_to_leader(joint).leader in moving.names,
         )
         for joint, mimic in followed
     ]
@@ -125,7 +127,7 @@ def _read_hold_position(
     name: str,
     value: float | str,
     leaders: Collection[str],
-    moving: Collection[str],
+    moving: MovingJoints,
     problems: Problems,
 ) -> float:
     """Return the given position of a held joint; 0 after adding a problem."""
@@ -142,19 +144,19 @@ def _read_hold_position(
         return 0.0
 
 
-def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: Collection[str]) -> str:
+def _reason_against(urdf: Urdf, name: str, leaders: Collection[str], moving: MovingJoints) -> str:
     """Return the reason why a joint cannot be held; empty if it can."""
     joint, shown = urdf.joints.get(name), quoted(name)
     if joint is None:
-        return f"there is no joint {shown} outside the chain{did_you_mean(name, leaders)}"
+        return f"there is no joint {shown} outside the {moving.shape}{did_you_mean(name, leaders)}"
     if joint.type not in MOVING:
         return f"{shown} is {joint.type}, so it has no position to choose"
-    if name in moving:
-        return f"{shown} belongs to the chain, where it moves"
-    if (leader := urdf.relation_to_leader(joint).leader) != name and leader not in moving:
+    if name in moving.names:
+        return f"{shown} belongs to the {moving.shape}, where it moves"
+    if (leader := urdf.relation_to_leader(joint).leader) != name and leader not in moving.names:
         return f"{shown} follows {quoted(leader)} (<mimic>); hold that one"
     if name not in leaders:
-        return f"{shown} is neither outside the chain nor below its base, so that it has no effect"
+        return f"{shown} is neither outside the {moving.shape} nor below its base, so that it has no effect"
     return ""
 
 
@@ -163,17 +165,19 @@ STANDARD_GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
-class ChainJoint:
-    """A joint of the chain, at position zero.
+class MovingJoint:
+    """A joint that moves, at position zero.
 
     Attributes:
         urdf: joint of the URDF.
+        parent: index of the joint that carries it; -1 on the base.
         frame: pose of its URDF frame in the base link, (4, 4).
         links: links that it carries rigidly, its own first.
         body: these links as a single body, in the base link.
     """
 
     urdf: UrdfJoint
+    parent: int
     frame: FloatArray
     links: tuple[UrdfLink, ...]
     body: RigidBody
@@ -195,110 +199,143 @@ class ChainJoint:
         return result
 
 
+class Tip(NamedTuple):
+    """A link that becomes a tool, at position zero.
+
+    Attributes:
+        link: name of the link.
+        joint: index of the joint that carries it.
+        pose: pose of the link in the base link, (4, 4).
+        beyond: links beyond it that could be the tool as well.
+    """
+
+    link: str
+    joint: int
+    pose: FloatArray
+    beyond: tuple[str, ...]
+
+
 @dataclass(frozen=True)
-class SerialChain:
-    """A serial chain at position zero, in the frame of its base link.
+class MovingTree:
+    """The moving joints of a robot at position zero, in the frame of its base link.
 
     Attributes:
         robot_name: name of the robot.
         base: name of the base link.
-        tip: name of the tip link.
+        shape: "chain" or "tree".
         up: direction of the root link's z axis, (3,).
-        joints: joints that move, from the base.
-        tip_pose: pose of the tip link, (4, 4).
+        joints: joints that move, each after the one that carries it.
+        tips: links of the end effectors.
         held_below: joints between root and base that could move.
-        held_beside: joints on side branches that could move.
-        followers: joints on side branches that follow the chain, without mass.
+        held_beside: other joints that could move.
+        immobile: those of `held_beside` with several degrees of freedom, if all joints should move.
+        followers: joints that follow moving ones, without mass.
     """
 
     robot_name: str
     base: str
-    tip: str
+    shape: str
     up: FloatArray
-    joints: tuple[ChainJoint, ...]
-    tip_pose: FloatArray
+    joints: tuple[MovingJoint, ...]
+    tips: tuple[Tip, ...]
     held_below: tuple[HeldJoint, ...]
     held_beside: tuple[HeldJoint, ...]
+    immobile: tuple[UrdfJoint, ...]
     followers: tuple[UrdfJoint, ...]
 
     @property
     def held(self) -> tuple[HeldJoint, ...]:
-        """All held joints, which could move and affect the chain."""
+        """All held joints, which could move and affect the robot."""
         return (*self.held_below, *self.held_beside)
 
 
-def serial_chain(
-    urdf: Urdf, base: str | None = None, tip: str | None = None, hold: Hold | None = None
-) -> SerialChain:
-    """Return the chain from a base link to a tip link.
+def moving_tree(
+    urdf: Urdf, base: str | None = None, tips: Sequence[str] = (), hold: Hold | None = None
+) -> MovingTree:
+    """Return the joints that move between a base link and tip links.
 
     Args:
         urdf: robot.
         base: name of the base link; the root by default.
-        tip: name of the tip link; by default the only possible one.
-        hold: positions of joints that are not on the chain, by name; zero for others.
+        tips: names of the tip links; by default the end of each branch.
+        hold: positions of joints that are held, by name; zero for others.
 
     Raises:
-        InputError: the chain does not exist, has joints without a drive, or joints cannot be held as
-            requested.
+        InputError: there is no such path, joints on it have no drive, or joints cannot be held as requested.
     """
-    path = find_path(urdf, base, tip)
-    carried = _carried_links(urdf, path)
-    below_base = [joint for joint in urdf.joints_above(path.base) if not joint.is_fixed]
-    names, hold = [joint.name for joint in path.moving], hold or {}
-    side = _side_branch_joints(urdf, carried, path)
+    hold = hold or {}
+    moving = choose_moving_joints(urdf, base, tips, hold)
+    carriers = _carriers_of_links(urdf, moving)
+    carried = _links_by_carrier(urdf, carriers, len(moving.joints))
+    below_base = [joint for joint in urdf.joints_above(moving.base) if not joint.is_fixed]
+    side = _side_joints(urdf, carriers, moving)
     follow = {
-        joint.name: urdf.relation_to_leader(joint, hold).leader in names and _is_massless(urdf, joint)
+        joint.name: urdf.relation_to_leader(joint, hold).leader in moving.names and is_massless(urdf, joint)
         for joint in side
     }
     beside = [joint for joint in side if not follow[joint.name]]
-    _check_joints(urdf, path, below_base, beside, hold)
+    _check_joints(urdf, moving, below_base, beside, hold)
     _check_links(urdf, carried)
-    held = held_joints(urdf, [*below_base, *beside], names, hold)
+    held = held_joints(urdf, [*below_base, *beside], moving, hold)
     poses = _link_poses(urdf, held)
-    to_base = inverse_pose(poses[path.base])
-    return SerialChain(
+    to_base = inverse_pose(poses[moving.base])
+    return MovingTree(
         robot_name=urdf.name,
-        base=path.base,
-        tip=path.tip,
+        base=moving.base,
+        shape=moving.shape,
         up=to_base[:3, 2],
         joints=tuple(
-            ChainJoint(joint, to_base @ poses[joint.child], links, _rigid_body_of(links, poses, to_base))
-            for joint, links in zip(path.moving, carried, strict=True)
+            MovingJoint(
+                joint,
+                carriers[joint.parent],
+                to_base @ poses[joint.child],
+                links,
+                _rigid_body_of(links, poses, to_base),
+            )
+            for joint, links in zip(moving.joints, carried, strict=True)
         ),
-        tip_pose=to_base @ poses[path.tip],
+        tips=tuple(
+            Tip(link, carriers[link], to_base @ poses[link], _ends_beyond(urdf, moving, link))
+            for link in moving.tips
+        ),
         held_below=tuple(held[: len(below_base)]),
         held_beside=tuple(held[len(below_base) :]),
+        immobile=tuple(joint for joint in beside if moving.whole and joint.type not in MOVING),
         followers=tuple(joint for joint in side if follow[joint.name]),
     )
 
 
-def _is_massless(urdf: Urdf, joint: UrdfJoint) -> bool:
-    """Return whether a joint moves links without mass only, so that it exerts no torque on its leader."""
-    links = [urdf.links[moved.child] for moved in (joint, *joints_below(joint.child, urdf.joints.values()))]
-    return not any(link.flaw or (link.body and (link.body.mass or link.body.inertia.any())) for link in links)
+def _ends_beyond(urdf: Urdf, moving: MovingJoints, tip: str) -> tuple[str, ...]:
+    """Return links that could be the tool instead of a tip that was not chosen."""
+    return tuple(fixed_ends(urdf, tip)) if moving.whole else ()
 
 
 def _check_joints(
-    urdf: Urdf, path: ChainPath, below_base: Iterable[UrdfJoint], beside: Iterable[UrdfJoint], hold: Hold
+    urdf: Urdf,
+    moving: MovingJoints,
+    below_base: Iterable[UrdfJoint],
+    beside: Iterable[UrdfJoint],
+    hold: Hold,
 ) -> None:
-    """Raise an error for joints of the chain without a drive, and for others that follow the chain."""
+    """Raise an error for joints between base and tips without a drive, and for others that follow those."""
     problems = Problems(urdf.file)
-    for joint in path.moving:
+    for joint in moving.joints:
         name = f"joint {quoted(joint.name)}"
         if joint.type not in MOVING:
-            reason = f"is {joint.type}; a chain has revolute, continuous and prismatic joints"
+            reason = f"is {joint.type}; a {moving.shape} has revolute, continuous and prismatic joints"
             problems.add(joint.line, f"{name} {reason}; choose base and tip so that it is not between them")
         if joint.mimic is not None:
             reason = f"follows {quoted(joint.mimic.leader)} (<mimic>), so it has no drive of its own"
             problems.add(joint.line, f"{name} {reason}; choose a tip before it")
-    on_chain = {joint.name for joint in path.moving}
-    for place, joints in (("outside the chain", beside), ("below the base", below_base)):
+    for place, joints in ((f"outside the {moving.shape}", beside), ("below the base", below_base)):
         for joint in joints:
             leader = urdf.relation_to_leader(joint, hold).leader
-            if leader in on_chain:
+            if leader in moving.names:
                 reason = f"{place} follows {quoted(leader)} on it (<mimic>)"
                 fix = f"hold it by --hold {shlex.quote(joint.name)}=0, which neglects its motion"
+                if moving.whole:
+                    reason = f"follows {quoted(leader)} (<mimic>), so it has no drive of its own"
+                    fix += f", or both by --hold {shlex.quote(leader)}=0"
                 problems.add(joint.line, f"joint {quoted(joint.name)} {reason}; {fix}")
     problems.check()
 
@@ -321,23 +358,32 @@ def _link_poses(urdf: Urdf, held: Iterable[HeldJoint]) -> dict[str, FloatArray]:
     return poses
 
 
-def _carried_links(urdf: Urdf, path: ChainPath) -> list[tuple[UrdfLink, ...]]:
-    """Return the links that each moving joint of the chain carries, side branches included."""
-    number = {joint.name: index for index, joint in enumerate(path.moving)}
-    owner = {path.base: -1}
-    carried: list[list[UrdfLink]] = [[] for _ in number]
-    for joint in joints_below(path.base, urdf.joints.values()):
-        index = owner[joint.child] = number.get(joint.name, owner[joint.parent])
+def _carriers_of_links(urdf: Urdf, moving: MovingJoints) -> dict[str, int]:
+    """Return the index of the moving joint that carries each link from the base on; -1 for the base."""
+    number = {name: index for index, name in enumerate(moving.names)}
+    carriers = {moving.base: -1}
+    for joint in joints_below(moving.base, urdf.joints.values()):
+        carriers[joint.child] = number.get(joint.name, carriers[joint.parent])
+    return carriers
+
+
+def _links_by_carrier(urdf: Urdf, carriers: Mapping[str, int], count: int) -> list[tuple[UrdfLink, ...]]:
+    """Return the links that each moving joint carries, its own first."""
+    carried: list[list[UrdfLink]] = [[] for _ in range(count)]
+    for link, index in carriers.items():
         if index >= 0:
-            carried[index].append(urdf.links[joint.child])
+            carried[index].append(urdf.links[link])
     return [tuple(links) for links in carried]
 
 
-def _side_branch_joints(urdf: Urdf, carried: list[tuple[UrdfLink, ...]], path: ChainPath) -> list[UrdfJoint]:
-    names = {link.name for links in carried for link in links}
-    moving = {joint.name for joint in path.moving}
-    candidates = (joint for joint in urdf.joints.values() if joint.child in names and not joint.is_fixed)
-    return [joint for joint in candidates if joint.name not in moving]
+def _side_joints(urdf: Urdf, carriers: Mapping[str, int], moving: MovingJoints) -> list[UrdfJoint]:
+    """Return joints that could move but do not, on links that move; of a whole robot, also on the base."""
+    nearest = -1 if moving.whole else 0
+    return [
+        joint
+        for joint in urdf.joints.values()
+        if not joint.is_fixed and joint.name not in moving.names and carriers.get(joint.child, -2) >= nearest
+    ]
 
 
 def _rigid_body_of(
