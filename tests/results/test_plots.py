@@ -275,8 +275,8 @@ def test_figures_without_their_variables_are_left_out_with_a_reason() -> None:
     result = without(rest_to_rest(), "q", "stiffness", "tau_e")
     assert list(plot_stored(result)) == ["motor-torque"]
     reasons = omitted_figures(RESULT_DRAWINGS, result.variables)
-    of_devices = ["losses", "damper", "motor-current", "motor-voltage"]
-    assert list(reasons) == ["motion", "elastic-torque", "energy", *of_devices]
+    further = ["losses", "damper", "motor-current", "motor-voltage", "tool-stiffness", "tool-path"]
+    assert list(reasons) == ["motion", "elastic-torque", "energy", *further]
     expected = "figure motion needs q and stiffness, which this result was written without (--variables)"
     assert reasons["motion"] == expected
 

@@ -9,13 +9,14 @@ import pytest
 from samples.branched import alone, random_branches
 from samples.paths import STEP, complex_torques
 from samples.robots import random_robot
-from samples.shipped import shipped_robot
+from samples.shipped import shipped_robot, shipped_run
 from samples.wrenches import held
 
 from vsacli import Trajectory, Wrench, forward_kinematics, inverse_dynamics, jacobian, tip_compliance
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base.errors import InputError
+from vsacli.base.variables import Block
 
 ROUNDING = 1e-13
 """Of the largest entry: a product of a few sums, and a well conditioned system of few equations."""
@@ -172,6 +173,19 @@ def test_mujoco_yields_as_much_at_rest(robot):
     expected = tip_compliance(robot, q, result.stiffness[0], wrenches=Wrench.constant(wrench, "base"))
     actual = models.settled_compliance(robot, result, wrench, 1e-3)
     np.testing.assert_allclose(actual, expected, rtol=0, atol=OF_MUJOCO * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_mujoco_yields_as_much_at_both_hands_of_a_torso():
+    models = pytest.importorskip("samples.mujoco_models")
+    robot, trajectory = shipped_run("torso_2x3r", "torso_2x3r")
+    result = inverse_dynamics(robot, trajectory)
+    held = Block(**result.arrays()).taken(slice(-1, None))  # at rest, while the right hand is pushed
+    wrench = Wrench.constant(held.wrench[0].ravel(), ("base", "base"))
+    for tool, name in enumerate(robot.tool_names):
+        expected = tip_compliance(robot, held.q[0], held.stiffness[0], name, wrench)
+        actual = models.settled_compliance(robot, held, held.wrench[0], 1e-3, tool)
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=OF_MUJOCO * np.abs(expected).max())
 
 
 def at_rest(robot, q, stiffness, wrench):

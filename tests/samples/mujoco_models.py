@@ -197,17 +197,21 @@ def _dampers(joint: Any) -> int:
     return int(joint.damper is not None)
 
 
-def settled_compliance(robot: Robot, result: Any, wrench: FloatArray, step: float) -> FloatArray:
-    """Displacement and rotation of the tool per wrench in base axes, (6, 6), motors held as in sample 0.
+def settled_compliance(
+    robot: Robot, result: Any, wrench: FloatArray, step: float, tool: int = 0
+) -> FloatArray:
+    """Displacement and rotation of a tool per wrench in base axes, (6, 6), motors held as in sample 0.
 
-    Half the difference of two equilibria with a further wrench of this step, N and N m, on the tool.
+    Half the difference of two equilibria with a further wrench of this step, N and N m, on the tool; the
+    wrench is that on all tools, (tools, 6).
     """
     with compiled(robot) as (model, data):
         held = coordinates(robot, model, result).positions[0]
         sprung = [joint.name for joint in robot.joints if joint.actuator.sprung]
         places = [model.joint(name).qposadr[0] for name in sprung]
         dofs = [model.joint(name).dofadr[0] for name in sprung]
-        site = model.site("tool")
+        sites = [model.site(name) for name in exported_tool_names(robot)]
+        site = sites[tool]
 
         def torques_at(positions: FloatArray, load: FloatArray) -> FloatArray:
             data.qpos[:], data.qvel[:] = held, 0
@@ -215,15 +219,17 @@ def settled_compliance(robot: Robot, result: Any, wrench: FloatArray, step: floa
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
             data.qfrc_applied[:] = 0
-            point = data.site_xpos[site.id]
-            mujoco.mj_applyFT(model, data, load[:3], load[3:], point, int(site.bodyid[0]), data.qfrc_applied)
+            for each, (force, moment) in zip(sites, load.reshape(-1, 2, 3), strict=True):
+                place, body = data.site_xpos[each.id], int(each.bodyid[0])
+                mujoco.mj_applyFT(model, data, force, moment, place, body, data.qfrc_applied)
             mujoco.mj_forward(model, data)
             return np.array(data.qfrc_smooth[dofs])
 
         poses = []
-        for load in (sign * step * unit for unit in np.eye(6) for sign in (1, -1)):
-            solution = optimize.root(torques_at, held[places], args=(wrench + load,), tol=1e-13)
-            assert np.abs(torques_at(solution.x, wrench + load)).max() < 1e-6 * step
+        further = np.eye(6 * len(sites))[6 * tool : 6 * tool + 6]
+        for load in (wrench.ravel() + sign * step * unit for unit in further for sign in (1, -1)):
+            solution = optimize.root(torques_at, held[places], args=(load,), tol=1e-13)
+            assert np.abs(torques_at(solution.x, load)).max() < 1e-6 * step
             poses.append((data.site_xpos[site.id].copy(), data.site_xmat[site.id].reshape(3, 3).copy()))
     columns = []
     for (ahead, turned), (behind, turned_back) in zip(poses[::2], poses[1::2], strict=True):
