@@ -52,6 +52,7 @@ def test_compliance_is_computed_when_asked_for(vsacli, torso):
     outcome = vsacli("invdyn", *torso, *ASKED, "-o", "swing.h5")
     assert outcome.code == 0
     assert "smallest stiffness of tools: left_hand" in outcome.out
+    assert "equal bit for bit" in vsacli("validate", "--recompute", "swing.h5").out
     robot = load_robot("torso.yaml")
     with open_result("swing.h5") as result:
         assert result.tip_compliance.shape == (41, 3, 6, 6)
@@ -86,6 +87,11 @@ def test_exports_have_a_column_for_each_entry(vsacli, torso):
     place = header.index("right_hand.tip_compliance_ry_fx")
     with open_result("swing.h5") as result:
         assert float(first[place]) == result.tip_compliance[0, 1, 4, 0]
+    at_other_times = ("--variables", "tip_compliance", "--rate", 30, "-o", "again.csv")
+    assert vsacli("export", "swing.h5", *at_other_times).code == 0
+    with open("again.csv") as lines:
+        assert next(lines).split(",")[place] == header[place]
+        assert float(next(lines).split(",")[place]) == float(first[place])
     for ending in ("mat", "parquet"):
         assert (
             vsacli("export", "swing.h5", "--variables", "tip_compliance", "-o", f"swing.{ending}").code == 0

@@ -11,13 +11,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vsacli.analysis.joint_report import JUDGED
 from vsacli.analysis.run import Run
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Staged
 from vsacli.base.progress import Tell, unheard
 from vsacli.base.storage import reading_copies, reporting_temporary_errors, temporary_folder
 from vsacli.base.texts import one_line
-from vsacli.base.variables import Block
+from vsacli.base.variables import ALL, ON_REQUEST, Block
 from vsacli.results.exports.selection import check_rate, stride_of
 from vsacli.results.store.inputs import StoredInput
 from vsacli.results.store.reader import StoredResult, stored_inputs
@@ -77,13 +78,19 @@ def repeat(path: str | Path, tell: Tell = unheard) -> Repetition:
         robot, trajectory = rebuilt(result)
         options: dict[str, Any] = result.provenance()["options"]
         engine = str(result.attributes.get("engine", "numpy"))
-        run = Run(robot, trajectory, engine=engine, tell=tell, **options)
+        asked = (JUDGED, *_on_request(result))
+        run = Run(robot, trajectory, engine=engine, asked=asked, tell=tell, **options)
         comparisons = [_Comparison(result, name) for name in result.variables]
         for block in run:
             for comparison in comparisons:
                 comparison.add(block)
         differences = [comparison.difference for comparison in comparisons if comparison.values]
         return Repetition(differences, result.precision)
+
+
+def _on_request(result: StoredResult) -> list[str]:
+    """Return the variables of a result that a run has only if they are asked for."""
+    return [name for name in ON_REQUEST if name in result.variables]
 
 
 def rebuilt(result: StoredResult) -> tuple[Robot, Trajectory]:
@@ -216,10 +223,10 @@ def at_rate(result: StoredResult, rate: float) -> Iterator[StoredResult]:
         return
     robot, trajectory = again[0], _sampled(again[1], rate)
     options: dict[str, Any] = result.provenance()["options"]
-    run = Run(robot, trajectory, **options)
+    run = Run(robot, trajectory, asked=(JUDGED, *_on_request(result)), **options)
     with temporary_folder() as place:
         staged = Staged.unnamed(place / "result.h5")
-        with ResultWriter(staged, robot, trajectory) as writer:
+        with ResultWriter(staged, robot, trajectory, (ALL, *_on_request(result))) as writer:
             for block in run:
                 writer.write(block)
             writer.finish(run.report().as_json())
