@@ -369,7 +369,7 @@ def _tidy_pose(pose: FloatArray, scale: float) -> Pose:
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """Return distinct names of letters, digits, `_` and `-`, which begin with a letter or `_`; none is null."""
+    """Return distinct names of letters, digits, `_` and `-`, with a letter or `_` first; none is null."""
     chosen: list[str] = []
     for name in names:
         word = re.sub(r"[^A-Za-z0-9_-]", "_", name)
