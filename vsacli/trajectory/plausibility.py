@@ -83,7 +83,7 @@ def trajectory_findings(
     file_lines, findings = ValuesInFile(source), list[Problem]()
     for subtree in robot.checked_subtrees:
         checked = CheckedTrajectory(robot, subtree, numbers, times, sampled)
-        robot_rules = robot_rules_with_findings(robot, subtree)
+        robot_rules = robot_rules_with_findings(robot.checked, subtree, robot.sources)
         findings += implausible_values(TRAJECTORY_RULES, checked, file_lines, robot_rules)
     return tuple(dict.fromkeys(findings))
 
