@@ -201,8 +201,8 @@ def _measure_wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[M
     common, unit = (COMMON_FORCE, "N") if forces else (COMMON_MOMENT, "N m")
     for path, quantity, value, _ in checked.numbers if not checked.robot.placeholder else ():
         of_kind = isinstance(path[-1], PathIndex) and (path[-1].number < 3) == forces
-        tool = str(path[1]) if path[0] == "wrenches" else checked.robot.tool_names[0]
-        if quantity == units.WRENCH and of_kind and tool in tools:
+        pushed = (str(path[1]),) if path[0] == "wrenches" else checked.robot.tool_names[:1]
+        if quantity == units.WRENCH and of_kind and not tools.isdisjoint(pushed):
             size = ratio_or_nan(abs(value), scale) if value else math.nan
             yield Measured(path, value, unit, min(size, 1.0) if abs(value) < common else size)
 
