@@ -173,7 +173,10 @@ def test_a_file_in_a_value_lies_beside_the_document(vsacli: Any) -> None:
         ("joints.elbow.link.mass=heavy", "expected a number in kg, found 'heavy'"),
         ("position.degree=4", "must be odd, from 7 to 15"),
         ("joints.*.link.mass=-1", "joints.base.link.mass: must be zero or positive, not -1 kg"),
-        ("joints.elbow=2", "joints.elbow is a mapping; set one of its keys: name, type, dh, link, damping"),
+        (
+            "joints.elbow=2",
+            "joints.elbow is a mapping; set one of its keys: name, type, parent, mount, dh, link, damping",
+        ),
         ("position.end.5=1", "position.end has no '5'; valid: base, shoulder, elbow or 0 to 2"),
         (
             "position.type=via",

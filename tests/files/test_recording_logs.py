@@ -36,6 +36,7 @@ class Arm:
         self.joint_names = tuple(names)
         self.joint_types = ("revolute",) * len(names)
         self.joints = ()
+        self.tool_names = ("end_effector",)
 
 
 @pytest.fixture(autouse=True)

@@ -331,8 +331,14 @@ def test_links_that_end_beside_each_other_leave_the_tool_before_them(urdf):
     camera = [link("camera", ""), joint("screw", "left_palm", "camera", "F")]
     conversion = import_urdf(urdf(robot(*WAIST, *LEFT, *camera, *RIGHT)))
     assert conversion.robot.tool_names == ("left_palm", "right_tcp")
-    note = "tool at left_palm, beyond which several links end; choose others by --tip: left_tcp, camera"
-    assert note in conversion.notes()
+    ends = "several links end beyond left_palm, where the tool is: left_tcp, camera"
+    assert f"{ends}; for another, name all tools by --tip" in conversion.notes()
+
+
+def test_a_joint_named_null_carries_a_branch(urdf, tmp_path):
+    conversion = import_urdf(urdf(TORSO.replace('"waist"', '"null"').replace("left_tcp", "Null")))
+    loaded = load_robot(write(tmp_path / "body.yaml", converted_robot_text(conversion)))
+    assert (loaded.joints[4].parent, loaded.tool_names[0]) == ("_null", "_Null")
 
 
 def test_names_of_tools_are_identifiers_that_differ(urdf):

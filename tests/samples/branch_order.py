@@ -112,7 +112,7 @@ def differences(one: Any, other: Any, where: str = "", scale: float = 1e-9) -> I
 
 def _sorted(entries: list[Any]) -> list[Any]:
     """Entries with texts sorted by them; others as they are."""
-    return sorted(entries, key=lambda entry: _PLACE.sub(r"\1", " ".join(sorted(_texts(entry)))))
+    return sorted(entries, key=lambda entry: sorted(_PLACE.sub(r"\1", text) for text in _texts(entry)))
 
 
 def _texts(content: Any) -> Iterator[str]:

@@ -119,7 +119,7 @@ class Tool(Pose):
     @staticmethod
     def example(_joint_type: str) -> dict[str, Any]:
         """Return plausible values of the fields, for a new robot file."""
-        return {"name": "hand", "joint": "wrist", "xyz": [0.0, 0.0, 0.1]}
+        return {"name": "hand", "joint": "wrist"}
 
 
 @dataclass(frozen=True)

@@ -271,11 +271,26 @@ class Robot(DeclaredRecord):
         return tuple(dict.fromkeys(sources))
 
     @cached_property
+    def checked(self) -> CheckedRobot:
+        """The robot's data that plausibility rules need."""
+        from vsacli.documents.record_values import numbers_in_record
+        from vsacli.robot.plausibility.checked_robot import CheckedRobot
+
+        return CheckedRobot(
+            self.joints,
+            self.parents,
+            self.base,
+            self.gravity,
+            tuple(numbers_in_record(self)),
+            self.placeholder,
+            tuple(range(len(self.joints))),
+            dict(enumerate(self.tool_joints)),
+        )
+
+    @cached_property
     def checked_subtrees(self) -> tuple[CheckedRobot, ...]:
         """The data that plausibility rules need, of each of `subtrees`."""
-        from vsacli.robot.plausibility.checked_robot import checked_subtrees
-
-        return checked_subtrees(self)
+        return tuple(self.checked.subtree(joints) for joints in self.subtrees)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -287,11 +302,12 @@ class Robot(DeclaredRecord):
         """Warnings about implausible values, with the line if they concern a number of the robot file."""
         from vsacli.robot.plausibility import robot_findings
 
+        findings = robot_findings(self.checked, self.checked_subtrees, self.sources)
         massless = not any(joint.link.mass for joint in self.joints)
         of_robot = {OF_PLACEHOLDERS: self.placeholder, WITHOUT_MASSES: massless}
         of_joints = (warning for joint in self.joints for warning in joint.warnings())
         whole = (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
-        return (*(Problem("", 0, warning) for warning in whole), *robot_findings(self))
+        return (*(Problem("", 0, warning) for warning in whole), *findings)
 
 
 def check_robot(value: object) -> None:

@@ -83,7 +83,7 @@ def trajectory_findings(
     file_lines, findings = ValuesInFile(source), list[Problem]()
     for subtree in robot.checked_subtrees:
         checked = CheckedTrajectory(robot, subtree, numbers, times, sampled)
-        robot_rules = robot_rules_with_findings(robot, subtree)
+        robot_rules = robot_rules_with_findings(robot.checked, subtree, robot.sources)
         findings += implausible_values(TRAJECTORY_RULES, checked, file_lines, robot_rules)
     return tuple(dict.fromkeys(findings))
 
@@ -201,8 +201,8 @@ def _measure_wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[M
     common, unit = (COMMON_FORCE, "N") if forces else (COMMON_MOMENT, "N m")
     for path, quantity, value, _ in checked.numbers if not checked.robot.placeholder else ():
         of_kind = isinstance(path[-1], PathIndex) and (path[-1].number < 3) == forces
-        tool = str(path[1]) if path[0] == "wrenches" else checked.robot.tool_names[0]
-        if quantity == units.WRENCH and of_kind and tool in tools:
+        pushed = (str(path[1]),) if path[0] == "wrenches" else checked.robot.tool_names[:1]
+        if quantity == units.WRENCH and of_kind and not tools.isdisjoint(pushed):
             size = ratio_or_nan(abs(value), scale) if value else math.nan
             yield Measured(path, value, unit, min(size, 1.0) if abs(value) < common else size)
 

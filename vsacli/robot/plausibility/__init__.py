@@ -2,53 +2,61 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from vsacli.base.errors import Problem
 from vsacli.documents import tree
 from vsacli.documents.plausibility import ValuesInFile, implausible_measurements, implausible_values
 from vsacli.documents.record_values import NumberPath, PathIndex
+from vsacli.documents.source import Source
 from vsacli.robot.plausibility.bodies import BODY_RULES
 from vsacli.robot.plausibility.checked_robot import CheckedRobot
 from vsacli.robot.plausibility.drives import DRIVE_RULES
 from vsacli.robot.plausibility.links import impossible_links
 from vsacli.robot.plausibility.springs import SPRING_RULES
 
-if TYPE_CHECKING:
-    from vsacli.robot.model import Robot
-
 ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
 
 
-def robot_findings(robot: Robot) -> tuple[Problem, ...]:
+def robot_findings(
+    robot: CheckedRobot, subtrees: Sequence[CheckedRobot], sources: Sequence[Source]
+) -> tuple[Problem, ...]:
     """Return impossible links and the findings of the rules, with lines of the robot file.
 
-    The robot file is the first of the sources. Each of `Robot.subtrees` is judged by itself, as if it stood
+    The robot file is the first of the sources. Each subtree on the base is judged by itself, as if it stood
     alone: one with a number in another unit neither explains nor hides the findings of the others.
     """
     findings = [
-        *impossible_links(robot.joints, ValuesInFile(robot.sources[0]) if robot.sources else None),
+        *impossible_links(robot.joints, ValuesInFile(sources[0]) if sources else None),
         *(
             problem
-            for subtree in robot.checked_subtrees
-            for problem in implausible_values(ROBOT_RULES, subtree, _robot_file_lines(robot, subtree))
+            for subtree in subtrees
+            for problem in implausible_values(
+                ROBOT_RULES, subtree, _robot_file_lines(robot, subtree, sources)
+            )
         ),
     ]
     return tuple(dict.fromkeys(findings))
 
 
-def robot_rules_with_findings(robot: Robot, subtree: CheckedRobot) -> frozenset[str]:
-    """Return the names of the rules that have findings in one of `Robot.checked_subtrees`."""
-    return frozenset(implausible_measurements(ROBOT_RULES, subtree, _robot_file_lines(robot, subtree)))
+def robot_rules_with_findings(
+    robot: CheckedRobot, subtree: CheckedRobot, sources: Sequence[Source]
+) -> frozenset[str]:
+    """Return the names of the rules that have findings in a subtree of a robot."""
+    lines = _robot_file_lines(robot, subtree, sources)
+    return frozenset(implausible_measurements(ROBOT_RULES, subtree, lines))
 
 
-def _robot_file_lines(robot: Robot, subtree: CheckedRobot) -> ValuesInFile | None:
-    translate = partial(_path_in_robot_file, robot, subtree)
-    return ValuesInFile(robot.sources[0], translate) if robot.sources else None
+def _robot_file_lines(
+    robot: CheckedRobot, subtree: CheckedRobot, sources: Sequence[Source]
+) -> ValuesInFile | None:
+    return ValuesInFile(sources[0], partial(_path_in_robot_file, robot, subtree)) if sources else None
 
 
-def _path_in_robot_file(robot: Robot, subtree: CheckedRobot, root: tree.Node, path: NumberPath) -> NumberPath:
+def _path_in_robot_file(
+    robot: CheckedRobot, subtree: CheckedRobot, root: tree.Node, path: NumberPath
+) -> NumberPath:
     """Return the path in the robot file for a path of a subtree; modified rows become standard ones.
 
     The standard row of a joint has a and alpha of the modified row of the next one; those of the first one

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.plausibility import Measured
-from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex, numbers_in_record
+from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex
 from vsacli.robot.joint import Joint, Link, Pose
-
-if TYPE_CHECKING:
-    from vsacli.robot.model import Robot
 
 WEIGHT_PER_MASS = 9.81
 """Gravity, m/s^2; loads are compared with the weight on earth, also of robots in space."""
@@ -53,7 +50,7 @@ class CheckedRobot:
         numbers: all numbers of the file that concern it.
         placeholder: whether springs and motors are placeholders.
         numbers_in_robot: index of each joint in the whole robot.
-        tools: indices of its tools in the whole robot.
+        tools: index of the joint that carries each tool, by the index of the tool in the whole robot.
     """
 
     joints: tuple[Joint, ...]
@@ -63,7 +60,31 @@ class CheckedRobot:
     numbers: tuple[NumberAtPath, ...]
     placeholder: bool
     numbers_in_robot: tuple[int, ...]
-    tools: tuple[int, ...]
+    tools: Mapping[int, int]
+
+    def subtree(self, joints: tuple[int, ...]) -> CheckedRobot:
+        """Return the data of some joints, which are renumbered; numbers of the whole robot stay with them."""
+        place = {-1: -1, **{number: index for index, number in enumerate(joints)}}
+        tools = {tool: place[joint] for tool, joint in self.tools.items() if joint in place}
+        inside = []
+        for number in self.numbers:
+            match number.path:
+                case ("joints", PathIndex(joint, name), *inner):
+                    if joint in place:
+                        path = ("joints", PathIndex(place[joint], name), *inner)
+                        inside.append(number._replace(path=path))
+                case ("tools", PathIndex(tool), *_) if tool not in tools:
+                    pass
+                case _:
+                    inside.append(number)
+        return replace(
+            self,
+            joints=tuple(self.joints[joint] for joint in joints),
+            parents=tuple(place[self.parents[joint]] for joint in joints),
+            numbers=tuple(inside),
+            numbers_in_robot=joints,
+            tools=tools,
+        )
 
     @cached_property
     def sizes(self) -> BodySizes:
@@ -97,39 +118,6 @@ class CheckedRobot:
         if path[0] != "joints" or not isinstance(path[1], PathIndex):
             return "revolute"
         return self.joints[path[1].number].type
-
-
-def checked_subtrees(robot: Robot) -> tuple[CheckedRobot, ...]:
-    """Return the data of each of `Robot.subtrees`."""
-    numbers = tuple(numbers_in_record(robot))
-    return tuple(_checked_subtree(robot, joints, numbers) for joints in robot.subtrees)
-
-
-def _checked_subtree(robot: Robot, joints: tuple[int, ...], numbers: Sequence[NumberAtPath]) -> CheckedRobot:
-    """Return the data of some joints, which are renumbered; numbers of the whole robot stay with them."""
-    place = {-1: -1, **{number: index for index, number in enumerate(joints)}}
-    tools = tuple(tool for tool, joint in enumerate(robot.tool_joints) if joint in place)
-    inside = []
-    for number in numbers:
-        match number.path:
-            case ("joints", PathIndex(joint, name), *inner):
-                if joint in place:
-                    path = ("joints", PathIndex(place[joint], name), *inner)
-                    inside.append(number._replace(path=path))
-            case ("tools", PathIndex(tool), *_) if tool not in tools:
-                pass
-            case _:
-                inside.append(number)
-    return CheckedRobot(
-        tuple(robot.joints[joint] for joint in joints),
-        tuple(place[robot.parents[joint]] for joint in joints),
-        robot.base,
-        robot.gravity,
-        tuple(inside),
-        robot.placeholder,
-        joints,
-        tools,
-    )
 
 
 def joint_path(number: int, joint: Joint, *steps: str | PathIndex) -> NumberPath:

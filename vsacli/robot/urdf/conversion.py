@@ -20,7 +20,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InvalidRecordError, Problem
 from vsacli.base.texts import as_name, counted, joined, listed, one_line
 from vsacli.documents.source import Problems
-from vsacli.documents.tree import quoted
+from vsacli.documents.tree import NULLS, quoted
 from vsacli.robot.joint import (
     FRAME_0,
     UNBOUNDED,
@@ -149,7 +149,8 @@ class Conversion:
         for tip in self.tree.tips:
             if tip.beyond:
                 others = listed(tip.beyond, MOST_ENDS)
-                yield f"tool at {tip.link}, beyond which several links end; choose others by --tip: {others}"
+                another = "for another, name all tools by --tip"
+                yield f"several links end beyond {tip.link}, where the tool is: {others}; {another}"
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
         yield from self._of_motors()
@@ -368,11 +369,11 @@ def _tidy_pose(pose: FloatArray, scale: float) -> Pose:
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """Return distinct names of letters, digits, `_` and `-` that begin with a letter or `_`."""
+    """Return distinct names of letters, digits, `_` and `-`, with a letter or `_` first; none is null."""
     chosen: list[str] = []
     for name in names:
         word = re.sub(r"[^A-Za-z0-9_-]", "_", name)
-        word = word if re.match(r"[A-Za-z_]", word) else f"_{word}"
+        word = word if re.match(r"[A-Za-z_]", word) and word.lower() not in NULLS else f"_{word}"
         taken = (f"{word}_{number}" for number in itertools.count(2))
         chosen.append(word if word not in chosen else next(other for other in taken if other not in chosen))
     return chosen

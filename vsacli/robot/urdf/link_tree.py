@@ -376,18 +376,17 @@ def _last_joints(urdf: Urdf, joints: Sequence[UrdfJoint]) -> list[UrdfJoint]:
 
 def _end_of_fixed_links(urdf: Urdf, link: str) -> str:
     """Return the last of the links that are fixed one to the other, before they branch."""
-    while len(fixed := fixed_links(urdf, link)) == 1:
+    while len(fixed := _fixed_links(urdf, link)) == 1:
         (link,) = fixed
     return link
 
 
-def fixed_links(urdf: Urdf, link: str) -> list[str]:
+def _fixed_links(urdf: Urdf, link: str) -> list[str]:
     """Return the links that fixed joints connect to their parent link."""
     return [joint.child for joint in urdf.joints.values() if joint.parent == link and joint.is_fixed]
 
 
 def fixed_ends(urdf: Urdf, link: str) -> list[str]:
     """Return the last links of the branches of fixed joints on a link; none without branches."""
-    fixed: Iterable[UrdfJoint] = [joint for joint in urdf.joints.values() if joint.is_fixed]
-    links = [joint.child for joint in joints_below(link, fixed)]
-    return [each for each in links if not fixed_links(urdf, each)]
+    fixed = joints_below(link, (joint for joint in urdf.joints.values() if joint.is_fixed))
+    return [joint.child for joint in fixed if not _fixed_links(urdf, joint.child)]
