@@ -65,7 +65,9 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
     findings = _HeldRun(robot, trajectory).findings
     if not findings:
         return of_joints
-    rule = Acceptance(robot, of_joints.min_margin, RecordedLimits(trajectory))
+    left_out = {cause.joint for cause in of_joints.causes if not cause.fixable}
+    ignored = frozenset(index for index, name in enumerate(robot.joint_names) if name in left_out)
+    rule = Acceptance(robot, of_joints.min_margin, RecordedLimits(trajectory), ignored=ignored)
     candidates = [Fix(0.0, robot, trajectory, asked=trajectory), *of_joints.fixes]
     chosen, hopeless = _confirmed_fixes(Task(rule, trajectory), candidates)
     if hopeless:
@@ -205,24 +207,20 @@ def _smallest_factor(
         scales[list(joints)] = factor
         return [tool for tool in tools if held.lacks(tool, scales)]
 
-    if not joints or high < low or lacking(high):
-        tool = tools[0] if not joints or high < low else lacking(high)[0]
-        raise ImpossibleError(_too_soft(robot, tool, joints, high, held.least_stiffness(tool, scales)))
+    moved, names = robot.tool_names[tools[0]], joined([robot.joint_names[joint] for joint in joints])
+    if not joints:
+        raise ImpossibleError(f"no joint that moves {moved} has a stiffness to choose")
+    if high < low:
+        raise ImpossibleError(f"no factor keeps the margins and limits of all of {names}")
+    if soft := lacking(high):
+        least, unit = held.least_stiffness(soft[0], scales), LINEAR_STIFFNESS.unit("")
+        raise ImpossibleError(
+            f"with {high:.4g} times their stiffness, the most that {names} may have, the stiffness of "
+            f"{robot.tool_names[soft[0]]} is {significant(least)} {unit}"
+        )
     for _ in range(BISECTIONS if lacking(low) else 0):
         middle = math.sqrt(low * high)
         low, high = (middle, high) if lacking(middle) else (low, middle)
     smallest = high if lacking(low) else low
     rounded = float(significant(smallest, toward=math.inf))
-    return rounded if smallest <= rounded <= high or not lacking(rounded) else smallest
-
-
-def _too_soft(robot: Robot, tool: int, joints: Sequence[int], high: float, stiffness: float) -> str:
-    """Return why no factor makes a tool stiff enough, as a clause."""
-    name, unit = robot.tool_names[tool], LINEAR_STIFFNESS.unit("")
-    if not joints:
-        return f"no joint that moves {name} has a stiffness to choose"
-    names = joined([robot.joint_names[joint] for joint in joints])
-    return (
-        f"with {high:.4g} times their stiffness, the most that {names} may have, the stiffness of {name} is "
-        f"{significant(stiffness)} {unit}"
-    )
+    return rounded if rounded <= allowed[1] else smallest
