@@ -10,6 +10,7 @@ from samples.branched import alone, random_branches
 from samples.paths import STEP, complex_torques
 from samples.robots import random_robot
 from samples.shipped import shipped_robot, shipped_run
+from samples.trees import reordered
 from samples.wrenches import held
 
 from vsacli import Trajectory, Wrench, forward_kinematics, inverse_dynamics, jacobian, tip_compliance
@@ -196,3 +197,16 @@ def at_rest(robot, q, stiffness, wrench):
     samples = {name: np.tile(row, (8, 1)) for name, row in rows.items()}
     trajectory = Trajectory.from_samples(np.arange(8) / 10, **samples, wrench_frame="base")
     return inverse_dynamics(robot, trajectory)
+
+
+def test_the_order_of_the_branches_in_a_file_does_not_matter():
+    robot = TREES[0]
+    q, stiffness, components = drawn(robot, 2)
+    other = reordered(robot, 1)
+    assert other.joint_names != robot.joint_names
+    places = [robot.joint_names.index(name) for name in other.joint_names]
+    wrench = in_base(robot, components)
+    for name in robot.tool_names:
+        expected = tip_compliance(robot, q, stiffness, name, wrench)
+        actual = tip_compliance(other, q[:, places], stiffness[:, places], name, wrench)
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=10 * ROUNDING * np.abs(expected).max())
