@@ -122,7 +122,7 @@ class HeldPose:
 
         C is NaN there, and where a value is.
         """
-        coupled, matrix = self._coupled(tool)
+        coupled, matrix = self._coupled_joints(tool)
         columns = jacobian_in_base(self._robot, self._frames, tool)[..., coupled]
         least = smallest_eigenvalues(matrix)
         stable = least > SMALLEST_EIGENVALUE
@@ -131,7 +131,7 @@ class HeldPose:
         compliance[~stable] = np.nan
         return compliance, least <= SMALLEST_EIGENVALUE
 
-    def _coupled(self, tool: int) -> tuple[list[int], FloatArray]:
+    def _coupled_joints(self, tool: int) -> tuple[list[int], FloatArray]:
         """Return the joints with springs whose deflections depend on those of a tool, and K + dg/dq of them.
 
         They are all joints on the link of the first such joint before the tool: loads on the links beyond

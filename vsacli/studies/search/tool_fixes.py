@@ -203,7 +203,7 @@ def _smallest_factor(
     """Return the smallest factor in a range with which no tool is too soft, rounded up to four digits."""
     scales, (low, high) = np.ones(len(robot.joints)), allowed
 
-    def lacking(factor: float) -> list[int]:
+    def soft_tools(factor: float) -> list[int]:
         scales[list(joints)] = factor
         return [tool for tool in tools if held.lacks(tool, scales)]
 
@@ -212,15 +212,15 @@ def _smallest_factor(
         raise ImpossibleError(f"no joint that moves {moved} has a stiffness to choose")
     if high < low:
         raise ImpossibleError(f"no factor keeps the margins and limits of all of {names}")
-    if soft := lacking(high):
+    if soft := soft_tools(high):
         least, unit = held.least_stiffness(soft[0], scales), LINEAR_STIFFNESS.unit("")
         raise ImpossibleError(
             f"with {high:.4g} times their stiffness, the most that {names} may have, the stiffness of "
             f"{robot.tool_names[soft[0]]} is {significant(least)} {unit}"
         )
-    for _ in range(BISECTIONS if lacking(low) else 0):
+    for _ in range(BISECTIONS if soft_tools(low) else 0):
         middle = math.sqrt(low * high)
-        low, high = (middle, high) if lacking(middle) else (low, middle)
-    smallest = high if lacking(low) else low
+        low, high = (middle, high) if soft_tools(middle) else (low, middle)
+    smallest = high if soft_tools(low) else low
     rounded = float(significant(smallest, toward=math.inf))
     return rounded if rounded <= allowed[1] else smallest
