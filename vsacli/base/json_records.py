@@ -89,7 +89,7 @@ def _written(record: Published, shape: Shape) -> dict[str, Any]:
     content = {}
     for key, inner in shape.items():
         value = json_value(getattr(record, inner)) if isinstance(inner, str) else _written(record, inner)
-        if not (key.endswith(OPTIONAL) and (value is False or value in (None, "", [], {}))):
+        if not (key.endswith(OPTIONAL) and (value is False or value in (None, [], {}))):
             content[key.removesuffix(OPTIONAL)] = value
     return content
 

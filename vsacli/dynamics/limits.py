@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -80,7 +80,7 @@ class Finding(Stored):
         unit: Unit of value and bound.
         motor: Motor or spring 1 or 2; None for a quantity of the joint.
         joint: Name of the joint.
-        tool: Name of the tool, in place of a joint.
+        tool: Name of the tool, in place of a joint; None for a quantity of a joint.
         between: Whether the instant lies between two samples.
         at_rest: Whether the motion is held at that instant.
         end: End of the attainable range if the bound keeps a margin from it, else NaN.
@@ -104,13 +104,17 @@ class Finding(Stored):
     advice: str = ""
     fixable: bool = True
     first: float = field(default=math.nan, compare=False)
-    tool: str = ""
+    tool: str | None = None
 
     key: ClassVar = "kind"
     shape: ClassVar = {
         **named("time", "value", "bound", "unit"),
         **{f"{name}?": name for name in ("motor", "joint", "tool", "between", "at_rest")},
     }
+
+    def as_json(self) -> dict[str, Any]:
+        """See `Published.as_json`; a tool has no joint."""
+        return {key: entry for key, entry in super().as_json().items() if key != "joint" or not self.tool}
 
     def __str__(self) -> str:
         return f"{self.tool or self.joint}: {self.text}"

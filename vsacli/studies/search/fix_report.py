@@ -303,7 +303,7 @@ class Fixes(Published):
             yield f"nothing to change: every sample has {margin} and is within all limits"
             return
         yield from map(str, self.causes)
-        left = [cause.joint or cause.tool for cause in self.causes if not cause.fixable]
+        left = [cause.tool or cause.joint for cause in self.causes if not cause.fixable]
         members = "joints and tools" if any(cause.tool for cause in self.causes) else "joints"
         but = f" of all {members} but {joined(left)}" if left and self.fixes else ""
         if self.fixes:

@@ -77,7 +77,7 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
     causes = (
         replace(finding, fixable=bool(chosen) and not advice, advice=advice)
         for finding in findings
-        for advice in [hopeless.get(finding.tool, "")]
+        for advice in [hopeless.get(finding.tool or "", "")]
     )
     return replace(
         of_joints,
