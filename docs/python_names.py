@@ -11,8 +11,8 @@ from typing import Any
 import vsacli
 
 GROUPS = {
-    "Robots": "load_robot import_urdf Robot Joint DenavitHartenberg Link Inertia Pose Limits Antagonistic "
-    "Elastic Rigid Serial Motor Friction Damper laws mechanisms Placeholders",
+    "Robots": "load_robot import_urdf Robot Joint DenavitHartenberg Link Inertia Pose Tool Limits "
+    "Antagonistic Elastic Rigid Serial Motor Friction Damper laws mechanisms Placeholders",
     "Trajectories": "load_trajectory Trajectory Motion Wrench",
     "Inverse dynamics and its results": "inverse_dynamics motor_torques Result Report Flag open_result fixes "
     "compare Comparison sensitivity Sensitivity identify Identification plan_excitation Excitation "
