@@ -35,7 +35,7 @@ def robot_lines(robot: Values) -> Iterator[str]:
         bound = f"bound {short(reach['bound'])} m"
         yield f"reach {short(reach['found'])} m from the origin of DH frame 0; {bound}"
     yield from ("", *aligned(list(_geometry(joints))))
-    yield from _mounts(joints)
+    yield from _mount_rows(joints)
     yield from ("", *aligned(list(_masses(joints))))
     yield from ("", *aligned(list(_drives(joints))), "")
     yield "static load: the largest torque of gravity that was found, over configurations within the limits"
@@ -70,7 +70,7 @@ def _geometry(joints: Sequence[Values]) -> Iterator[tuple[str, ...]]:
         yield joint["name"], *carrier, joint["type"], *numbers, limits
 
 
-def _mounts(joints: Sequence[Values]) -> Iterator[str]:
+def _mount_rows(joints: Sequence[Values]) -> Iterator[str]:
     """Yield a table of the mounts, if there are any."""
     rows = [
         (joint["name"], row(joint["mount"]["xyz"]), row(joint["mount"]["rpy"]))
