@@ -230,3 +230,10 @@ def test_ellipses_are_displacements_by_a_force(torso):
     assert LARGEST_ELLIPSE / 2.5 < largest <= LARGEST_ELLIPSE
     poses = forward_kinematics(load_robot("torso.yaml"), result.q)
     np.testing.assert_allclose(path.paths["lamp"], poses[:, -1, :3, 3], rtol=0, atol=1e-15)
+
+
+def test_an_optimization_refuses_a_limit_that_it_does_not_keep(vsacli, torso):
+    found = vsacli("optimize", *torso, "--set", "tools.left_hand.min_stiffness=300")
+    assert found.code == 2
+    assert "do not keep the min_stiffness of tools (left_hand)" in found.err
+    assert "check-feasibility --fixes" in found.err

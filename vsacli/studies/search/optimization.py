@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN, check_min_margin
 from vsacli.base.progress import Countdown
 from vsacli.base.texts import as_name
@@ -87,12 +88,13 @@ def optimize(
         progress: function to call with the number of further searches done; `searches` gives the total.
 
     Raises:
-        InputError: the trajectory is not for the robot, a required parameter is missing, or `minimize` and
-            `vary` cannot be combined.
+        InputError: the trajectory is not for the robot, a required parameter is missing, a tool has a
+            `min_stiffness`, or `minimize` and `vary` cannot be combined.
     """
     trajectory = adapt_trajectory(robot, trajectory)
     check_min_margin(min_margin)
     refuse_damped_transmissions(robot, trajectory, "optimizations")
+    _refuse_limits_of_tools(robot)
     varied = varied_joints(robot, vary)
     warnings = (*robot.warnings, *trajectory.warnings)
     what = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin, warnings=warnings)
@@ -105,6 +107,20 @@ def optimize(
     if shared:
         return cheapest_pace(what, trajectory, criterion, varied, seed, progress)
     return cheapest_stiffness(what, trajectory, criterion, seed, progress)
+
+
+def _refuse_limits_of_tools(robot: Robot) -> None:
+    """Raise an error if a tool has a smallest stiffness, which no search here keeps.
+
+    Raises:
+        InputError: with the names of the tools.
+    """
+    names = ", ".join(tool.name for tool in robot.tools if tool.min_stiffness is not None)
+    if names:
+        raise InputError.one(
+            f"optimizations do not keep the min_stiffness of tools ({names}); leave it out, and make the "
+            "optimized motion stiff enough with check-feasibility --fixes"
+        )
 
 
 def searches(robot: Robot, minimize: str, vary: str) -> int:
