@@ -145,7 +145,9 @@ def test_a_tool_of_a_chain_needs_no_dimension(tmp_path, vsacli):
     """A robot with one entry in `tools` has the wrench of a chain, in the version for trees."""
     chain = shipped_robot("vsa_3r")
     named = dataclasses.replace(chain, tools=(Tool(name="grip", joint=chain.joint_names[1]),))
-    (tmp_path / "held.yaml").write_text(f"{SWING}wrench: {{type: constant, frame: base, value: [1, 2, 3, 4, 5, 6]}}\n")
+    (tmp_path / "held.yaml").write_text(
+        f"{SWING}wrench: {{type: constant, frame: base, value: [1, 2, 3, 4, 5, 6]}}\n"
+    )
     result = inverse_dynamics(named, load_trajectory(tmp_path / "held.yaml", named))
     result.save("held.h5")
     with h5py.File("held.h5") as file:
