@@ -86,7 +86,7 @@ class _Groups:
     def _common_base(
         self, group: Element, paths: Sequence[Sequence[UrdfJoint]], moving: Sequence[UrdfJoint]
     ) -> str:
-        """Return the base link that the chains of the group share, or else the last one before all that moves.
+        """Return the base link that the chains of the group share, or else the last before all that moves.
 
         A base link beyond a joint of the group that moves is that of one chain on another.
         """
