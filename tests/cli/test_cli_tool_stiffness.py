@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 import yaml
-from samples.torso_and_hand import SWING, torso_text
+from samples.torso import SWING, torso_text
 
 from vsacli import (
     Wrench,

@@ -14,7 +14,7 @@ import scipy.io
 import xarray
 from samples.results import REPORT, PlannedTrajectory, robot, writing
 from samples.shipped import shipped_robot
-from samples.torso_and_hand import FRAMES, SWING, torso_result
+from samples.torso import FRAMES, SWING, torso_result
 
 from vsacli import InputError, Pose, Result, inverse_dynamics, load_trajectory, open_result
 from vsacli.base.variables import VARIABLES, Block, Variable, column_names, row_shape
