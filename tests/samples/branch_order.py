@@ -103,7 +103,7 @@ def differences(one: Any, other: Any, where: str = "", scale: float = 1e-9) -> I
             for number, (here, there) in enumerate(zip(_sorted(one), _sorted(other), strict=True)):
                 yield from differences(here, there, f"{where}.{number}", scale)
         case float() | int(), float() | int():
-            if not math.isclose(one, other, rel_tol=1e-6, abs_tol=scale):
+            if not math.isclose(one, other, rel_tol=1e-9, abs_tol=scale):
                 yield f"{where}: {one} and {other}"
         case _:
             if _PLACE.sub(r"\1", str(one)) != _PLACE.sub(r"\1", str(other)):
