@@ -198,3 +198,9 @@ def test_the_command_refuses_other_tools(
 ) -> None:
     refused = vsacli("codegen", two_hands(tmp_path), "-o", "f", "--wrench", words)
     assert (refused.code, problem in refused.err) == (2, True), refused.err
+
+
+def test_a_tool_has_one_frame(vsacli: Callable[..., Outcome], tmp_path: Path) -> None:
+    twice = ("--wrench", "left_hand:base", "--wrench", "left_hand:end_effector")
+    refused = vsacli("codegen", two_hands(tmp_path), "-o", "f", *twice)
+    assert (refused.code, "the tool left_hand has two frames" in refused.err) == (2, True), refused.err

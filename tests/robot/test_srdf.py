@@ -119,6 +119,21 @@ TREES = {
         ["right_hand", "left_hand"],
     ),
     "with the joint that carries both": (f'<joint name="lift"/>{BOTH}', "floor", ["left_hand", "right_hand"]),
+    "chains one after the other": (
+        '<chain base_link="torso" tip_link="left_hand"/><chain base_link="floor" tip_link="torso"/>',
+        "floor",
+        ["left_hand"],
+    ),
+    "chains that share a base link": (
+        '<chain base_link="floor" tip_link="left_hand"/><chain base_link="floor" tip_link="right_hand"/>',
+        "floor",
+        ["left_hand", "right_hand"],
+    ),
+    "a base link before a fixed joint": (
+        '<chain base_link="torso" tip_link="right"/>',
+        "torso",
+        ["right"],
+    ),
     "joints": ('<joint name="nod"/><joint name="raise_left"/>', "torso", ["head", "left"]),
 }
 
@@ -130,7 +145,8 @@ def test_a_group_may_be_a_tree(tmp_path, name):
     text = f'<robot name="x"><group name="both">{group}</group>{LEFT}{RIGHT}</robot>'
     conversion = import_urdf(urdf, srdf=write(tmp_path / "body.srdf", text), group="both")
     assert (conversion.tree.base, [tip.link for tip in conversion.tree.tips]) == (base, tips)
-    assert conversion.robot.tool_names == tuple(tips)
+    expected = tips if len(tips) > 1 else ["end_effector"]
+    assert conversion.robot.tool_names == tuple(expected)
     assert "roll" not in conversion.robot.joint_names
 
 

@@ -300,7 +300,7 @@ def inverse_dynamics(
 def _prepare_tools(robot: Robot, trajectory: Trajectory, asked: Collection[str]) -> ToolStiffness | None:
     """Return the compliance of the tools along the run; None if neither a request nor a limit needs it."""
     stored = TIP_COMPLIANCE in asked
-    if not stored and not any(tool.min_stiffness for tool in robot.tools):
+    if not (stored or robot.limited_tools):
         return None
     from vsacli.analysis.tool_stiffness import ToolStiffness
 

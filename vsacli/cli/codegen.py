@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import example, overwrite_option, read_robot, robot_argument
 from vsacli.cli.console import Exit, Talk, talk_options
@@ -35,11 +36,14 @@ def _wrench_frame(robot: Robot, wrenches: Sequence[str]) -> WrenchFrame | None:
     """Return the frame of the wrench on each tool from the option; None if nothing acts.
 
     Raises:
-        InputError: there is no such tool, or which one is not said.
+        InputError: there is no such tool, which one is not said, or one has two frames.
     """
     frames: list[str | None] = [None] * len(robot.tool_names)
     for tool, _, frame in (each.rpartition(":") for each in wrenches):
-        frames[robot.end_effector(tool or None)] = frame
+        index = robot.end_effector(tool or None)
+        if frames[index] is not None:
+            raise InputError.one(f"the tool {robot.tool_names[index]} has two frames; give one")
+        frames[index] = frame
     if not wrenches:
         return None
     return tuple(frames) if len(frames) > 1 else frames[0]

@@ -72,7 +72,7 @@ def tip_compliance(
 
 def _check_same_shape(name: str, array: FloatArray, shape: tuple[int, ...]) -> None:
     if np.shape(array) != shape:
-        raise InputError.one(f"{name} must have the shape {shape}, as q, not {np.shape(array)}")
+        raise InputError.one(f"{name} must have the shape {shape}, not {np.shape(array)}")
 
 
 def softest_direction(compliance: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -128,7 +128,7 @@ class HeldPose:
         stable = least > SMALLEST_EIGENVALUE
         matrix[~stable] = np.eye(len(coupled))
         compliance: FloatArray = columns @ np.linalg.solve(matrix, np.swapaxes(columns, -1, -2))
-        compliance[~stable] = np.nan
+        compliance[~stable | ~np.isfinite(columns).all(axis=(-2, -1))] = np.nan
         return compliance, least <= SMALLEST_EIGENVALUE
 
     def _coupled_joints(self, tool: int) -> tuple[list[int], FloatArray]:

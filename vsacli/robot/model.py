@@ -126,13 +126,13 @@ class Robot(DeclaredRecord):
         rows: list[tuple[str, ...]] = [("joint", "type", "actuator"), *joints]
         if self.is_plain_chain:
             return rows
-        carriers = [FRAME_0 if parent < 0 else self.joint_names[parent] for parent in self.parents]
         tools = [
             ", ".join(tool.name for tool in self.end_effectors if tool.joint == name) or "-"
             for name in self.joint_names
         ]
         return [
-            (*row, *further) for row, *further in zip(rows, ["on", *carriers], ["tools", *tools], strict=True)
+            (*row, *further)
+            for row, *further in zip(rows, ["on", *self.parent_names], ["tools", *tools], strict=True)
         ]
 
     def replace(self, path: str | Mapping[str, Any], value: Any = None) -> Self:
@@ -178,6 +178,11 @@ class Robot(DeclaredRecord):
             number - 1 if joint.parent is None else index[joint.parent]
             for number, joint in enumerate(self.joints)
         )
+
+    @property
+    def parent_names(self) -> tuple[str, ...]:
+        """Name of the joint on whose link each joint is mounted, or `FRAME_0`."""
+        return tuple(FRAME_0 if parent < 0 else self.joint_names[parent] for parent in self.parents)
 
     @cached_property
     def paths(self) -> tuple[tuple[int, ...], ...]:
@@ -227,6 +232,11 @@ class Robot(DeclaredRecord):
         return tuple(tool.name for tool in self.end_effectors)
 
     @property
+    def limited_tools(self) -> tuple[str, ...]:
+        """Names of the tools with a `min_stiffness`."""
+        return tuple(tool.name for tool in self.tools if tool.min_stiffness is not None)
+
+    @property
     def labels(self) -> Labels:
         """Labels along each dimension of the variables of results."""
         return dimension_labels(self.joint_names, self.tool_names)
@@ -253,7 +263,7 @@ class Robot(DeclaredRecord):
         if variable.requires == TOOLS:
             return bool(self.end_effectors)
         if variable.requires == MIN_STIFFNESS:
-            return any(tool.min_stiffness is not None for tool in self.end_effectors)
+            return bool(self.limited_tools)
         if variable.requires == LOSSES:
             return any(joint.has_friction or joint.damper is not None for joint in self.joints)
         required_of_none = variable.requires in OF_ANY_ROBOT

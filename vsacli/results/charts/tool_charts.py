@@ -30,15 +30,20 @@ class _SoftestDirections:
     """A result with four values for each tool: stiffness in the softest direction, and this unit vector."""
 
     def __init__(self, result: StoredResult) -> None:
-        self._result = result
+        self._result, self._before = result, np.full((1, len(result.tool_names), 3), np.nan)
         self.time, self.joint_names = result.time, result.tool_names
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray:
-        """Return samples start..stop-1, (samples, tools, 4); NaN where there is no direction."""
+        """Return samples start..stop-1, (samples, tools, 4); NaN where there is no direction.
+
+        A block continues the sign of the direction of the block read before.
+        """
         stiffness, direction = softest_direction(self._result.read(name, start, stop).astype(np.float64))
         stiffness[np.isinf(stiffness)] = np.nan
-        turns = np.sum(direction[1:] * direction[:-1], axis=-1, keepdims=True) < 0
-        direction[1:] *= np.cumprod(np.where(turns, -1, 1), axis=0)  # either sign is a softest direction
+        before = np.concatenate([self._before, direction[:-1]])
+        turns = np.sum(direction * before, axis=-1, keepdims=True) < 0
+        direction *= np.cumprod(np.where(turns, -1, 1), axis=0)  # either sign is a softest direction
+        self._before = direction[-1:]
         return np.concatenate([stiffness[..., None], direction], axis=-1)
 
 

@@ -40,7 +40,6 @@ from vsacli.results.store.schema import (
     unit_attributes,
     variable_attributes,
 )
-from vsacli.robot.joint import FRAME_0
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -223,9 +222,8 @@ def resolve(robot: Robot) -> list[ResolvedField]:
 
     If the robot has the field `parent`, it has the parent of each joint.
     """
-    parents = [FRAME_0 if parent < 0 else robot.joint_names[parent] for parent in robot.parents]
     return [
-        field._replace(values=np.array(parents, dtype=object)) if field.path == PARENTS else field
+        field._replace(values=np.array(robot.parent_names, dtype=object)) if field.path == PARENTS else field
         for field in _resolved(robot)
     ]
 

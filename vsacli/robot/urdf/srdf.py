@@ -86,10 +86,13 @@ class _Groups:
     def _common_base(
         self, group: Element, paths: Sequence[Sequence[UrdfJoint]], moving: Sequence[UrdfJoint]
     ) -> str:
-        """Return the last link before all moving joints; of a single chain, the base link if it names one."""
-        chain = next(group.children_with_tag("chain"), None)
-        if chain is not None and len(paths) == 1:
-            return chain.attributes["base_link"]
+        """Return the base link that the chains of the group share, or else the last before all that moves.
+
+        A base link beyond a joint of the group that moves is that of one chain on another.
+        """
+        stated = {chain.attributes["base_link"] for chain in group.children_with_tag("chain")}
+        if len(stated) == 1 and not any(joint in moving for joint in self._urdf.joints_above(*stated)):
+            return stated.pop()
         before = [itertools.takewhile(lambda joint: joint not in moving, path) for path in paths]
         base = self._urdf.root
         for joint, *others in zip(*before, strict=False):

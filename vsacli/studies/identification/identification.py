@@ -169,8 +169,7 @@ def _pushed_tools(robot: Robot, record: Record) -> str:
     """Return the tools on which a wrench is recorded, joined; "" if there are none."""
     tools = robot.tool_names
     words = {tool: wrench_columns(f"{tool}.{WRENCH_NAMES[0]}") for tool in tools}
-    if len(tools) <= 1:
-        words["the end effector"] = wrench_columns(WRENCH_NAMES[0])
+    words["the end effector" if len(tools) == 1 else "a tool"] = wrench_columns(WRENCH_NAMES[0])
     return " and ".join(tool for tool, each in words.items() if not set(each).isdisjoint(record.unused))
 
 

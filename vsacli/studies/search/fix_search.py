@@ -73,7 +73,7 @@ def fixes(
     """
     trajectory = adapt_trajectory(robot, trajectory)
     check_min_margin(min_margin)
-    if any(tool.min_stiffness for tool in robot.tools):
+    if robot.limited_tools:
         from vsacli.studies.search.tool_fixes import with_stiff_tools, without_limits
 
         of_joints = fixes(without_limits(robot), trajectory, min_margin, progress=progress)

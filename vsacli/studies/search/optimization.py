@@ -115,8 +115,8 @@ def _refuse_limits_of_tools(robot: Robot) -> None:
     Raises:
         InputError: with the names of the tools.
     """
-    names = ", ".join(tool.name for tool in robot.tools if tool.min_stiffness is not None)
-    if names:
+    if robot.limited_tools:
+        names = ", ".join(robot.limited_tools)
         raise InputError.one(
             f"optimizations do not keep the min_stiffness of tools ({names}); leave it out, and make the "
             "optimized motion stiff enough with check-feasibility --fixes"

@@ -18,6 +18,7 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import joined, significant
 from vsacli.base.units import LINEAR_STIFFNESS
 from vsacli.base.wrench import Wrench
+from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.compliance import HeldPose, softest_direction
 from vsacli.robot.model import Robot
@@ -38,6 +39,9 @@ from vsacli.trajectory.trajectory import Trajectory
 
 LARGEST_FACTOR = 1e3
 """Largest factor that is tried where springs have no largest stiffness."""
+
+JOINTS_FALL_SHORT = "joints fall short as well, which a factor on the stiffness does not change"
+"""Reason why no factor does alone what it does together with a fix of joints."""
 
 BISECTIONS = 20
 """Halvings of the range of a factor: at most 1e-5 of it remains, less than its four digits."""
@@ -65,6 +69,7 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
     findings = _HeldRun(robot, trajectory).findings
     if not findings:
         return of_joints
+    refuse_damped_transmissions(robot, trajectory, "fixes")
     left_out = {cause.joint for cause in of_joints.causes if not cause.fixable}
     ignored = frozenset(index for index, name in enumerate(robot.joint_names) if name in left_out)
     rule = Acceptance(robot, of_joints.min_margin, RecordedLimits(trajectory), ignored=ignored)
@@ -74,6 +79,7 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
         limited = replace(rule, robot=without_limits(robot, hopeless))
         chosen, _ = _confirmed_fixes(Task(limited, trajectory), candidates)
     alone = next((fix.stiffness_factor for fix in chosen if fix.kinds == {"stiffness_factor"}), None)
+    not_alone = (JOINTS_FALL_SHORT,) if of_joints.needed else (NOT_CONFIRMED,)
     causes = (
         replace(finding, fixable=bool(chosen) and not advice, advice=advice)
         for finding in findings
@@ -81,7 +87,7 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
     )
     return replace(
         of_joints,
-        stiffness_factor=alone or NotPossible(tuple(hopeless.values()) or (NOT_CONFIRMED,)),
+        stiffness_factor=alone or NotPossible(tuple(hopeless.values()) or not_alone),
         causes=(*of_joints.causes, *causes),
         fixes=tuple(sorted(chosen, key=lambda fix: (fix.branch is not None, fix.size))),
     )
