@@ -14,7 +14,7 @@ import scipy.io
 import xarray
 from samples.results import REPORT, PlannedTrajectory, robot, writing
 from samples.shipped import shipped_robot
-from samples.torso import FRAMES, SWING, torso_result
+from samples.torso import FRAMES, SWING, torso, torso_result
 
 from vsacli import InputError, Pose, Result, inverse_dynamics, load_trajectory, open_result
 from vsacli.base.variables import VARIABLES, Block, Variable, column_names, row_shape
@@ -130,6 +130,15 @@ def test_charts_name_the_tools(path):
     ]
     assert [line.label for line in charts[5].lines] == ["mx", "my", "mz"]
     assert [line.curve.values[0] for line in charts[5].lines] == [16.0, 17.0, 18.0]
+
+
+def test_some_joints_of_a_tree_have_its_wrenches_but_no_compliance(tmp_path):
+    inverse_dynamics(*torso(tmp_path), tip_compliance=True).save(tmp_path / "soft.h5")
+    with open_stored(tmp_path / "soft.h5") as stored:
+        names = ("wrench", "tip_compliance", "tool_flags")
+        for joints, shown in (((), names), (("pole",), names[:1])):
+            part = Excerpt(stored, joints)
+            assert tuple(name for name in names if part.has_variable(part.declared[name])) == shown
 
 
 def test_info_names_the_tools(path, vsacli):

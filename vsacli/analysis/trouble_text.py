@@ -303,7 +303,7 @@ def _unstable_text(joint: JointReport, worst: Finding, samples: int) -> str:
 
 def _buckling_text(tool: ToolReport, worst: Finding, samples: int) -> str:
     return (
-        f"{worst.text}; increase the stiffness of the joints that carry it "
+        f"{worst.text}; increase the stiffness of the joints that move the tool "
         f"({_occurrence_text(tool, 'singular', samples)})"
     )
 

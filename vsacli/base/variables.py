@@ -53,8 +53,9 @@ class Variable(NamedTuple):
 
     Attributes:
         name: name in files and in Python.
-        dims: dimensions after `time`: (), ("joint",), ("joint", "motor") or ("wrench_axis",); see
-            `variables_by_tool` for robots with several tools.
+        dims: dimensions after `time`: (), ("joint",), ("joint", "motor"), ("wrench_axis",), ("tool",) or
+            ("tool", "displacement_axis", "wrench_axis"); see `variables_by_tool` for robots with several
+            tools.
         quantity: units at revolute and prismatic joints, or of moments and forces.
         long_name: short description.
         equation: number in Buondonno & De Luca (2016), or source of the value.
@@ -251,12 +252,16 @@ VARIABLES: dict[str, Variable] = {
 
 
 class Block:
-    """Variables over consecutive samples, as attributes of shape (samples, joints[, 2]).
+    """Variables over consecutive samples, as attributes.
+
+    Shapes are (samples, joints[, 2]); (samples, 6 tools) of the wrench, the six components of each tool in
+    turn; (samples, tools, 6, 6) of `tip_compliance`; and (samples, tools) of `tool_flags`.
 
     A value that cannot be computed is NaN, and `flags` gives the reason; a variable that the joint's actuator
-    does not have is NaN throughout. Missing variables are None: the wrench, (samples, 6 tools), of a
-    trajectory without one; `motor_energy`, an integral over all earlier samples, and standard deviations
-    until the block has its place in a run; standard deviations if no signal was recorded.
+    does not have is NaN throughout. Missing variables are None: the wrench of a trajectory without one;
+    `tip_compliance` if it is not requested, and `tool_flags` if no tool has a `min_stiffness` either;
+    `motor_energy`, an integral over all earlier samples, and standard deviations until the block has its
+    place in a run; standard deviations if no signal was recorded.
 
     Attributes:
         declared: variables that a block may have, by name.

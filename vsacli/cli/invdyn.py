@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     help="Result file to write.",
     show_default="ROBOT-TRAJECTORY.h5 in the current folder",
 )
-@variables_option("all", "; all,tip_compliance adds how far tools yield")
+@variables_option("all", "; all,tip_compliance adds the compliance of tools")
 @click.option(
     "--store-precision",
     "precision",

@@ -80,9 +80,10 @@ def plot(
     A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
     <stem>-motion, <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give
     <stem>-losses if the robot has dry friction or dampers, and <stem>-motor-current and <stem>-motor-voltage
-    if its motors have the constants for them; results of robots with dampers give <stem>-damper. Two or more
-    FILEs give one figure <stem>-<stem>-compare: motor torques of results, or position errors of simulations,
-    overlaid joint by joint, and their differences from the first.
+    if its motors have the constants for them; results of robots with dampers give <stem>-damper, and those
+    with tip_compliance <stem>-tool-stiffness and <stem>-tool-path. Two or more FILEs give one figure
+    <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid joint by
+    joint, and their differences from the first.
 
     A recording, a CSV file or a trajectory with recorded signals, gives <stem>-recording: the samples of each
     signal, the fitted spline, the residual and the spectra of both. A result computed from a recording gives

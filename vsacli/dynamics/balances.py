@@ -344,6 +344,9 @@ _Axes: TypeAlias = tuple[Vector, Vector, Vector]
 class _FrameVelocity(NamedTuple):
     """Motion of a link frame, in components of that frame.
 
+    Derived along the links from the rows themselves, on purpose not from the frames of `kinematics`: it is an
+    independent check, which shares no fault with what it checks.
+
     Attributes:
         origin: Vector from the origin of frame 0.
         velocity: Velocity of the origin.

@@ -16,7 +16,7 @@ class CommandedJoints:
     """The joints that a trajectory commands, and the tools on which it may let wrenches act.
 
     Attributes:
-        types: joint types by joint name, from the base to the tip.
+        types: joint types by joint name, in the order of the robot file.
         exempt: joints that a signal does not command, by signal key; each name with the reason, a clause.
         rigid: whether all joints are rigid, so that torques do not depend on jerk and snap.
         tools: names of the tools on which wrenches may act.

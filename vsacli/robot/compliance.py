@@ -184,7 +184,7 @@ def holding_torque_slope(robot: Robot, frames: RobotFrames, wrench: Wrench | Non
 
     With the axis z of a joint, levers r from it, and forces f and moments m on all that it carries, dg/dq of
     a joint j and of i, which carries it, is z_i^T (tr(V) - V) z_j with V = sum r f^T if both are revolute,
-    -sum f . (z_i x z_j) if only j is prismatic, and 0 if i is. dg_j/dq_i has -m . (z_i x z_j) besides.
+    -sum f . (z_i x z_j) if only j is prismatic, and 0 if i is. dg_j/dq_i has -m . (z_i x z_j) in addition.
 
     Args:
         robot: Robot.

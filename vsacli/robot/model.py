@@ -69,7 +69,7 @@ class Robot(DeclaredRecord):
         ItemsByName(RecordOf(Tool)), "end effectors by name, instead of `tool`", default=()
     )
     joints: tuple[Joint, ...] = value(
-        Items(RecordOf(Joint), unique="name"), "joints from the base to the tips"
+        Items(RecordOf(Joint), unique="name"), "joints, each after the one that carries it"
     )
     sources: tuple[Source, ...] = field(default=(), kw_only=True, repr=False, compare=False)
 

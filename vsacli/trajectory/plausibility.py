@@ -278,12 +278,14 @@ MOTION_RULES: tuple[Rule[CheckedTrajectory], ...] = (
 )  # fmt: skip
 
 EFFORT_RULES: tuple[Rule[CheckedTrajectory], ...] = (
-    Rule("forces on the end effector", "`wrench`", lambda checked: _measure_wrenches(checked, forces=True),
+    Rule("forces on the end effector", "`wrench`, `wrenches`",
+        lambda checked: _measure_wrenches(checked, forces=True),
         size=f"over the weight; above 1 only from {COMMON_FORCE:g} N on",
         low=1e-4, high=10, usual=0.2, reason="the robot could not bear more, and would not feel less",
         finding="is {size} of the weight of the robot",
         units=(OtherUnit("kN", 1e3), OtherUnit("g", 9.81e-3), OtherUnit("mN", 1e-3)), explained_by=SIZES),
-    Rule("moments on the end effector", "`wrench`", lambda checked: _measure_wrenches(checked, forces=False),
+    Rule("moments on the end effector", "`wrench`, `wrenches`",
+        lambda checked: _measure_wrenches(checked, forces=False),
         size=f"over weight times reach; above 1 only from {COMMON_MOMENT:g} N m on",
         low=1e-5, high=10, usual=0.02, reason="the robot could not bear more, and would not feel less",
         finding="is {size} of the weight of the robot at its reach",

@@ -12,7 +12,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.variables import OF_ANY_ROBOT, Variable
+from vsacli.base.variables import MIN_STIFFNESS, OF_ANY_ROBOT, TOOLS, Variable
 from vsacli.results.store.reader import StoredResult
 
 Span = tuple[float, float]
@@ -26,7 +26,7 @@ class Excerpt(StoredResult):
 
     Args:
         whole: open file, which must stay open.
-        joints: names in any order, read from base to tip; all joints if empty.
+        joints: names in any order, read in the order of the file; all joints if empty.
         span: time span.
 
     Raises:
@@ -75,7 +75,7 @@ class Excerpt(StoredResult):
 
     def has_variable(self, variable: Variable) -> bool:
         """Return whether these joints have the variable, as far as that depends on the robot file."""
-        if "tool" in variable.dims:  # tools are moved by all joints
+        if variable.requires in (TOOLS, MIN_STIFFNESS):  # compliance depends on joints that are not shown
             return len(self._joints) == len(self._original.joint_names) and super().has_variable(variable)
         one_of_them = variable.requires in OF_ANY_ROBOT or bool(self.existing(variable).any())
         return one_of_them and super().has_variable(variable)

@@ -57,7 +57,7 @@ class StoredGeometry(NamedTuple):
         """Return the geometry of joints with these names and types.
 
         Args:
-            joint_names: names of the joints, base to tips.
+            joint_names: names of the joints, in the order of the robot file.
             joint_types: "revolute" or "prismatic".
             arrays: the stored ones of `ARRAYS`.
 

@@ -154,7 +154,8 @@ class StoredResult(StoredFile):
         attributes: root attributes, e.g. `created`, `command_line`, `versions`.
         robot_name, trajectory_name, verdict: as in the report.
         complete: False if the run ended early at an infeasible sample.
-        joint_names, joint_types: names and types ("revolute" or "prismatic"), base to tip.
+        joint_names, joint_types: names and types ("revolute" or "prismatic"), in the order of
+            the robot file.
         tool_names: names of the tools.
         actuators: kind of the actuator of each joint.
         gear_ratio: gear ratios of the motors, (joints, 2); NaN where the robot file gives none.

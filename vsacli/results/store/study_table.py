@@ -93,7 +93,7 @@ class Head(NamedTuple):
         study, robot: names of the study and of the robot.
         fingerprint: digest of the whole study, common to all its parts.
         runs: number of runs of the study; the table may contain a part of them.
-        joint_names, joint_types: names and types of the joints, base to tip.
+        joint_names, joint_types: names and types of the joints, in the order of the robot file.
         parameters: varying parameters, with units.
         columns: columns stored for each run.
         steps: maximum number of samples of columns over time.
@@ -261,7 +261,7 @@ class StoredStudy(StoredFile):
         path: path as given.
         attributes: root attributes.
         study_name, robot_name: names as in the input files.
-        joint_names, joint_types: names and types of the joints, base to tip.
+        joint_names, joint_types: names and types of the joints, in the order of the robot file.
         parameters: paths of the varying parameters.
         columns: names of the columns.
         rows: number of runs in the table.
