@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from samples.trees import finger, hand, reordered, tree_run, tree_text
+from samples.trees import TreeMotion, finger, hand, reordered, tree_run, tree_text
+from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
 
 _PLACE = re.compile(r"\w+/(\w+\.yaml)(:\d+: )?")
@@ -37,57 +38,64 @@ def write_orders(
 
     Its joints have a `share` of a stiffness that most of them attain.
     """
-    robot, stiffness = _tree(seed, joints, share)
-    first = _write("first", robot, stiffness, folder)
-    return first, _write("second", reordered(robot, seed), stiffness, folder)
+    robot, motion = _tree(seed, joints, share)
+    first = _write("first", robot, motion, folder)
+    return first, _write("second", reordered(robot, seed), motion, folder)
 
 
 def write_branches(seed: int, joints: int, share: float = 0.95, folder: Path = Path()) -> Iterator[TreeFiles]:
     """Files of each subtree of the same random tree that stands on the base, alone."""
-    robot, stiffness = _tree(seed, joints, share)
+    robot, motion = _tree(seed, joints, share)
     for number, subtree in enumerate(robot.subtrees):
-        yield _write(f"branch_{number}", finger(robot, subtree[0]), stiffness, folder)
+        yield _write(f"branch_{number}", finger(robot, subtree[0]), motion, folder)
 
 
 def write_hand(soft: str, folder: Path = Path()) -> TreeFiles:
     """Files of five equal fingers on the base, of which one joint has less stiffness than its springs."""
     robot = hand(5, 2, palm=False)
-    return _write("hand", robot, {**dict.fromkeys(robot.joint_names, 5e3), soft: 500.0}, folder)
+    stiffness = {**dict.fromkeys(robot.joint_names, np.full(2, 5e3)), soft: np.full(2, 500.0)}
+    q = dict.fromkeys(robot.joint_names, np.array([0.0, 0.3]))
+    return _write("hand", robot, TreeMotion(q, stiffness, {}, {}), folder)
 
 
-def _tree(seed: int, joints: int, share: float) -> tuple[Robot, dict[str, float]]:
-    """A random tree, and the stiffness of each joint that has one."""
+def _tree(seed: int, joints: int, share: float) -> tuple[Robot, TreeMotion]:
+    """A random tree, and its motion with a share of its stiffness."""
     robot, motion = tree_run(seed, joints)
-    lowest = {name: float(np.min(values)) for name, values in motion.stiffness.items()}
-    return robot, {name: share * value for name, value in lowest.items() if math.isfinite(value)}
+    stiffness = {name: share * values for name, values in motion.stiffness.items()}
+    return robot, motion._replace(stiffness=stiffness)
 
 
-def _write(name: str, robot: Robot, stiffness: dict[str, float], folder: Path) -> TreeFiles:
-    """Write a robot, and its motion from rest to rest, with values by joint."""
+def _write(name: str, robot: Robot, motion: TreeMotion, folder: Path) -> TreeFiles:
+    """Write a robot, and its motion with values by joint and wrenches by tool."""
     (folder / name).mkdir()
     files = TreeFiles(folder / name / "robot.yaml", folder / name / "motion.yaml")
     files.robot.write_text(tree_text(robot))
-    motion = {
+    document: dict[str, Any] = {
         "format": "vsacli-trajectory/1",
         "name": "reach",
         "duration": 1.0,
         "rate": 40,
-        "position": {
-            "type": "polynomial",
-            "degree": 7,
-            "start": 0.0,
-            "end": {j: _goal(j) for j in robot.joint_names},
-        },
+        "position": _polynomial(9, {joint: motion.q[joint] for joint in robot.joint_names}),
     }
-    if commanded := {joint: stiffness[joint] for joint in robot.joint_names if joint in stiffness}:
-        motion["stiffness"] = {"type": "constant", "value": commanded}
-    files.motion.write_text(json.dumps(motion))
+    stiffness = {joint: motion.stiffness[joint] for joint in robot.joint_names}
+    if commanded := {joint: ends for joint, ends in stiffness.items() if np.isfinite(ends).all()}:
+        document["stiffness"] = _polynomial(5, commanded)
+    if pushed := [tool for tool in robot.tool_names if motion.frames.get(tool)]:
+        document["wrenches"] = {
+            tool: _polynomial(5, motion.wrenches[tool]) | {"frame": motion.frames[tool]} for tool in pushed
+        }
+    files.motion.write_text(json.dumps(document))
     return files
 
 
-def _goal(joint: str) -> float:
-    """A position that depends on the name of the joint alone, rad (m)."""
-    return float(np.random.default_rng(list(joint.encode())).uniform(-0.5, 0.5))
+def _polynomial(degree: int, ends: FloatArray | dict[str, FloatArray]) -> dict[str, Any]:
+    """A polynomial between the ends of each joint, by name, or component."""
+    names = ("start", "end")
+    if isinstance(ends, dict):
+        values = [{joint: float(pair[end]) for joint, pair in ends.items()} for end in range(2)]
+    else:
+        values = ends.T.tolist()
+    return {"type": "polynomial", "degree": degree, **dict(zip(names, values, strict=True))}
 
 
 def differences(one: Any, other: Any, where: str = "", scale: float = 1e-9) -> Iterator[str]:
