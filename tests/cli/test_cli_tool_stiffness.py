@@ -7,17 +7,20 @@ import json
 import numpy as np
 import pytest
 import yaml
-from samples.torso_and_hand import SWING, torso_text
+from samples.torso import SWING, torso_text
 
 from vsacli import (
+    Wrench,
     forward_kinematics,
     inverse_dynamics,
+    jacobian,
     load_robot,
     load_trajectory,
     open_result,
     tip_compliance,
 )
 from vsacli.analysis.report import Report
+from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.results.charts.tool_charts import LARGEST_ELLIPSE, tool_path
 
 TOOLS = ("left_hand", "right_hand", "lamp")
@@ -26,7 +29,7 @@ ASKED = ("--variables", "all,tip_compliance")
 
 @pytest.fixture
 def torso(own_folder):
-    """The paths of the torso and a swing of it; the left hand is pushed where wrenches have a frame."""
+    """The paths of the torso and a swing of it, on which nothing is pushed."""
     (own_folder / "torso.yaml").write_text(torso_text())
     (own_folder / "swing.yaml").write_text(SWING)
     return "torso.yaml", "swing.yaml"
@@ -75,6 +78,42 @@ def test_compliance_is_computed_when_asked_for(vsacli, torso):
         assert Report.from_json(result.report.as_json()) == result.report
     with open_result("kept.h5") as again:
         assert set(again.variables) == set(result.variables)
+
+
+WRENCHES = """wrenches:
+  left_hand: {type: constant, frame: base, value: [20, -15, 25, 2, -1, 1.5]}
+  lamp: {type: constant, frame: end_effector, value: [-10, 30, 5, 0, 1, -2]}
+"""
+
+STEP = 1e-4
+"""Step of central differences, rad."""
+
+
+def test_compliance_has_the_slope_of_gravity_and_of_the_wrench_on_each_tool(vsacli, torso):
+    """At a sample in the middle; differences err by STEP^2/6 of torques that are below the stiffness."""
+    with open("swing.yaml", "a") as stream:
+        stream.write(WRENCHES)
+    assert vsacli("invdyn", *torso, *ASKED, "-o", "swing.h5").code == 0
+    robot = load_robot("torso.yaml")
+    with open_result("swing.h5") as result:
+        q, stiffness, compliance = (
+            getattr(result, name)[17] for name in ("q", "stiffness", "tip_compliance")
+        )
+        wrench = result.wrench[17].reshape(3, 2, 3)
+    wrench[2] = wrench[2] @ forward_kinematics(robot, q)[-1, :3, :3].T  # to base axes, which it keeps
+    held = Wrench.constant(np.tile(wrench.ravel(), (len(q), 1)), ("base", None, "base"))
+    ahead, behind = (
+        link_torques(robot, row, wrench=held).tau_e
+        for row in (q + STEP * np.eye(len(q)), q - STEP * np.eye(len(q)))
+    )
+    slope = (ahead - behind).T / (2 * STEP)
+    for index, tool in enumerate(TOOLS):
+        columns = jacobian(robot, q, "base", tool=tool)
+        expected = columns @ np.linalg.inv(np.diag(stiffness) + slope) @ columns.T
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(compliance[index], expected, rtol=0, atol=STEP**2 * size)
+        of_gravity = tip_compliance(robot, q, stiffness, tool)
+        assert np.abs(compliance[index] - of_gravity).max() > 1e-4 * size
 
 
 def test_exports_have_a_column_for_each_entry(vsacli, torso):
@@ -206,13 +245,17 @@ def test_figures_show_stiffness_and_path_of_tools(vsacli, torso):
     ]
     with open_result("swing.h5") as result:
         figures = result.plot()
-    lines = {line.get_label(): line for line in figures["tool-stiffness"].axes[0].lines}
+        compliance = result.tip_compliance
+    over_time = figures["tool-stiffness"].axes[0]
     assert list(figures) == names
     assert [axes.get_title(loc="left") for axes in figures["tool-stiffness"].axes] == [
         "stiffness in the softest direction",
         *(f"softest direction of {tool}" for tool in TOOLS),
     ]
-    assert lines
+    assert tuple(text.get_text() for text in over_time.get_legend().texts) == TOOLS
+    for index, line in enumerate(over_time.lines):
+        least = 1 / np.linalg.eigvalsh(compliance[:, index, :3, :3])[:, -1]
+        np.testing.assert_allclose(line.get_ydata(), least, rtol=1e-12)  # rounding of eigenvalues
     of_elbow = vsacli("plot", "swing.h5", "--joints", "left_elbow", "-o", "elbow")
     assert "tool" not in of_elbow.err
     assert vsacli("plot", "swing.h5", "--variables", "tip_compliance", "-o", "elbow").code == 2

@@ -118,6 +118,8 @@ def solving_program(robot: Robot) -> Program:
 
 
 def test_branches_do_not_fill_in() -> None:
-    costs = [len(solving_program(hand(fingers, 3, palm=False)).operations) for fingers in (1, 2, 6)]
-    one, two, six = costs
-    assert (two, six) == (2 * one, 6 * one)
+    """Each further finger of a palm costs as much as the second, however many there are before it."""
+    costs = [len(solving_program(hand(fingers, 3)).operations) for fingers in (1, 2, 3, 6)]
+    one, two, three, six = costs
+    assert three - two == two - one
+    assert six - two == 4 * (two - one)

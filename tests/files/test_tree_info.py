@@ -6,7 +6,7 @@ import json
 import math
 
 import pytest
-from samples.torso_and_hand import torso_text, written
+from samples.torso import torso_text, written
 
 from vsacli import load_robot
 

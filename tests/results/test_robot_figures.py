@@ -16,7 +16,8 @@ from samples.figures import smallest_stiffness
 from samples.marks import slow_but
 from samples.robots import random_motion, random_robot
 from samples.shipped import shipped_robot, shipped_run
-from samples.torso_and_hand import hand_text, torso_text, written
+from samples.torso import torso_text, written
+from samples.trees import hand
 from samples.wrenches import held
 
 from vsacli import inverse_dynamics, load_robot
@@ -233,12 +234,12 @@ def test_a_tree_is_drawn_with_every_branch_and_tool(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_all_joints_of_a_hand_are_named(tmp_path: Path) -> None:
-    hand = load_robot(written(tmp_path, hand_text()))
-    figure = arm_figure(arm_chart(hand))
-    assert {*hand.joint_names, *hand.tool_names} <= {text.get_text() for text in figure.axes[0].texts}
+def test_all_joints_of_a_hand_are_named() -> None:
+    robot = hand(5, 4)
+    figure = arm_figure(arm_chart(robot))
+    assert {*robot.joint_names, *robot.tool_names} <= {text.get_text() for text in figure.axes[0].texts}
     figure.draw_without_rendering()
-    names = [text for text in figure.axes[0].texts if text.get_text() in hand.joint_names]
+    names = [text for text in figure.axes[0].texts if text.get_text() in robot.joint_names]
     boxes = sorted((text.get_window_extent() for text in names), key=lambda box: float(box.y0))
     assert all(below.y1 <= above.y0 + 1 for below, above in itertools.pairwise(boxes))
 

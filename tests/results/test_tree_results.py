@@ -3,32 +3,34 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 import scipy.io
 import xarray
-from samples.results import REPORT, PlannedTrajectory, robot
-from samples.torso_and_hand import FRAMES, hand_text, torso, torso_result, written
+from samples.results import REPORT, PlannedTrajectory, robot, writing
+from samples.shipped import shipped_robot
+from samples.torso import FRAMES, SWING, torso, torso_result
 
-from vsacli import InputError, Pose, Result, inverse_dynamics, load_robot, open_result
-from vsacli.base.outputs import Outputs
-from vsacli.base.units import DIMENSIONLESS
-from vsacli.base.variables import VARIABLES, Variable, column_names, row_shape
+from vsacli import InputError, Pose, Result, inverse_dynamics, load_trajectory, open_result
+from vsacli.base.variables import VARIABLES, Block, Variable, column_names, row_shape
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.results.charts.stored import StoredCharts
 from vsacli.results.store.excerpt import Excerpt
-from vsacli.results.store.reader import StoredResult, open_stored
-from vsacli.results.store.writer import ResultWriter
+from vsacli.results.store.reader import open_stored
+from vsacli.robot.joint import Tool
 from vsacli.robot.kinematics import Geometry, frames_in_base
 
 TOOLS = ("left_hand", "right_hand", "lamp")
 PUSHES = np.array([*range(1, 7), *[0] * 6, *range(13, 19)], dtype=float)
 """Components of the wrenches of the torso."""
+
+UNITS_OF_COMPLIANCE = [["m/N"] * 3 + ["m/(N m)"] * 3] * 3 + [["rad/N"] * 3 + ["rad/(N m)"] * 3] * 3
+"""Units of displacements, then of rotations, by forces and moments."""
 
 
 @pytest.fixture(scope="module")
@@ -148,60 +150,57 @@ def test_info_names_the_tools(path, vsacli):
     assert "tools left_hand, right_hand, lamp" in vsacli("info", path).out.splitlines()
 
 
-def test_a_tool_of_a_chain_needs_no_dimension(tmp_path):
+def test_a_tool_of_a_chain_needs_no_dimension(tmp_path, vsacli):
     """A robot with one entry in `tools` has the wrench of a chain, in the version for trees."""
-    robot = load_robot(written(tmp_path, hand_text(fingers=1)))
-    assert robot.labels["tool"] == ("tip_0",)
-    assert not robot.is_plain_chain
-
-
-COMPLIANCE = Variable(
-    "tip_compliance", ("tool", "displacement_axis", "wrench_axis"), DIMENSIONLESS, "compliance", "test"
-)
-TOOL_FLAGS = Variable("tool_flags", ("tool",), DIMENSIONLESS, "flags of tools", "test")
-FURTHER = {**VARIABLES, "tip_compliance": COMPLIANCE, "tool_flags": TOOL_FLAGS}
-"""Variables with declarations that have a dimension of tools for any robot."""
-
-
-class FurtherWriter(ResultWriter):
-    """A writer of results with these variables."""
-
-    _declared = FURTHER
+    chain = shipped_robot("vsa_3r")
+    named = dataclasses.replace(chain, tools=(Tool(name="grip", joint=chain.joint_names[1]),))
+    (tmp_path / "held.yaml").write_text(
+        f"{SWING}wrench: {{type: constant, frame: base, value: [1, 2, 3, 4, 5, 6]}}\n"
+    )
+    result = inverse_dynamics(named, load_trajectory(tmp_path / "held.yaml", named))
+    result.save("held.h5")
+    with h5py.File("held.h5") as file:
+        assert file.attrs["format"] == "vsacli-result/3"
+        assert [list(dim.keys()) for dim in file["wrench"].dims] == [["time"], ["wrench_axis"]]
+        assert file["wrench"].attrs["long_name"] == "wrench exerted on the end effector"
+    with open_result("held.h5") as stored:
+        stored.check()
+        assert stored.tool_names == ("grip",)
+        np.testing.assert_array_equal(stored.wrench, np.tile(np.arange(1.0, 7.0), (41, 1)))
+        assert stored.to_xarray().identical(result.to_xarray())
+    assert vsacli("export", "held.h5", "--variables", "wrench", "-o", "held.csv").code == 0
+    assert Path("held.csv").read_text().startswith("time,fx,fy,fz,mx,my,mz\n")
 
 
 @pytest.mark.parametrize("shape", ["tree", "chain"])
-def test_variables_of_tools_are_stored_and_exported(result, tmp_path, monkeypatch, vsacli, shape):
-    monkeypatch.setattr(StoredResult, "declared", FURTHER)
+def test_variables_of_tools_are_stored_and_exported(result, vsacli, shape):
     of = robot() if shape == "chain" else result.robot
     tools, rng = len(of.tool_names), np.random.default_rng(1)
     compliance = rng.normal(size=(5, tools, 6, 6))
     flags = rng.integers(0, 4, (5, tools)).astype(np.uint32)
-    samples = SimpleNamespace(time=np.arange(5.0), tip_compliance=compliance, tool_flags=flags)
-    with (
-        Outputs() as outputs,
-        FurtherWriter(
-            outputs.file(tmp_path / "further.h5"), of, PlannedTrajectory(5), ("tip_compliance", "tool_flags")
-        ) as writer,
-    ):
+    samples = Block(time=np.arange(5.0), tip_compliance=compliance, tool_flags=flags)
+    names = ("tip_compliance", "tool_flags")
+    with writing(Path("tools.h5"), of, PlannedTrajectory(5), names) as writer:
         writer.write(samples)
         writer.finish(REPORT)
-    with open_stored(tmp_path / "further.h5") as stored:
+    with open_stored("tools.h5") as stored:
         stored.check()
         assert np.array_equal(stored.read("tip_compliance"), compliance)
         assert np.array_equal(stored.read("tool_flags"), flags)
         assert stored.tool_names == (("end_effector",) if shape == "chain" else TOOLS)
         assert stored.attributes["format"] == f"vsacli-result/{2 if shape == 'chain' else 3}"
-    assert vsacli("export", "further.h5", "--variables", "tip_compliance,tool_flags", "-o", "f.csv").code == 0
-    with open("f.csv", newline="") as file:
+    assert vsacli("export", "tools.h5", "--variables", ",".join(names), "-o", "tools.csv").code == 0
+    with open("tools.csv", newline="") as file:
         header, first, *_ = csv.reader(file)
     assert header[1] == f"{of.tool_names[0]}.tip_compliance_x_fx"
     assert header[-1] == f"{of.tool_names[-1]}.tool_flags"
     assert [float(value) for value in first[1:-tools]] == compliance[0].ravel().tolist()
-    assert vsacli("export", "further.h5", "--variables", "tip_compliance", "-o", "f.mat").code == 0
-    exported = scipy.io.loadmat("f.mat")
-    assert np.array_equal(exported["tip_compliance"], compliance)
-    assert exported["units"]["tip_compliance"][0, 0].shape == (tools, 6, 6)
-    described = json.loads(vsacli("info", "further.h5", "--json").out)["variables"]
+    assert vsacli("export", "tools.h5", "--variables", ",".join(names), "-o", "tools.mat").code == 0
+    exported = scipy.io.loadmat("tools.mat", simplify_cells=True)
+    assert np.array_equal(exported["tip_compliance"].reshape(compliance.shape), compliance)
+    units = exported["units"]["tip_compliance"].reshape(tools, 6, 6)
+    assert units.tolist() == [UNITS_OF_COMPLIANCE] * tools
+    described = json.loads(vsacli("info", "tools.h5", "--json").out)["variables"]
     assert described[0]["dims"] == ["time", "tool", "displacement_axis", "wrench_axis"]
 
 

@@ -32,7 +32,7 @@ class Compiled(NamedTuple):
 
 @contextlib.contextmanager
 def compiled(robot: Robot, start: Start | None = None) -> Iterator[Compiled]:
-    """The exported model."""
+    """The exported model, of which MuJoCo must not warn: it takes controls that are not finite for zero."""
     exported = mjcf_model(robot, start)
     model = mujoco.MjModel.from_xml_string(exported.text)
     try:
@@ -40,7 +40,9 @@ def compiled(robot: Robot, start: Start | None = None) -> Iterator[Compiled]:
             namespace: dict[str, Any] = {}
             exec(compile(exported.forces, "forces.py", "exec"), namespace)
             namespace["install"](model)
-        yield Compiled(model, mujoco.MjData(model))
+        data = mujoco.MjData(model)
+        yield Compiled(model, data)
+        assert not data.warning.number.any()
     finally:
         mujoco.set_mjcb_passive(None)
         mujoco.set_mjcb_control(None)
@@ -125,7 +127,7 @@ def inverse_error(robot: Robot, result: Any, frame: WrenchFrame = ()) -> float:
             if frame:
                 exerted += forces_of_tools(robot, frame, result.wrench[sample], model, data)
             errors.append(np.abs(data.qfrc_inverse - exerted).max())
-    return float(max(errors) / np.abs(result.tau_motor[np.isfinite(result.tau_motor)]).max())
+    return float(np.max(errors) / np.abs(result.tau_motor[np.isfinite(result.tau_motor)]).max())
 
 
 def driven(robot: Robot, result: Any, frame: WrenchFrame = ()) -> FloatArray:

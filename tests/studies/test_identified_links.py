@@ -199,9 +199,10 @@ def test_links_are_left_out_with_a_reason(tmp_path: Path) -> None:
     handed = dataclasses.replace(
         robot, tools=(Tool(name="hand", joint="slide"), Tool(name="grip", joint="arm"))
     )
-    file = written(robot, run, robot.joint_names, tmp_path, **{"hand.fx": 0 * run.time})
-    (note,) = identify(handed, file).notes
-    assert note == f"{file}: links are not identified, since a wrench acts on hand"
+    for column, tool in (("hand.fx", "hand"), ("fx", "a tool")):
+        file = written(robot, run, robot.joint_names, tmp_path, **{column: 0 * run.time})
+        (note,) = identify(handed, file).notes
+        assert note == f"{file}: links are not identified, since a wrench acts on {tool}"
 
 
 def test_forces_that_no_body_exerts_are_told(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, edited, rest_t
 from samples.marks import needs
 from samples.measured_pages import wicked_page
 from samples.studies import study
-from samples.torso_and_hand import torso_result
+from samples.torso import torso_result
 
 from vsacli.cli.main import run
 

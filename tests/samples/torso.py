@@ -1,4 +1,4 @@
-"""Robots that are trees, as files: a torso with two arms and a hand; and runs of them with wrenches."""
+"""A robot that is a tree, as a file: a torso with two arms; and runs of it with wrenches."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ stiffness: {type: constant, value: 900}
 """
 
 
-def joint_text(name: str, dh: str, begin: str = "", mass: float = 1.0) -> str:
+def joint_text(name: str, dh: str, begin: str = "") -> str:
     """An entry of `joints`; `begin` are its keys `parent` and `mount`."""
-    inertia = f"{{xx: {0.01 * mass:g}, yy: {0.01 * mass:g}, zz: {0.01 * mass:g}}}"
-    link = f"{{mass: {mass:g}, com: [-0.02, 0, 0], inertia: {inertia}}}"
-    rest = f"link: {link},\n     actuator: {ACTUATOR}"
-    return f"  - {{name: {name}, type: revolute, {begin}dh: {dh},\n     {rest}}}\n"
+    link = "{mass: 1, com: [-0.02, 0, 0], inertia: {xx: 0.01, yy: 0.01, zz: 0.01}}"
+    return (
+        f"  - {{name: {name}, type: revolute, {begin}dh: {dh},\n"
+        f"     link: {link},\n     actuator: {ACTUATOR}}}\n"
+    )
 
 
 def torso_text() -> str:
@@ -48,24 +49,6 @@ def torso_text() -> str:
         "  left_hand: {joint: left_elbow, xyz: [0, 0, 0.1]}\n  right_hand: {joint: right_elbow}\n"
         "  lamp: {joint: pole, rpy: [0.1, 0.2, 0.3]}\n"
     )
-
-
-def hand_text(fingers: int = 5, joints: int = 4) -> str:
-    """A wrist with a palm and fingers; the first finger opposes the others."""
-    text = "format: vsacli-robot/1\nname: hand\njoints:\n"
-    text += joint_text("wrist", "{a: 0.02, alpha: 0}", mass=0.3)
-    tools = "tools:\n"
-    for number in range(fingers):
-        place = f"[0.02, {-0.04 if number == 0 else 0.06 - 0.025 * number:.3f}, 0]"
-        place = place if number == 0 else place.replace("0.02", "0.09", 1)
-        mount = f"{{xyz: {place}, rpy: [0, 0, {-60 if number == 0 else 8 * (2.5 - number):g} deg]}}"
-        text += joint_text(
-            f"f{number}_1", "{a: 0.01, alpha: 90 deg}", f"parent: wrist, mount: {mount}, ", 0.05
-        )
-        for joint in range(2, joints + 1):
-            text += joint_text(f"f{number}_{joint}", f"{{a: {0.06 - 0.01 * joint:g}, alpha: 0}}", mass=0.03)
-        tools += f"  tip_{number}: {{joint: f{number}_{joints}}}\n"
-    return text + tools
 
 
 def written(folder: Path, text: str) -> Path:
