@@ -98,20 +98,24 @@ def _polynomial(degree: int, ends: FloatArray | dict[str, FloatArray]) -> dict[s
     return {"type": "polynomial", "degree": degree, **dict(zip(names, values, strict=True))}
 
 
-def differences(one: Any, other: Any, where: str = "", scale: float = 1e-9) -> Iterator[str]:
+SAME = 1e-9
+"""Of numbers, or of 1: sums in another order agree to 1e-12; three digits are left to what cancels."""
+
+
+def differences(one: Any, other: Any, where: str = "") -> Iterator[str]:
     """Yield where two JSON reports differ, whatever the order of their lists."""
     match one, other:
         case dict(), dict():
             for key in sorted({*one, *other} - WITHOUT_MEANING):
                 if key in one and key in other:
-                    yield from differences(one[key], other[key], f"{where}.{key}", scale)
+                    yield from differences(one[key], other[key], f"{where}.{key}")
                 else:
                     yield f"{where}.{key} is there once"
         case list(), list() if len(one) == len(other):
             for number, (here, there) in enumerate(zip(_sorted(one), _sorted(other), strict=True)):
-                yield from differences(here, there, f"{where}.{number}", scale)
+                yield from differences(here, there, f"{where}.{number}")
         case float() | int(), float() | int():
-            if not math.isclose(one, other, rel_tol=1e-9, abs_tol=scale):
+            if not math.isclose(one, other, rel_tol=SAME, abs_tol=SAME):
                 yield f"{where}: {one} and {other}"
         case _:
             if _PLACE.sub(r"\1", str(one)) != _PLACE.sub(r"\1", str(other)):
