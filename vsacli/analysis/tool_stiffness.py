@@ -33,6 +33,7 @@ class ToolSummary:
         self._samples = dict.fromkeys(COUNTED_AT_TOOLS, 0)
         self._first_time: dict[str, float] = {}
         self._worst: dict[str, Finding] = {}
+        self._rigid = False
         self._softest = (math.nan, math.nan, NO_DIRECTION)
 
     def add(
@@ -42,12 +43,13 @@ class ToolSummary:
 
         Args:
             time: Times, (samples,).
-            stiffness: Stiffness in the softest direction, (samples,), NaN where there is none.
+            stiffness: Stiffness in the softest direction, (samples,), NaN where there is none, inf if rigid.
             direction: This direction, (samples, 3).
             unstable: Where the pose is statically unstable, (samples,).
         """
         required = self._tool.min_stiffness or 0.0
         below = stiffness < (1 - LIMIT_ROUNDING) * required
+        self._rigid |= bool(np.isinf(stiffness).any())
         if np.isfinite(stiffness).any():
             self._keep_softest(time, stiffness, direction)
         if below.any():
@@ -74,6 +76,7 @@ class ToolSummary:
             dict(self._worst),
             *self._softest,
             self._tool.min_stiffness,
+            rigid=self._rigid and math.isnan(self._softest[0]),
         )
 
     def _keep_softest(self, time: FloatArray, stiffness: FloatArray, direction: FloatArray) -> None:

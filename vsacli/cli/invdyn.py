@@ -159,7 +159,8 @@ def _figures(
     stored = {ALL} if variables is None else {*variables}
     if ALL in stored:
         stored |= {name for name in VARIABLES if name not in ON_REQUEST}
-    drawn = drawable_figures(result_drawings(inputs.robot.has_variable), stored)
+    actuators = [joint.actuator_type for joint in inputs.robot.joints]
+    drawn = drawable_figures(result_drawings(inputs.robot.has_variable, actuators), stored)
     if inputs.trajectory.estimates:
         drawn.append(RECORDING)
     return target.files(drawn, stem, outputs)

@@ -296,12 +296,14 @@ RESULT_DRAWINGS: dict[str, Drawing] = {
 """Figures of a result of `invdyn`, by name."""
 
 
-def result_drawings(has_variable: Callable[[Variable], bool]) -> dict[str, Drawing]:
-    """Return the figures whose variables the results of a robot have."""
+def result_drawings(has_variable: Callable[[Variable], bool], actuators: Sequence[str]) -> dict[str, Drawing]:
+    """Return the figures whose variables the results of a robot have; of compliance, if a joint yields."""
+    rigid = not compliant_joints(actuators)
     return {
         name: drawing
         for name, drawing in RESULT_DRAWINGS.items()
         if all(has_variable(VARIABLES[needed]) for needed in drawing.needs)
+        and not (rigid and TIP_COMPLIANCE in drawing.needs)
     }
 
 
@@ -321,7 +323,7 @@ def drawings_of(stored: StoredResult) -> dict[str, Drawing]:
     """Return the figures of a file by name, according to its kind."""
     if stored.kind == "simulation":
         return simulation_drawings(lambda variable: bool(stored.existing(variable).any()))
-    return result_drawings(stored.has_variable)
+    return result_drawings(stored.has_variable, stored.actuators)
 
 
 def drawable_figures(
