@@ -276,6 +276,9 @@ def test_a_tool_without_stiffness_to_choose_has_no_fix(vsacli):
     assert "no joint that moves chest has a stiffness to choose" in outcome.out
 
 
+SPRUNG_POLE = ("--set", "joints.pole.actuator={type: elastic, motor: {inertia: 0.1}, stiffness: 100}")
+
+
 def test_tools_of_rigid_joints_do_not_yield(vsacli, own_folder):
     rigid = torso_text().replace(ACTUATOR, "{type: rigid, motor: {inertia: 0.1}}")
     (own_folder / "rigid.yaml").write_text(rigid)
@@ -287,6 +290,10 @@ def test_tools_of_rigid_joints_do_not_yield(vsacli, own_folder):
     with open_result("rigid.h5") as result:
         assert result.report.as_json()["tools"][0]["stiffness"]["rigid"] is True
         assert all(tool.rigid for tool in result.report.tools)
+    assert "tool" not in vsacli("plot", "rigid.h5", "-o", "again").err
+    outcome = vsacli("invdyn", "rigid.yaml", "swing.yaml", *ASKED, "-o", "pole.h5", *SPRUNG_POLE)
+    assert "right_hand does not yield, lamp" in outcome.out
+    assert "N/m at" in outcome.out
 
 
 def inverse(files):

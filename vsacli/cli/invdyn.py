@@ -155,12 +155,14 @@ def _figures(
     from vsacli.base.variables import ALL, ON_REQUEST, VARIABLES
     from vsacli.cli.drawings import RECORDING
     from vsacli.results.charts.figures import drawable_figures, result_drawings
+    from vsacli.robot.compliance import coupled_joints
 
     stored = {ALL} if variables is None else {*variables}
     if ALL in stored:
         stored |= {name for name in VARIABLES if name not in ON_REQUEST}
-    actuators = [joint.actuator_type for joint in inputs.robot.joints]
-    drawn = drawable_figures(result_drawings(inputs.robot.has_variable, actuators), stored)
+    robot = inputs.robot
+    tools_yield = any(coupled_joints(robot, tool) for tool in range(len(robot.end_effectors)))
+    drawn = drawable_figures(result_drawings(robot.has_variable, tools_yield), stored)
     if inputs.trajectory.estimates:
         drawn.append(RECORDING)
     return target.files(drawn, stem, outputs)
