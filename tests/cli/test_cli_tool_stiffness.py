@@ -228,18 +228,17 @@ def test_a_pose_that_buckles_is_a_finding(vsacli, rod):
     assert vsacli("check-feasibility", *rod, *soft).code == 0  # not asked for
 
 
-def test_the_hint_of_an_unstable_pose_leads_to_its_fixes(vsacli, rod):
+@pytest.mark.parametrize(("tool", "tools"), [("tip", "tools: {tip: {joint: hinge}}\n"), ("end_effector", "")])
+def test_the_hint_of_an_unstable_pose_leads_to_its_fixes(vsacli, rod, tool, tools):
     soft = ("--set", "joints.hinge.actuator.stiffness=15")
-    outcome = vsacli("invdyn", *rod, *soft, *ASKED, "-o", "soft.h5")
-    assert "to list fixes, give end_effector a min_stiffness, under `tools`" in outcome.out
     with open("rod.yaml", "a") as stream:
-        stream.write("tools: {tip: {joint: hinge}}\n")
+        stream.write(tools)
     outcome = vsacli("invdyn", *rod, *soft, *ASKED, "-o", "tip.h5")
     (hint,) = (line for line in outcome.out.splitlines() if line.startswith("to list fixes"))
     listed = vsacli(*shlex.split(hint.partition(": vsacli ")[2]))
     assert listed.code == 3
-    assert "tip: its pose is statically unstable" in listed.out
-    assert "no joint that moves tip has a stiffness to choose" in listed.out
+    assert f"\n{tool}: its pose is statically unstable" in listed.out
+    assert f"no joint that moves {tool} has a stiffness to choose" in listed.out
 
 
 BOTH_ARMS = (

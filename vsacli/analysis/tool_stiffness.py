@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -123,3 +124,16 @@ class ToolStiffness:
     def reports(self) -> tuple[ToolReport, ...]:
         """Return the report of each tool so far."""
         return tuple(summary.report() for summary in self._summaries)
+
+
+def limits_for_fixes(robot: Robot, reports: Sequence[ToolReport]) -> list[str]:
+    """Return changes with which fixes of unstable poses are searched: these need a limit, a tiny one.
+
+    There are none if a tool has a limit, or if all poses are stable.
+    """
+    unstable = [report.name for report in reports if report.shows("singular")]
+    if not unstable or robot.limited_tools:
+        return []
+    if robot.tools:
+        return [f"tools.{unstable[0]}.min_stiffness=1"]
+    return [f"tools={{{unstable[0]}: {{joint: {robot.joint_names[-1]}, min_stiffness: 1}}}}"]

@@ -241,10 +241,6 @@ def result_line(result: StoredResult) -> str:
 MOST_CHANGES = 3
 """Options `--set` that a command in a report repeats at most."""
 
-TINY_LIMIT = 1
-"""Stiffness, N/m, with which a command in a report limits a tool: without a limit, `check-feasibility` does
-not find poses that are statically unstable."""
-
 FIXABLE = ("infeasible", "singular", "over_limit")
 """Verdicts for which fixes are searched."""
 
@@ -283,29 +279,7 @@ def _hint(report: Report, files: tuple[str, str], changes: Sequence[str], option
     """Return how to list fixes of a motion that cannot be executed; empty if it can."""
     if report.verdict not in FIXABLE or STANDARD in files:
         return ""  # standard input has been read, and cannot be read again
-    shown, limits = changes if len(changes) <= MOST_CHANGES else (), _tiny_limits(report)
-    if limits is None:
-        return "to list fixes, give end_effector a min_stiffness, under `tools` in the robot file"
-    words = [
-        *files,
-        *(word for change in (*shown, *limits) for word in ("--set", change)),
-        *options,
-        "--fixes",
-    ]
+    shown = changes if len(changes) <= MOST_CHANGES else ()
+    words = [*files, *(word for change in shown for word in ("--set", change)), *options, "--fixes"]
     others = "" if shown == changes else ", with the same --set options"
     return f"to list fixes{others}: vsacli check-feasibility {shlex.join(words)}"
-
-
-def _tiny_limits(report: Report) -> list[str] | None:
-    """Return changes with which a search for fixes sees the unstable poses of a report, if it needs any.
-
-    None if only the tool of a robot without `tools` is unstable, which cannot be limited.
-    """
-    from vsacli.robot.model import END_EFFECTOR
-
-    unstable = [tool.name for tool in report.tools if tool.shows("singular")]
-    if not unstable or any(tool.required is not None for tool in report.tools):
-        return []
-    if [tool.name for tool in report.tools] == [END_EFFECTOR]:
-        return [] if any(joint.shows(report.verdict) for joint in report.joints) else None
-    return [f"tools.{unstable[0]}.min_stiffness={TINY_LIMIT}"]
