@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import shlex
 
 import numpy as np
 import pytest
 import yaml
-from samples.torso import SWING, torso_text
+from samples.command_line import REPOSITORY
+from samples.torso import ACTUATOR, SWING, torso_text
 
 from vsacli import (
     Wrench,
@@ -224,6 +226,73 @@ def test_a_pose_that_buckles_is_a_finding(vsacli, rod):
         np.testing.assert_array_equal(np.isnan(result.tip_compliance[:, 0, 0, 0]), unstable)
         assert result.report.verdict == "singular"
     assert vsacli("check-feasibility", *rod, *soft).code == 0  # not asked for
+
+
+@pytest.mark.parametrize(("tool", "tools"), [("tip", "tools: {tip: {joint: hinge}}\n"), ("end_effector", "")])
+def test_the_hint_of_an_unstable_pose_leads_to_its_fixes(vsacli, rod, tool, tools):
+    soft = ("--set", "joints.hinge.actuator.stiffness=15")
+    with open("rod.yaml", "a") as stream:
+        stream.write(tools)
+    outcome = vsacli("invdyn", *rod, *soft, *ASKED, "-o", "tip.h5")
+    (hint,) = (line for line in outcome.out.splitlines() if line.startswith("to list fixes"))
+    listed = vsacli(*shlex.split(hint.partition(": vsacli ")[2]))
+    assert listed.code == 3
+    assert f"\n{tool}: its pose is statically unstable" in listed.out
+    assert f"no joint that moves {tool} has a stiffness to choose" in listed.out
+
+
+BOTH_ARMS = (
+    *(REPOSITORY / folder / "torso_2x3r.yaml" for folder in ("robots", "trajectories")),
+    *("--set", "rate=10"),
+)
+"""The torso of the examples, with an elastic waist."""
+
+
+@pytest.mark.parametrize("limited", ["left_hand", "right_hand", "*"])
+def test_the_arm_that_buckles_is_stiffened_whichever_tool_is_limited(vsacli, limited):
+    """The stretched left arm is pushed along its length, towards the shoulder."""
+    changes = (
+        f"tools.{limited}.min_stiffness=10",
+        "position={type: constant, value: 0}",
+        "gravity=[0,0,-0.001]",
+        "wrenches={left_hand: {type: constant, frame: base, value: [-300,0,0,0,0,0]}}",
+    )
+    options = [word for change in changes for word in ("--set", change)]
+    outcome = vsacli("check-feasibility", *BOTH_ARMS, *options, "--fixes")
+    assert outcome.code == 3
+    assert "right_hand: its pose is statically unstable" in outcome.out
+    assert "with any of them every sample has a margin" in outcome.out
+    joints = "left_shoulder_lift, left_shoulder_swing and left_elbow"
+    assert f"\n1. multiply the stiffness of {joints} by " in outcome.out
+
+
+def test_a_tool_without_stiffness_to_choose_has_no_fix(vsacli):
+    hand = "{joint: left_elbow}, right_hand: {joint: right_elbow}"
+    chest = "{joint: waist, xyz: [0.1, 0, 0], min_stiffness: 1e6}"
+    tools = ("--set", f"tools={{left_hand: {hand}, chest: {chest}}}")
+    outcome = vsacli("check-feasibility", *BOTH_ARMS, *tools, "--fixes")
+    assert outcome.code == 3
+    assert "no joint that moves chest has a stiffness to choose" in outcome.out
+
+
+SPRUNG_POLE = ("--set", "joints.pole.actuator={type: elastic, motor: {inertia: 0.1}, stiffness: 100}")
+
+
+def test_tools_of_rigid_joints_do_not_yield(vsacli, own_folder):
+    rigid = torso_text().replace(ACTUATOR, "{type: rigid, motor: {inertia: 0.1}}")
+    (own_folder / "rigid.yaml").write_text(rigid)
+    (own_folder / "swing.yaml").write_text(SWING.replace("stiffness: {type: constant, value: 900}\n", ""))
+    outcome = vsacli("invdyn", "rigid.yaml", "swing.yaml", *ASKED, "-o", "rigid.h5", "--plot", "drawn")
+    assert outcome.code == 0
+    assert "stiffness of tools: left_hand does not yield, right_hand does not yield, lamp" in outcome.out
+    assert "tool" not in outcome.err
+    with open_result("rigid.h5") as result:
+        assert result.report.as_json()["tools"][0]["stiffness"]["rigid"] is True
+        assert all(tool.rigid for tool in result.report.tools)
+    assert "tool" not in vsacli("plot", "rigid.h5", "-o", "again").err
+    outcome = vsacli("invdyn", "rigid.yaml", "swing.yaml", *ASKED, "-o", "pole.h5", *SPRUNG_POLE)
+    assert "right_hand does not yield, lamp" in outcome.out
+    assert "N/m at" in outcome.out
 
 
 def inverse(files):

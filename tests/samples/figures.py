@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,6 +20,7 @@ class Result:
     kind, command = "result", "invdyn"
     complete = True
     declared = VARIABLES
+    report_json: ClassVar = {}
 
     def __init__(
         self,

@@ -13,6 +13,7 @@ from vsacli.base.units import LINEAR_STIFFNESS, time_text
 from vsacli.dynamics.limits import Finding
 
 NO_DIRECTION = (math.nan, math.nan, math.nan)
+OF_SOME_TOOLS = {"rigid?": "rigid", "required?": "required"}
 
 
 @dataclass(frozen=True)
@@ -24,10 +25,11 @@ class ToolReport(Stored):
         samples: Number of samples with each kind of trouble.
         first_time: Time of the first sample of each kind that occurs, s.
         worst: Worst sample of each kind that occurs, by its flag.
-        stiffness: Smallest translational stiffness along the motion, N/m; NaN if it has none.
+        stiffness: Smallest translational stiffness along the motion, N/m; NaN if it has none, or is rigid.
         time: Time of the smallest stiffness, s.
         direction: Unit vector of the softest direction at that time, base axes.
         required: Smallest stiffness that the tool may have, N/m; None without this limit.
+        rigid: Whether the tool does not yield at any sample.
     """
 
     name: str
@@ -38,10 +40,11 @@ class ToolReport(Stored):
     time: float = math.nan
     direction: tuple[float, float, float] = NO_DIRECTION
     required: float | None = None
+    rigid: bool = False
 
     shape: ClassVar = {
         **named("name", "samples", "first_time", "worst"),
-        "stiffness": {"min": "stiffness", **named("time", "direction"), "required?": "required"},
+        "stiffness": {"min": "stiffness", **named("time", "direction"), **OF_SOME_TOOLS},
     }
 
     def shows(self, verdict: str) -> bool:
@@ -53,10 +56,12 @@ def tool_stiffness_lines(tools: Sequence[ToolReport]) -> Iterator[str]:
     """Yield how stiff each tool is at least, where, and in which direction."""
     unit = LINEAR_STIFFNESS.unit("")
     entries = [
-        f"{tool.name} {short_number(tool.stiffness)} {unit} at {time_text(tool.time)} "
+        f"{tool.name} does not yield"
+        if tool.rigid
+        else f"{tool.name} {short_number(tool.stiffness)} {unit} at {time_text(tool.time)} "
         f"along ({', '.join(f'{round(component, 2) + 0.0:.2f}' for component in tool.direction)})"
         for tool in tools
-        if math.isfinite(tool.stiffness)
+        if tool.rigid or math.isfinite(tool.stiffness)
     ]
     if entries:
         yield wrap_joint_entries("smallest stiffness of tools: ", entries)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -33,6 +34,7 @@ class ToolSummary:
         self._samples = dict.fromkeys(COUNTED_AT_TOOLS, 0)
         self._first_time: dict[str, float] = {}
         self._worst: dict[str, Finding] = {}
+        self._rigid = False
         self._softest = (math.nan, math.nan, NO_DIRECTION)
 
     def add(
@@ -42,12 +44,13 @@ class ToolSummary:
 
         Args:
             time: Times, (samples,).
-            stiffness: Stiffness in the softest direction, (samples,), NaN where there is none.
+            stiffness: Stiffness in the softest direction, (samples,), NaN where there is none, inf if rigid.
             direction: This direction, (samples, 3).
             unstable: Where the pose is statically unstable, (samples,).
         """
         required = self._tool.min_stiffness or 0.0
         below = stiffness < (1 - LIMIT_ROUNDING) * required
+        self._rigid |= bool(np.isinf(stiffness).any())
         if np.isfinite(stiffness).any():
             self._keep_softest(time, stiffness, direction)
         if below.any():
@@ -74,6 +77,7 @@ class ToolSummary:
             dict(self._worst),
             *self._softest,
             self._tool.min_stiffness,
+            rigid=self._rigid and math.isnan(self._softest[0]),
         )
 
     def _keep_softest(self, time: FloatArray, stiffness: FloatArray, direction: FloatArray) -> None:
@@ -120,3 +124,16 @@ class ToolStiffness:
     def reports(self) -> tuple[ToolReport, ...]:
         """Return the report of each tool so far."""
         return tuple(summary.report() for summary in self._summaries)
+
+
+def limits_for_fixes(robot: Robot, reports: Sequence[ToolReport]) -> list[str]:
+    """Return changes with which fixes of unstable poses are searched: these need a limit, a tiny one.
+
+    There are none if a tool has a limit, or if all poses are stable.
+    """
+    unstable = [report.name for report in reports if report.shows("singular")]
+    if not unstable or robot.limited_tools:
+        return []
+    if robot.tools:
+        return [f"tools.{unstable[0]}.min_stiffness=1"]
+    return [f"tools={{{unstable[0]}: {{joint: {robot.joint_names[-1]}, min_stiffness: 1}}}}"]

@@ -303,8 +303,8 @@ def _unstable_text(joint: JointReport, worst: Finding, samples: int) -> str:
 
 def _buckling_text(tool: ToolReport, worst: Finding, samples: int) -> str:
     return (
-        f"{worst.text}; increase the stiffness of the joints that move the tool "
-        f"({_occurrence_text(tool, 'singular', samples)})"
+        f"{worst.text}; increase the stiffness of the joints that move the tool or are carried by one of "
+        f"them ({_occurrence_text(tool, 'singular', samples)})"
     )
 
 

@@ -132,7 +132,12 @@ def invdyn(
                 from vsacli.cli.plot_recording import recording_figure
 
                 drawn.save(recording_figure(inputs.robot, inputs.trajectory.estimates.values(), path))
-    code = show_report(report, as_json, (robot, trajectory), changes)
+    limits: list[str] = []
+    if report.tools:
+        from vsacli.analysis.tool_stiffness import limits_for_fixes
+
+        limits = [word for limit in limits_for_fixes(inputs.robot, report.tools) for word in ("--set", limit)]
+    code = show_report(report, as_json, (robot, trajectory), changes, options=limits)
     talk.wrote(outputs)
     return code
 
@@ -155,11 +160,13 @@ def _figures(
     from vsacli.base.variables import ALL, ON_REQUEST, VARIABLES
     from vsacli.cli.drawings import RECORDING
     from vsacli.results.charts.figures import drawable_figures, result_drawings
+    from vsacli.robot.compliance import coupled_joints
 
     stored = {ALL} if variables is None else {*variables}
     if ALL in stored:
         stored |= {name for name in VARIABLES if name not in ON_REQUEST}
-    drawn = drawable_figures(result_drawings(inputs.robot.has_variable), stored)
+    tools_yield = any(coupled_joints(inputs.robot, tool) for tool in range(len(inputs.robot.end_effectors)))
+    drawn = drawable_figures(result_drawings(inputs.robot.has_variable, tools_yield), stored)
     if inputs.trajectory.estimates:
         drawn.append(RECORDING)
     return target.files(drawn, stem, outputs)

@@ -122,7 +122,8 @@ class HeldPose:
 
         C is NaN there, and where a value is.
         """
-        coupled, matrix = self._coupled_joints(tool)
+        coupled = coupled_joints(self._robot, tool)
+        matrix = self._matrix[:, coupled][:, :, coupled]
         columns = jacobian_in_base(self._robot, self._frames, tool)[..., coupled]
         least = smallest_eigenvalues(matrix)
         stable = least > SMALLEST_EIGENVALUE
@@ -131,17 +132,16 @@ class HeldPose:
         compliance[~stable | ~np.isfinite(columns).all(axis=(-2, -1))] = np.nan
         return compliance, least <= SMALLEST_EIGENVALUE
 
-    def _coupled_joints(self, tool: int) -> tuple[list[int], FloatArray]:
-        """Return the joints with springs whose deflections depend on those of a tool, and K + dg/dq of them.
 
-        They are all joints on the link of the first such joint before the tool: loads on the links beyond
-        a joint change with it. Other branches do not count, so that a branch has what it has alone.
-        """
-        robot = self._robot
-        sprung = [joint.actuator.sprung for joint in robot.joints]
-        first = [joint for joint in robot.paths[robot.tool_joints[tool]] if sprung[joint]][:1]
-        coupled = [joint for joint, path in enumerate(robot.paths) if sprung[joint] and {*first} & {*path}]
-        return coupled, self._matrix[:, coupled][:, :, coupled]
+def coupled_joints(robot: Robot, tool: int) -> list[int]:
+    """Return the joints with springs whose deflections depend on those of a tool by index.
+
+    They are all joints on the link of the first such joint before the tool: loads on the links beyond
+    a joint change with it. Other branches do not count, so that a branch has what it has alone.
+    """
+    sprung = [joint.actuator.sprung for joint in robot.joints]
+    first = [joint for joint in robot.paths[robot.tool_joints[tool]] if sprung[joint]][:1]
+    return [joint for joint, path in enumerate(robot.paths) if sprung[joint] and {*first} & {*path}]
 
 
 def smallest_eigenvalues(matrices: FloatArray) -> FloatArray:

@@ -296,12 +296,13 @@ RESULT_DRAWINGS: dict[str, Drawing] = {
 """Figures of a result of `invdyn`, by name."""
 
 
-def result_drawings(has_variable: Callable[[Variable], bool]) -> dict[str, Drawing]:
-    """Return the figures whose variables the results of a robot have."""
+def result_drawings(has_variable: Callable[[Variable], bool], tools_yield: bool) -> dict[str, Drawing]:
+    """Return the figures whose variables the results of a robot have; of compliance, if any tool yields."""
     return {
         name: drawing
         for name, drawing in RESULT_DRAWINGS.items()
         if all(has_variable(VARIABLES[needed]) for needed in drawing.needs)
+        and (tools_yield or TIP_COMPLIANCE not in drawing.needs)
     }
 
 
@@ -321,7 +322,8 @@ def drawings_of(stored: StoredResult) -> dict[str, Drawing]:
     """Return the figures of a file by name, according to its kind."""
     if stored.kind == "simulation":
         return simulation_drawings(lambda variable: bool(stored.existing(variable).any()))
-    return result_drawings(stored.has_variable)
+    rigid = ["rigid" in tool.get("stiffness", {}) for tool in stored.report_json.get("tools", [])]
+    return result_drawings(stored.has_variable, not rigid or not all(rigid))
 
 
 def drawable_figures(

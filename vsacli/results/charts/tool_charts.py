@@ -48,7 +48,7 @@ class _SoftestDirections:
 
 
 def tool_charts(files: Sequence[StoredResult]) -> Iterator[Chart]:
-    """Yield the chart of the stiffness of all tools, then one of the direction of each tool."""
+    """Yield the chart of the stiffness of all tools, then one of the direction of each tool that yields."""
     curves = [read_curves(_SoftestDirections(file), [TIP_COMPLIANCE]) for file in files]
     names, bounds = files[0].tool_names, files[0].min_stiffness()
     lines = [
@@ -60,6 +60,8 @@ def tool_charts(files: Sequence[StoredResult]) -> Iterator[Chart]:
     words, unit = "stiffness in the softest direction", LINEAR_STIFFNESS.unit("")
     yield Chart(words, unit, lines, f"stiffness [{unit}]", TIP_COMPLIANCE, limits, from_zero=True)
     for tool, name in enumerate(names):
+        if not any(np.isfinite(of_file[tool].values).any() for of_file in curves):
+            continue
         lines = [
             Line(of_file[tool][1 + axis], axis, letter, axis, file=file)
             for file, of_file in enumerate(curves)

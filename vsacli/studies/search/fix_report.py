@@ -135,7 +135,7 @@ class StiffnessProfile(Published):
 
 @dataclass(frozen=True)
 class StiffnessFactor(Published):
-    """A factor on the stiffness of the joints that move a tool."""
+    """A factor on the stiffness of joints that move a tool, or are coupled with these."""
 
     factor: float
     joints: tuple[str, ...]
@@ -146,7 +146,7 @@ class StiffnessFactor(Published):
 
 @dataclass(frozen=True)
 class StifferTools(Published):
-    """A factor for each set of joints that move tools that are too soft."""
+    """A factor for each set of joints on which the stiffness of tools that are too soft depends."""
 
     factors: tuple[StiffnessFactor, ...]
 

@@ -1,5 +1,6 @@
 """Fixes of tools that are too soft: one factor on the stiffness of the joints that move a tool.
 
+Where these do not suffice, the factor is one on the joints coupled with them, or on all of these joints.
 The factor is added to each fix of the joints, or replaces them if that is enough. Loads do not depend on the
 stiffness, so that the admissible range of each joint bounds the factor on both sides.
 """
@@ -20,7 +21,7 @@ from vsacli.base.units import LINEAR_STIFFNESS
 from vsacli.base.wrench import Wrench
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import usual_block
-from vsacli.robot.compliance import HeldPose, softest_direction
+from vsacli.robot.compliance import HeldPose, coupled_joints, softest_direction
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range
 from vsacli.studies.search.changed_motion import with_scaled_stiffness
@@ -137,9 +138,9 @@ class _HeldRun:
         return least
 
     def lacks(self, tool: int, scales: FloatArray) -> bool:
-        """Return whether a tool is softer than it may be."""
-        required = self._robot.end_effectors[tool].min_stiffness
-        return required is not None and self.least_stiffness(tool, scales) < required
+        """Return whether a tool is softer than it may be, or unstable; one without a limit may be soft."""
+        least = self.least_stiffness(tool, scales)
+        return least <= 0 or least < (self._robot.end_effectors[tool].min_stiffness or 0.0)
 
 
 def _stiffened(fix: Fix, task: Task) -> tuple[Fix, dict[str, str]]:
@@ -147,17 +148,25 @@ def _stiffened(fix: Fix, task: Task) -> tuple[Fix, dict[str, str]]:
     trajectory, robot = fix.trajectory, fix.robot
     acceptance, held = replace(task.acceptance, robot=robot), _HeldRun(robot, trajectory)
     scales, parts, too_soft = np.ones(len(robot.joints)), list[StiffnessFactor](), dict[str, str]()
-    soft = [tool for tool in range(len(robot.tools)) if held.lacks(tool, scales)]
-    for tools, joints in _sets_of_joints(robot, soft):
-        try:
-            factor = _smallest_factor(
-                robot, held, tools, joints, _range_of_factor(acceptance, trajectory, joints)
-            )
-        except ImpossibleError as error:
-            too_soft |= dict.fromkeys((robot.tool_names[tool] for tool in tools), str(error))
-            continue
-        scales[joints] = factor
-        parts.append(StiffnessFactor(factor, tuple(robot.joint_names[joint] for joint in joints)))
+    judged = range(len(robot.tools)) if robot.limited_tools else ()
+    soft = [tool for tool in judged if held.lacks(tool, scales)]
+    for tools, moving in _sets_of_joints(robot, soft):
+        if not any(held.lacks(tool, scales) for tool in tools):
+            continue  # the factors for other tools suffice
+        reasons: list[str] = []
+        for joints in _with_coupled(robot, tools, moving):
+            try:
+                allowed = _range_of_factor(acceptance, trajectory, joints)
+                factor = _smallest_factor(robot, held, tools, joints, scales, allowed)
+            except ImpossibleError as error:
+                reasons.append(str(error))
+                continue
+            scales[joints] = factor
+            names = tuple(robot.joint_names[joint] for joint in joints)
+            parts = [*_without_joints(parts, names), StiffnessFactor(factor, names)]
+            break
+        else:
+            too_soft |= dict.fromkeys((robot.tool_names[tool] for tool in tools), reasons[0])
     asked = trajectory.block(0, trajectory.samples).commanded[STIFFNESS.key]
     factors = {joint: float(scales[joint]) for joint in np.flatnonzero(scales != 1).tolist()}
     sizes = [
@@ -186,6 +195,20 @@ def _sets_of_joints(robot: Robot, tools: Sequence[int]) -> list[tuple[list[int],
     return sets
 
 
+def _with_coupled(robot: Robot, tools: Sequence[int], moving: list[int]) -> list[list[int]]:
+    """Return the joints that move tools, those coupled with them, and all these: sets to be tried in turn."""
+    coupled = {joint for tool in tools for joint in coupled_joints(robot, tool)}
+    chosen = {joint for joint in coupled if STIFFNESS.key in robot.joints[joint].actuator.commanded}
+    beside = sorted(chosen.difference(moving))
+    return [moving, beside, sorted((*moving, *beside))] if beside else [moving]
+
+
+def _without_joints(parts: Sequence[StiffnessFactor], names: Collection[str]) -> list[StiffnessFactor]:
+    """Return factors without those on some joints, which another factor replaces."""
+    kept = [(part, tuple(name for name in part.joints if name not in names)) for part in parts]
+    return [replace(part, joints=joints) for part, joints in kept if joints]
+
+
 def _range_of_factor(
     acceptance: Acceptance, trajectory: Trajectory, joints: Sequence[int]
 ) -> tuple[float, float]:
@@ -204,18 +227,23 @@ def _smallest_factor(
     held: _HeldRun,
     tools: Sequence[int],
     joints: Sequence[int],
+    chosen: FloatArray,
     allowed: tuple[float, float],
 ) -> float:
-    """Return the smallest factor in a range with which no tool is too soft, rounded up to four digits."""
-    scales, (low, high) = np.ones(len(robot.joints)), allowed
+    """Return the smallest factor in a range with which no tool is too soft, rounded up to four digits.
+
+    Factors already chosen for other tools, (joints,), are kept at other joints, and not reduced at these.
+    """
+    if not joints:
+        moved = robot.tool_names[tools[0]]
+        raise ImpossibleError(f"no joint that moves {moved} has a stiffness to choose")
+    scales, names = chosen.copy(), joined([robot.joint_names[joint] for joint in joints])
+    low, high = max(allowed[0], float(chosen[list(joints)].max())), allowed[1]
 
     def soft_tools(factor: float) -> list[int]:
         scales[list(joints)] = factor
         return [tool for tool in tools if held.lacks(tool, scales)]
 
-    moved, names = robot.tool_names[tools[0]], joined([robot.joint_names[joint] for joint in joints])
-    if not joints:
-        raise ImpossibleError(f"no joint that moves {moved} has a stiffness to choose")
     if high < low:
         raise ImpossibleError(f"no factor keeps the margins and limits of all of {names}")
     if soft := soft_tools(high):
