@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 from samples.command_line import REPOSITORY
+from samples.studies import column
 from samples.torso import SWING, torso_text
 
 from vsacli import (
@@ -299,3 +300,14 @@ def test_simulations_judge_tools_on_simulated_values(vsacli):
     shown = vsacli("info", "grasp.h5")
     assert "1 of 3 tools over a limit" in shown.out
     assert "tools" not in json.loads(vsacli("simulate", *inputs, "--json").out)
+
+
+def test_a_study_names_the_tool_that_is_too_soft_first(vsacli, own_folder):
+    (own_folder / "tips.yaml").write_text(
+        f"format: vsacli-study/1\nname: tips\nrobot: {REPOSITORY / 'robots' / 'hand_3x2r.yaml'}\n"
+        f"trajectory: {REPOSITORY / 'trajectories' / 'hand_3x2r.yaml'}\n"
+        "vary: {tools.index_tip.min_stiffness: [50, 100]}\nkeep: [margin]\n"
+    )
+    done = vsacli("study", "tips.yaml", "-o", "tips.h5")
+    assert "1 ok, 1 over limit" in done.out
+    assert column("tips.h5", "first_limit").tolist() == ["", "index_tip tool_stiffness_limit"]
