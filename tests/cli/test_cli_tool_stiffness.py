@@ -311,3 +311,14 @@ def test_a_study_names_the_tool_that_is_too_soft_first(vsacli, own_folder):
     done = vsacli("study", "tips.yaml", "-o", "tips.h5")
     assert "1 ok, 1 over limit" in done.out
     assert column("tips.h5", "first_limit").tolist() == ["", "index_tip tool_stiffness_limit"]
+
+
+def test_analyses_that_do_not_judge_tools_say_so(vsacli, own_folder):
+    limited = (REPOSITORY / "robots" / "hand_3x2r.yaml").read_text()
+    limited = limited.replace("{joint: index_middle}", "{joint: index_middle, min_stiffness: 100}")
+    (own_folder / "hand.yaml").write_text(limited)
+    motion = REPOSITORY / "trajectories" / "hand_3x2r.yaml"
+    for command in ("size", "sensitivity"):
+        assert "min_stiffness of index_tip is not judged here" in vsacli(command, "hand.yaml", motion).out
+        plain = vsacli(command, REPOSITORY / "robots" / "hand_3x2r.yaml", motion).out
+        assert "min_stiffness" not in plain
