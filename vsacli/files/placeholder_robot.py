@@ -61,7 +61,9 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
         names = _of_columns(columns) or _numbered(1)
         stiffened = _of_suffix(columns, _STIFFNESS_SUFFIX, names) or tuple(names)
         damped = _of_suffix(columns, _DAMPING_SUFFIX, names)
-        return PlaceholderRobot(_robot(names, stiffened, damped, _tools(columns)), ordered=True)
+        return PlaceholderRobot(
+            _robot(names, stiffened, damped, _tools_of_wrench_columns(columns)), ordered=True
+        )
     root, survey = survey_document(path, OF_ANY_ROBOT)
     folder = Path(path).parent
     columns = tuple(
@@ -83,7 +85,12 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
     )
     ordered = bool(columns or _keys(positions)) or not _keys([*stiffnesses, *dampings])
     wrenches = root.entries.get(WRENCHES)
-    tools = _names((*(wrenches.entries if isinstance(wrenches, tree.MapNode) else ()), *_tools(columns)))
+    tools = _names(
+        (
+            *(wrenches.entries if isinstance(wrenches, tree.MapNode) else ()),
+            *_tools_of_wrench_columns(columns),
+        )
+    )
     return PlaceholderRobot(_robot(names, stiffened, damped, tools), ordered)
 
 
@@ -111,7 +118,7 @@ def _of_columns(columns: Iterable[str]) -> tuple[str, ...]:
     return named or _numbered(numbered)
 
 
-def _tools(columns: Iterable[str]) -> tuple[str, ...]:
+def _tools_of_wrench_columns(columns: Iterable[str]) -> tuple[str, ...]:
     """Return the tools that have a column of each component of a wrench, such as `hand.fx`."""
     bare = {column.partition("[")[0].strip(): None for column in columns}
     names = _names(column.rpartition(".")[0] for column in bare)

@@ -135,7 +135,7 @@ class SimulationReport(Stored):
             *([] if self.ending is None else [self.ending]),
             *group_findings(
                 [*tracking_findings(self.joints, self.complete), *self._findings_at_tools()],
-                [place.name for place in (*self.joints, *self.tools)],
+                [*(joint.name for joint in self.joints), *(tool.name for tool in self.tools)],
             ),
             *warnings_and_notes(self.warnings, self.notes),
         ]

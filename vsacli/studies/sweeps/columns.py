@@ -15,6 +15,7 @@ import numpy as np
 
 from vsacli.analysis.joint_report import JointReport
 from vsacli.analysis.report import Report
+from vsacli.analysis.tool_report import ToolReport
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import LIMITS, ToolFlag
@@ -140,9 +141,10 @@ def first_limit(report: Report) -> str:
     Of limits that are exceeded at the same time, the one of the joint nearest to the base comes first, and
     tools come last.
     """
+    places: tuple[JointReport | ToolReport, ...] = (*report.joints, *report.tools)
     exceeded = [
         (place.first_time[flag.label], f"{place.name} {flag.label}")
-        for place in (*report.joints, *report.tools)
+        for place in places
         for flag in (*LIMITS, ToolFlag.TOOL_STIFFNESS_LIMIT)
         if flag.label in place.first_time
     ]
