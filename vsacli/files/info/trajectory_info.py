@@ -35,8 +35,8 @@ def describe_table(
     """Describe a CSV file: as a trajectory if it has the columns of one, else as a recording."""
     from vsacli.files.recordings import describe_recording, is_trajectory
 
-    robot, placeholder = None if robot_path is None else load_robot(robot_path), placeholder_robot(path).robot
-    if not is_trajectory(path, robot or placeholder):
+    robot = None if robot_path is None else load_robot(robot_path)
+    if not is_trajectory(path, robot or placeholder_robot(path).robot):
         return describe_recording(path, robot, progress, rate)
     if rate is not None:
         raise InputError.one("has times in column 'time'; leave --rate out", path)
@@ -47,9 +47,9 @@ def describe_table(
     file = for_yaml(Path(path).name)
     signals = ["position", *(key for key in COMMANDED if key in described["joints"][0])]
     sources = [f"{key}: {{type: csv, file: {file}}}" for key in signals]
-    if placeholder.tools:
+    if tools := placeholder_robot(path).robot.tools:
         sources.append("# wrenches:  # the file has these columns, not the frames: base or end_effector")
-        sources += [f"#   {tool.name}: {{type: csv, frame: ..., file: {file}}}" for tool in placeholder.tools]
+        sources += [f"#   {tool.name}: {{type: csv, frame: ..., file: {file}}}" for tool in tools]
     described["trajectory"] = "\n".join([f"format: {file_formats.TRAJECTORY}", "name: recorded", *sources])
     described["mapping"] = f"format: {file_formats.COLUMNS}\ncolumns: {{time: time}}"
     return described
