@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from samples.command_line import REPOSITORY
+from samples.studies import column
 from samples.torso import ACTUATOR, SWING, torso_text
 
 from vsacli import (
@@ -349,3 +350,43 @@ def test_an_optimization_refuses_a_limit_that_it_does_not_keep(vsacli, torso):
     assert found.code == 2
     assert "do not keep the min_stiffness of tools (left_hand)" in found.err
     assert "check-feasibility --fixes" in found.err
+
+
+def test_simulations_judge_tools_on_simulated_values(vsacli):
+    """Feedforward follows the motion, so that the tools are as stiff as along the command."""
+    inputs = [REPOSITORY / folder / "hand_3x2r.yaml" for folder in ("robots", "trajectories")]
+    limited = ("--set", "tools.index_tip.min_stiffness=100")
+    commanded = vsacli("check-feasibility", *inputs, *limited, "--json")
+    simulated = vsacli("simulate", *inputs, *limited, "-o", "grasp.h5", "--json")
+    assert commanded.code == simulated.code == 3
+    expected, report = json.loads(commanded.out), json.loads(simulated.out)
+    assert report["verdict"] == "over_limit"
+    assert [each["name"] for each in report["tools"]] == ["index_tip", "middle_tip", "thumb_tip"]
+    worst, of_command = (each["tools"][0]["worst"]["tool_stiffness_limit"] for each in (report, expected))
+    assert worst["value"] == pytest.approx(of_command["value"], rel=1e-6)  # rtol of the integration
+    assert report["tools"][0]["samples"] == expected["tools"][0]["samples"]
+    shown = vsacli("info", "grasp.h5")
+    assert "1 of 3 tools over a limit" in shown.out
+    assert "tools" not in json.loads(vsacli("simulate", *inputs, "--json").out)
+
+
+def test_a_study_names_the_tool_that_is_too_soft_first(vsacli, own_folder):
+    (own_folder / "tips.yaml").write_text(
+        f"format: vsacli-study/1\nname: tips\nrobot: {REPOSITORY / 'robots' / 'hand_3x2r.yaml'}\n"
+        f"trajectory: {REPOSITORY / 'trajectories' / 'hand_3x2r.yaml'}\n"
+        "vary: {tools.index_tip.min_stiffness: [50, 100]}\nkeep: [margin]\n"
+    )
+    done = vsacli("study", "tips.yaml", "-o", "tips.h5")
+    assert "1 ok, 1 over limit" in done.out
+    assert column("tips.h5", "first_limit").tolist() == ["", "index_tip tool_stiffness_limit"]
+
+
+def test_analyses_that_do_not_judge_tools_say_so(vsacli, own_folder):
+    limited = (REPOSITORY / "robots" / "hand_3x2r.yaml").read_text()
+    limited = limited.replace("{joint: index_middle}", "{joint: index_middle, min_stiffness: 100}")
+    (own_folder / "hand.yaml").write_text(limited)
+    motion = REPOSITORY / "trajectories" / "hand_3x2r.yaml"
+    for command in ("size", "sensitivity"):
+        assert "min_stiffness of index_tip is not judged here" in vsacli(command, "hand.yaml", motion).out
+        plain = vsacli(command, REPOSITORY / "robots" / "hand_3x2r.yaml", motion).out
+        assert "min_stiffness" not in plain

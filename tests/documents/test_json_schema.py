@@ -232,3 +232,9 @@ def test_keys_tell_unit_default_and_meaning() -> None:
     assert schema["properties"]["gravity"]["default"] == [0.0, 0.0, -9.81]
     assert schema["properties"]["gravity"]["description"] == "gravity acceleration in the base frame, m/s^2"
     assert schema["$defs"]["Link"]["required"] == ["mass", "com", "inertia"]
+
+
+def test_a_mapping_by_name_has_no_list_as_its_default() -> None:
+    tools = DOCUMENTS["robot"].schema()["properties"]["tools"]
+    assert tools["type"] == "object"
+    assert "default" not in tools

@@ -221,3 +221,21 @@ def test_every_problem_of_a_value_is_told() -> None:
         InputError, match=r"(?s)^joints\.base\.link: com: expected.*joints\.base\.link: mass: must"
     ):
         replace(ROBOT, "joints.0.link", {"mass": -1, "com": [1, 2], "inertia": {"xx": 1, "yy": 1, "zz": 1}})
+
+
+def test_an_entry_by_name_takes_its_name_from_the_path() -> None:
+    """Also a further entry, and the first of a key that is absent."""
+    hand = load_robot(REPOSITORY / "robots" / "hand_3x2r.yaml")
+    moved = replace(hand, "tools.index_tip", {"joint": "index_knuckle"})
+    assert [(tool.name, tool.joint) for tool in moved.tools[:2]] == [
+        ("index_tip", "index_knuckle"),
+        ("middle_tip", "middle_middle"),
+    ]
+    assert replace(hand, "tools.0", {"joint": "index_knuckle"}) == moved
+    further = replace(hand, "tools.knuckle", {"joint": "index_knuckle"})
+    assert (further.tools[:-1], further.tool_names[-1]) == (hand.tools, "knuckle")
+    assert replace(ROBOT, "tools.tip", {"joint": ROBOT.joint_names[-1]}).tool_names == ("tip",)
+    with pytest.raises(InputError, match=re.escape("tools has no 'idex_tip'; did you mean 'index_tip'?")):
+        replace(hand, "tools.idex_tip", 5)
+    with pytest.raises(InputError, match=re.escape("tools.tip.joint: no joint is called 'x'")):
+        replace(hand, "tools.tip", {"joint": "x"})

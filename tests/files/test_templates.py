@@ -250,3 +250,9 @@ def test_a_new_trajectory_never_replaces_its_robot(vsacli: Any) -> None:
         assert done.code == 2
         assert done.err.endswith("is an input of this command; choose another name for the output\n")
     assert Path("arm.yaml").read_text() == robot_template("RP")
+
+
+def test_a_robot_with_several_tools_is_offered_wrenches_by_tool_alone() -> None:
+    hand, arm = (load_robot(REPOSITORY / "robots" / f"{name}.yaml") for name in ("hand_3x2r", "vsa_3r"))
+    assert re.findall(r"# (wrench\w*):", trajectory_template(hand)) == ["wrenches"]
+    assert re.findall(r"# (wrench\w*):", trajectory_template(arm)) == ["wrench", "wrenches"]

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 import math
+import re
 
+import numpy as np
 import pytest
+import yaml
+from samples.command_line import REPOSITORY
 from samples.torso import torso_text, written
 
-from vsacli import load_robot
+from vsacli import load_robot, open_result
 
 
 def cells(text: str, header: str) -> list[list[str]]:
@@ -75,3 +79,23 @@ def test_representations_say_what_carries_and_is_carried(own_folder):
     assert rows[3] == ["left_elbow", "revolute", "antagonistic", "left_arm", "left_hand"]
     assert rows[-1] == ["pole", "revolute", "antagonistic", "frame 0", "lamp"]
     assert "<td>left_hand</td>" in robot._repr_html_()
+
+
+def test_columns_of_wrenches_by_tool_need_no_robot(vsacli, own_folder):
+    """Tools are those that the columns name; a proposed trajectory has their wrenches as a comment."""
+    inputs = [REPOSITORY / folder / "hand_3x2r.yaml" for folder in ("robots", "trajectories")]
+    vsacli("invdyn", *inputs, "--set", "rate=50", "-o", "grasp.h5")
+    vsacli("export", "grasp.h5", "--variables", "q,stiffness,wrench", "-o", "grasp.csv")
+    assert vsacli("validate", "grasp.csv").code == 0
+    for robot in ((), ("--robot", inputs[0])):
+        text = vsacli("info", "grasp.csv", *robot, "--field", "trajectory").out
+        assert "ignore" not in text
+        assert yaml.safe_load(text)["position"] == {
+            "type": "csv",
+            "file": "grasp.csv",
+        }
+        assert '#   thumb_tip: {type: csv, frame: ..., file: "grasp.csv"}' in text
+        (own_folder / "again.yaml").write_text(re.sub("# ( *[a-z_]+:)", r"\1", text).replace("...", "base"))
+        assert vsacli("invdyn", inputs[0], "again.yaml", "-o", "again.h5", "--overwrite").code == 0
+    with open_result("grasp.h5") as first, open_result("again.h5") as again:
+        np.testing.assert_array_equal(again.wrench, first.wrench)

@@ -67,3 +67,7 @@ def test_a_tool_has_a_name_that_is_said_if_there_are_several() -> None:
     with pytest.raises(InputError) as unknown:
         jacobian(robot, q, tool="tool_9")
     assert str(unknown.value) == f"{robot.name} has no tool 'tool_9'; did you mean 'tool_2'?"
+    with pytest.raises(
+        TypeError, match="tool must be a str, not an int; tools are given by name, such as 'tool_0'"
+    ):
+        jacobian(robot, q, tool=0)  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from samples.command_line import REPOSITORY
 from samples.excited import Excitation, Recorded, excited
 from samples.marks import slow_but
 from samples.shipped import shipped_robot
@@ -281,3 +282,14 @@ def test_a_clean_record_is_not_doubted(arm: Robot, record: Recorded, tmp_path: P
 def read_by_encoders(positions: FloatArray) -> FloatArray:
     step = 2 * np.pi / 2**14
     return np.asarray(step * np.round(positions / step))
+
+
+@pytest.mark.usefixtures("own_folder")
+def test_motors_of_joints_that_move_alike_follow_their_own(vsacli: Any) -> None:
+    """Fingers close together, one less far: a share of its own joint is as near to a motor as the other."""
+    inputs = [REPOSITORY / folder / "hand_3x2r.yaml" for folder in ("robots", "trajectories")]
+    vsacli("invdyn", *inputs, "--set", "rate=200", "-o", "grasp.h5")
+    vsacli("export", "grasp.h5", "--variables", "q,theta,tau_motor", "-o", "grasp.csv")
+    done = vsacli("identify", inputs[0], "grasp.csv", "--fit", "springs")
+    assert "from 1 recording" in done.out
+    assert "exchanged" not in done.out

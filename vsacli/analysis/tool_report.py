@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from vsacli.analysis.report_text import short_number, wrap_joint_entries
 from vsacli.base.json_records import Stored, named
+from vsacli.base.texts import joined
 from vsacli.base.units import LINEAR_STIFFNESS, time_text
 from vsacli.dynamics.limits import Finding
 
@@ -50,6 +51,11 @@ class ToolReport(Stored):
     def shows(self, verdict: str) -> bool:
         """Return whether the tool is a reason for a verdict that is not ok."""
         return bool(self.samples.get(verdict))
+
+
+def unjudged_tools_text(limited_tools: Sequence[str]) -> str:
+    """Return that an analysis does not judge the min_stiffness of the tools that have one."""
+    return f"min_stiffness of {joined(limited_tools)} is not judged here; check-feasibility does so"
 
 
 def tool_stiffness_lines(tools: Sequence[ToolReport]) -> Iterator[str]:

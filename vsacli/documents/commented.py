@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
@@ -49,6 +49,7 @@ def commented_document(
     values: Values,
     head: Iterable[str] = (),
     sources: Mapping[str, str] = MappingProxyType({}),
+    unmentioned: Collection[str] = (),
 ) -> str:
     """Return a document of the record class `cls`.
 
@@ -58,8 +59,9 @@ def commented_document(
         values: values of every required field, and of the optional fields to set.
         head: lines of the comment at the top.
         sources: where a reader finds the value of a field, by `Class.field`; each text is said once.
+        unmentioned: fields that do not stand in comments either.
     """
-    lines = [_YamlLine(f"format: {format_name}"), *_Commented(sources).record(cls, values, "")]
+    lines = [_YamlLine(f"format: {format_name}"), *_Commented(sources, unmentioned).record(cls, values, "")]
     comments = [f"# {line}".rstrip() for line in head]
     return "\n".join([*comments, *(text for line in lines for text in _wrap_comment(line))]) + "\n"
 
@@ -82,10 +84,11 @@ class _Commented:
 
     Args:
         sources: where a reader finds the value of a field, by `Class.field`.
+        unmentioned: fields that are left out without a value.
     """
 
-    def __init__(self, sources: Mapping[str, str]) -> None:
-        self._sources = sources
+    def __init__(self, sources: Mapping[str, str], unmentioned: Collection[str]) -> None:
+        self._sources, self._unmentioned = sources, unmentioned
         self._stated_sources: set[str] = set()
         self._explained: set[tuple[type, str]] = set()
         self._in_later_entry = False
@@ -101,7 +104,7 @@ class _Commented:
                 yield from self._field_with_value(field.kind, name, values[name], comment, variant)
             elif default is REQUIRED:
                 raise KeyError(f"{cls.__name__} needs a value of {name}")
-            elif not explained_before:
+            elif not explained_before and name not in self._unmentioned:
                 yield from self._field_without_value(field, name, default, comment, variant)
 
     def _field_with_value(

@@ -85,7 +85,7 @@ class _SchemaBuilder:
 
     def _field_schema(self, field: Field, default: Any) -> Schema:
         described = field.doc if field.quantity == DIMENSIONLESS else f"{field.doc}, {field.quantity}"
-        shown = _json_default(default)
+        shown = None if isinstance(field.kind, ItemsByName) else _json_default(default)
         schema = self._value_schema(field.kind, field.check)
         return {"description": described, **schema, **({} if shown is None else {"default": shown})}
 

@@ -14,7 +14,7 @@ from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.base.texts import on_one_line
 from vsacli.documents import tree
-from vsacli.documents.fields import Items, PairOf, ValueKind, declared_fields, variant_inside
+from vsacli.documents.fields import Items, ItemsByName, PairOf, ValueKind, declared_fields, variant_inside
 from vsacli.documents.record_reader import read_value
 from vsacli.documents.record_values import entry_names
 from vsacli.documents.source import Problems
@@ -215,6 +215,9 @@ class _Replacement(NamedTuple):
         """Return a value with the replacement in it, or the replacement itself at the end of the path."""
         if not words:
             return self._read_value(kind, place)
+        named = isinstance(kind, ItemsByName) and len(words) == 1 and words[0] != ALL
+        if named and isinstance(self.node, tree.MapNode):
+            return self._with_entry(kind, content or (), words[0], self.node, place)
         if content is None:
             raise InputError.one(f"there is nothing at {_dotted_path(place)}; replace it as a whole")
         if isinstance(kind, PairOf) and words[0] not in SIDES:
@@ -273,3 +276,15 @@ class _Replacement(NamedTuple):
             entry_place = (*place, names[index] or str(index))
             entries[index] = inside.in_value(entry_kind, content[index], rest, entry_place)
         return tuple(entries)
+
+    def _with_entry(
+        self, kind: ValueKind, content: Any, word: str, mapping: tree.MapNode, place: tuple[str, ...]
+    ) -> Any:
+        """Return entries by name with a mapping as the one that a word names, or as a further one."""
+        names, key = entry_names(kind, content, {}), "name"
+        index = _indices(names).get(word)
+        name = word if index is None else names[index]
+        entries = {key: tree.TextNode(0, name, plain=False), **mapping.entries}
+        named = mapping._replace(entries=entries, key_lines={key: 0, **mapping.key_lines})
+        entry = self._replace(node=named)._read_value(kind.item or kind, (*place, name))
+        return tuple({**dict(zip(names, content, strict=True)), name: entry}.values())

@@ -16,7 +16,8 @@ from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base import units
-from vsacli.base.signals import COMMANDED, WRENCHES
+from vsacli.base.signals import COMMANDED, WRENCH, WRENCHES
+from vsacli.base.wrench import wrench_columns
 from vsacli.documents import tree
 from vsacli.documents.csv_file import read_header
 from vsacli.documents.fields import IDENTIFIER, LARGEST
@@ -50,7 +51,7 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
 
     Names and number of joints are taken from the file; one joint if it has no information. Joints without
     stiffness are elastic, or rigid if the file has neither stiffness nor damping. Joints with a damping have
-    a damper. Tools are those that `wrenches` names.
+    a damper. Tools are those that `wrenches` or columns of wrenches name.
 
     Raises:
         InputError: the file, or a CSV file that it names, cannot be read.
@@ -60,7 +61,9 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
         names = _of_columns(columns) or _numbered(1)
         stiffened = _of_suffix(columns, _STIFFNESS_SUFFIX, names) or tuple(names)
         damped = _of_suffix(columns, _DAMPING_SUFFIX, names)
-        return PlaceholderRobot(_robot(names, stiffened, damped), ordered=True)
+        return PlaceholderRobot(
+            _robot(names, stiffened, damped, _tools_of_wrench_columns(columns)), ordered=True
+        )
     root, survey = survey_document(path, OF_ANY_ROBOT)
     folder = Path(path).parent
     columns = tuple(
@@ -82,7 +85,12 @@ def placeholder_robot(path: str | os.PathLike[str]) -> PlaceholderRobot:
     )
     ordered = bool(columns or _keys(positions)) or not _keys([*stiffnesses, *dampings])
     wrenches = root.entries.get(WRENCHES)
-    tools = _names(wrenches.entries) if isinstance(wrenches, tree.MapNode) else ()
+    tools = _names(
+        (
+            *(wrenches.entries if isinstance(wrenches, tree.MapNode) else ()),
+            *_tools_of_wrench_columns(columns),
+        )
+    )
     return PlaceholderRobot(_robot(names, stiffened, damped, tools), ordered)
 
 
@@ -108,6 +116,13 @@ def _of_columns(columns: Iterable[str]) -> tuple[str, ...]:
     )
     numbered = sum(1 for column in bare if column[:1] == "q" and column[1:].isdecimal())
     return named or _numbered(numbered)
+
+
+def _tools_of_wrench_columns(columns: Iterable[str]) -> tuple[str, ...]:
+    """Return the tools that have a column of each component of a wrench, such as `hand.fx`."""
+    bare = {column.partition("[")[0].strip(): None for column in columns}
+    names = _names(column.rpartition(".")[0] for column in bare)
+    return tuple(name for name in names if bare.keys() >= {*wrench_columns(f"{name}.{WRENCH.key}")})
 
 
 def _of_suffix(columns: Iterable[str], suffix: str, names: Sequence[str]) -> tuple[str, ...]:

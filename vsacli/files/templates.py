@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from vsacli.actuators.kinds import example
 from vsacli.base import file_formats
 from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN
+from vsacli.base.signals import WRENCH
 from vsacli.base.storage import reporting_temporary_errors, temporary_folder
 from vsacli.base.texts import counted, for_yaml
 from vsacli.documents.commented import WIDTH, commented_document
@@ -232,13 +233,16 @@ def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory")
     if robot is None:
         return _trajectory_document(values)
 
-    duration, remark = possible_duration(robot, _trajectory_document(values), DURATION)
-    return _trajectory_document({**values, "duration": duration}, remark)
+    unmentioned = (WRENCH.key,) if len(robot.tool_names) > 1 else ()
+    draft = _trajectory_document(values, unmentioned=unmentioned)
+    duration, remark = possible_duration(robot, draft, DURATION)
+    return _trajectory_document({**values, "duration": duration}, remark, unmentioned)
 
 
-def _trajectory_document(values: Values, remark: str = "") -> str:
+def _trajectory_document(values: Values, remark: str = "", unmentioned: Collection[str] = ()) -> str:
     head = (*TRAJECTORY_HEAD, *textwrap.wrap(remark, WIDTH - 2))
-    return commented_document(file_formats.TRAJECTORY, trajectory_file.OF_ANY_ROBOT, values, head)
+    cls = trajectory_file.OF_ANY_ROBOT
+    return commented_document(file_formats.TRAJECTORY, cls, values, head, unmentioned=unmentioned)
 
 
 def _position(robot: Robot) -> Values:

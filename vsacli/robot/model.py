@@ -246,6 +246,7 @@ class Robot(DeclaredRecord):
 
         Raises:
             InputError: there is no such tool, or which one is not said.
+            TypeError: name is of another type.
         """
         names = self.tool_names
         if name is None and len(names) == 1:
@@ -254,6 +255,7 @@ class Robot(DeclaredRecord):
             raise InputError.one(f"{self.name} has no tools; give `tools` in its file")
         if name is None:
             raise InputError.one(f"{self.name} has the tools {', '.join(names)}; say which one")
+        check_type("tool", name, str, f"tools are given by name, such as {names[0]!r}")
         if name not in names:
             raise InputError.one(f"{self.name} has no tool {name!r}{did_you_mean(name, names)}")
         return names.index(name)

@@ -14,10 +14,13 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from vsacli.analysis.run import Run
+from vsacli.analysis.tool_stiffness import ToolStiffness
 from vsacli.analysis.trouble_text import undetermined_text
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.progress import Tell, unheard
+from vsacli.base.signals import WRENCH
+from vsacli.base.variables import Block
 from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, LinearizingFeedback
@@ -131,13 +134,23 @@ class SimulationRun:
         self._ending: Ending | None = None
         self._blocks = histories(robot, loop, self._until_end(blocks), first, readings)
         self._summary = Summary(robot, goal_tolerance, self.trajectory.times.span)
+        frame = None if trajectory.wrench is None else trajectory.wrench.frame
+        self._tools = ToolStiffness(robot, frame, stored=False) if robot.limited_tools else None
 
     def __iter__(self) -> Iterator[History]:
         """Integrate, and yield the variables of the run; a block is released before the next one."""
         for block in self._blocks:
             self._summary.add(block)
+            if self._tools is not None:
+                self._tools.add(self._at_tools(block))
             yield block
             del block
+
+    def _at_tools(self, block: History) -> Block:
+        """Return the simulated variables that determine the stiffness of tools, and the wrench."""
+        wrench = self.trajectory.at(block.time).wrench
+        acting = {} if wrench is None else {WRENCH.key: wrench.wrench}
+        return Block(time=block.time, q=block.q, stiffness=block.stiffness, flags=block.flags, **acting)
 
     def _until_end(self, blocks: Iterable[StateBlock]) -> Iterator[StateBlock]:
         for block in blocks:
@@ -157,7 +170,8 @@ class SimulationRun:
         full = self._with_full_state() if self._feedback == "positions" else None
         joints = self._summary.joints()
         effort, ending = self._integrator.effort, self._ending
-        verdict = verdict_on(self._summary.flags, joints, ending)
+        tools = () if self._tools is None else self._tools.reports()
+        verdict = verdict_on(self._summary.flags, joints, tools, ending)
         robot, trajectory = self.robot, self.trajectory
         return SimulationReport(
             robot=robot.name,
@@ -182,6 +196,7 @@ class SimulationRun:
             notes=(*trajectory.notes, *([] if self._gains is None else _unlimited_torque_notes(robot))),
             joints=joints,
             with_full_state=tuple(joint.q for joint in full.joints) if full else (),
+            tools=tools,
         )
 
     def _with_full_state(self) -> SimulationReport:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from vsacli.analysis.report_text import energy_lines
-from vsacli.analysis.trouble_text import group_findings, of_all_joints
+from vsacli.analysis.tool_report import ToolReport, tool_stiffness_lines
+from vsacli.analysis.trouble_text import failing_joints_line, group_findings, of_all_joints
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
 from vsacli.base.tables import ReportText, headline
@@ -24,6 +25,7 @@ from vsacli.control.simulation.joint_tracking import (
     tracking_findings,
     tracking_rows,
 )
+from vsacli.dynamics.limits import Finding
 
 VERDICTS = ("ok", "over_limit", "off_target", "singular", "infeasible", INCOMPLETE, DIVERGED)
 """Verdicts from best to worst; the worst that applies wins."""
@@ -31,13 +33,16 @@ VERDICTS = ("ok", "over_limit", "off_target", "singular", "infeasible", INCOMPLE
 _VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
 
 
-def verdict_on(flags: int, joints: Sequence[JointTracking], ending: Ending | None) -> str:
-    """Return the worst of `VERDICTS` that applies, by the flags of any joint at any sample.
+def verdict_on(
+    flags: int, joints: Sequence[JointTracking], tools: Sequence[ToolReport], ending: Ending | None
+) -> str:
+    """Return the worst of `VERDICTS` that applies, by the flags of any joint or tool at any sample.
 
     A flag at any sample implies its own verdict. A complete run with joints off target is "off_target". An
     early end without a flag has its own verdict.
     """
     applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
+    applies |= {verdict for verdict in VERDICTS if any(tool.shows(verdict) for tool in tools)}
     if ending is None and any(joint.off_course for joint in joints):
         applies.add("off_target")
     if ending is not None and ending.flag is None:
@@ -82,6 +87,7 @@ class SimulationReport(Stored):
         joints: findings of each joint.
         with_full_state: deviation of q of each joint in the same run when the controller knows the full state
             at every instant; empty unless only positions are measured.
+        tools: reports of the tools if the stiffness of one is limited, else empty.
     """
 
     robot: str
@@ -98,6 +104,7 @@ class SimulationReport(Stored):
     notes: tuple[str, ...] = ()
     budget: int = 0
     methods: tuple[Method, ...] = ()
+    tools: tuple[ToolReport, ...] = ()
 
     format: ClassVar = "vsacli-simulation-report/2"
     shape: ClassVar = {
@@ -106,6 +113,7 @@ class SimulationReport(Stored):
         **named(
             "ending", "evaluations", "budget", "methods", "warnings", "notes", "joints", "with_full_state"
         ),
+        "tools?": "tools",
     }
 
     @property
@@ -126,12 +134,14 @@ class SimulationReport(Stored):
         found = [
             *([] if self.ending is None else [self.ending]),
             *group_findings(
-                tracking_findings(self.joints, self.complete), [joint.name for joint in self.joints]
+                [*tracking_findings(self.joints, self.complete), *self._findings_at_tools()],
+                [*(joint.name for joint in self.joints), *(tool.name for tool in self.tools)],
             ),
             *warnings_and_notes(self.warnings, self.notes),
         ]
         lines = [
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
+            *tool_stiffness_lines(self.tools),
             *self._effort(),
         ]
         return ReportText(
@@ -157,7 +167,12 @@ class SimulationReport(Stored):
             "off target": sum(self.complete and joint.off_course for joint in self.joints),
             "over a limit": sum(bool(joint.worst) for joint in self.joints),
         }
-        return "; ".join([*parts, *filter(None, [of_all_joints(failing, len(self.joints))])])
+        failures = [of_all_joints(failing, len(self.joints)), failing_joints_line((), self.tools)]
+        return "; ".join([*parts, *filter(None, [", ".join(filter(None, failures))])])
+
+    def _findings_at_tools(self) -> Iterator[tuple[int, Finding]]:
+        for index, tool in enumerate(self.tools, len(self.joints)):
+            yield from ((index, worst) for worst in tool.worst.values())
 
     def _effort(self) -> Iterator[str]:
         if self.methods:

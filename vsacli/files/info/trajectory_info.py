@@ -47,6 +47,9 @@ def describe_table(
     file = for_yaml(Path(path).name)
     signals = ["position", *(key for key in COMMANDED if key in described["joints"][0])]
     sources = [f"{key}: {{type: csv, file: {file}}}" for key in signals]
+    if tools := placeholder_robot(path).robot.tools:
+        sources.append("# wrenches:  # the file has these columns, not the frames: base or end_effector")
+        sources += [f"#   {tool.name}: {{type: csv, frame: ..., file: {file}}}" for tool in tools]
     described["trajectory"] = "\n".join([f"format: {file_formats.TRAJECTORY}", "name: recorded", *sources])
     described["mapping"] = f"format: {file_formats.COLUMNS}\ncolumns: {{time: time}}"
     return described

@@ -111,8 +111,9 @@ def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> It
         for words, gain in ODD_GAINS.items():
             if _follows(theta / gain, q[:, index], own / gain**2):
                 yield f"columns {name!r} and {joint!r} {words}"
+        scaled = _least_variance(theta, q[:, index])  # joints that move alike cannot be told apart
         for other in range(q.shape[1]):
-            if other != index and _follows(theta, q[:, other], own):
+            if other != index and _follows(theta, q[:, other], scaled):
                 listed = f"{record.columns[POSITION, other, None]!r}, not {joint!r}"
                 yield f"column {name!r} follows {listed}: columns look exchanged"
 
@@ -121,6 +122,12 @@ def _follows(theta: FloatArray, q: FloatArray, own: float) -> bool:
     """Return whether a motor follows a joint much better than with the variance `own`."""
     about = float(np.var(theta - q))
     return about < FOLLOWS_BETTER * own and about < FOLLOWS * float(np.var(q))
+
+
+def _least_variance(theta: FloatArray, q: FloatArray) -> float:
+    """Return the least variance of the difference of a motor from a multiple of the motion of a joint."""
+    (of_motor, common), (_, of_joint) = np.cov(theta, q, bias=True)
+    return float(of_motor - common**2 / of_joint) if of_joint > 0 else float(of_motor)
 
 
 def _torque_agreements(

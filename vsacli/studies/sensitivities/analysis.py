@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vsacli.analysis.tool_report import unjudged_tools_text
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.base.units import TORQUE
@@ -209,7 +210,11 @@ def analyzed(
         failed=effects.failed,
         samples=run.trajectory.samples,
         left_out=effects.left_out,
-        warnings=(*robot.warnings, *run.trajectory.warnings),
+        warnings=(
+            *robot.warnings,
+            *run.trajectory.warnings,
+            *([unjudged_tools_text(robot.limited_tools)] if robot.limited_tools else []),
+        ),
         parameters=tuple(sorted(found, key=lambda each: -each.share)),
         band={} if band is None else dict(zip(robot.joint_names, band.joints(), strict=True)),
         monte_carlo=drawn,

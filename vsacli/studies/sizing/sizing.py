@@ -17,6 +17,7 @@ import numpy as np
 
 from vsacli.actuators.motor import SHAFT, JointMotor
 from vsacli.actuators.reach import LIMIT_ROUNDING
+from vsacli.analysis.tool_report import unjudged_tools_text
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError, check_type
 from vsacli.documents.edited import edited, moved_files, unaliased
@@ -191,6 +192,8 @@ def _assumption_notes(robot: Robot, table: RecordTable[CatalogMotor] | None) -> 
     coupled = [joint.name for joint in robot.joints if joint.actuator.coupled_rotors]
     if coupled and table is not None:
         yield f"{', '.join(coupled)}: the coupled inertia stays as it is, whatever the motors"
+    if robot.limited_tools:
+        yield unjudged_tools_text(robot.limited_tools)
     if table is not None and table.unknown_columns:
         yield f"columns of the catalog that were left out: {', '.join(table.unknown_columns)}"
 

@@ -15,9 +15,10 @@ import numpy as np
 
 from vsacli.analysis.joint_report import JointReport
 from vsacli.analysis.report import Report
+from vsacli.analysis.tool_report import ToolReport
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import LIMITS
+from vsacli.base.flags import LIMITS, ToolFlag
 from vsacli.base.units import Quantity
 from vsacli.base.variables import MOTORS, UNCERTAIN, VARIABLES, Block, deviation
 
@@ -134,16 +135,18 @@ def scalars(kept: Sequence[Column], report: Report) -> FloatArray:
     return np.concatenate([np.array(each, dtype=float).ravel() for each in values])
 
 
-def first_limit(joints: Sequence[JointReport]) -> str:
-    """Return joint and limit that a run exceeds first, such as `base motor_torque_limit`; "" if none.
+def first_limit(report: Report) -> str:
+    """Return joint or tool, and its limit that a run exceeds first, as `base motor_torque_limit`; "" if none.
 
-    Of limits that are exceeded at the same time, the one of the joint nearest to the base comes first.
+    Of limits that are exceeded at the same time, the one of the joint nearest to the base comes first, and
+    tools come last.
     """
+    places: tuple[JointReport | ToolReport, ...] = (*report.joints, *report.tools)
     exceeded = [
-        (joint.first_time[flag.label], f"{joint.name} {flag.label}")
-        for joint in joints
-        for flag in LIMITS
-        if flag.label in joint.first_time
+        (place.first_time[flag.label], f"{place.name} {flag.label}")
+        for place in places
+        for flag in (*LIMITS, ToolFlag.TOOL_STIFFNESS_LIMIT)
+        if flag.label in place.first_time
     ]
     return min(exceeded, default=(0.0, ""), key=itemgetter(0))[1]
 

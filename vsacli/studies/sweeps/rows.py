@@ -129,7 +129,7 @@ class Computer:
             recorder.add(block)
         report = computed.report()
         values = np.concatenate([*costs, scalars(self._study.kept, report)])
-        return Row(run, key, report.verdict, first_limit(report.joints), "", values, recorder.curves)
+        return Row(run, key, report.verdict, first_limit(report), "", values, recorder.curves)
 
     def _trajectory(self, robot: Robot, index: int, changes: ChangesByFile) -> Trajectory:
         place, joints = (index, json.dumps(changes.trajectory)), CommandedJoints.of(robot)
