@@ -50,7 +50,7 @@ OF_A_ROBOT = ("studies", "control", "results", "analysis", "dynamics", "h5py", "
 """Modules that have no part in reading one robot."""
 
 TASKS = {
-    "invdyn": Task(("invdyn", "-q", ROBOT, TRAJECTORY), NOT_FOR_THE_MAIN_JOB, 22_700),
+    "invdyn": Task(("invdyn", "-q", ROBOT, TRAJECTORY), NOT_FOR_THE_MAIN_JOB, 22_750),
     "invdyn --plot": Task(
         ("invdyn", "-q", ROBOT, TRAJECTORY, "--plot", "figures"),
         ("studies", "control", "files", "trajectory.fits", "trajectory.recorded"),
