@@ -12,6 +12,8 @@ from samples.branch_order import TreeFiles, differences, write_branches, write_h
 from samples.command_line import Outcome
 from samples.generated_code import STRICT, compile_c
 
+pytestmark = pytest.mark.cases(10)
+
 QUICK = 4
 """Joints of the trees of quick tests."""
 
@@ -56,6 +58,7 @@ def test_another_order_of_many_trees(vsacli: Callable[..., Outcome], command: st
 
 
 @pytest.mark.slow
+@pytest.mark.cases(3)
 @pytest.mark.parametrize("seed", range(8))
 def test_another_order_has_the_same_fixes(vsacli: Callable[..., Outcome], seed: int) -> None:
     compare_orders(vsacli, write_orders(seed, QUICK), "check-feasibility", "--fixes")
@@ -98,6 +101,7 @@ def test_branches_on_the_base_of_many_trees_alone(vsacli: Callable[..., Outcome]
 
 
 @pytest.mark.slow
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("seed", [1, 2, 3, 5, 6])
 def test_simulations_of_trees_end_on_target(vsacli: Callable[..., Outcome], seed: int) -> None:
     simulate(vsacli, seed, joints=6)
@@ -119,6 +123,7 @@ def simulate(vsacli: Callable[..., Outcome], seed: int, joints: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("precision", ["double", "float"])
 @pytest.mark.parametrize("seed", range(5))
 def test_generated_code_of_trees_passes_its_own_test(

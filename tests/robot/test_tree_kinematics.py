@@ -20,6 +20,8 @@ ROUNDING = 1e-12
 
 SAMPLES = 10
 
+pytestmark = pytest.mark.cases(8)
+
 trees = pytest.mark.parametrize("seed", slow_but(SMALL, range(50)))
 
 

@@ -27,6 +27,7 @@ from vsacli.base import file_formats
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH, Signal
 from vsacli.base.wrench import Wrench, WrenchFrame, frames_by_tool
+from vsacli.dynamics.inverse import adapt_trajectory
 from vsacli.robot.joint import FRAME_0, Joint, Pose, Tool
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
@@ -210,7 +211,7 @@ class TreeMotion(NamedTuple):
     frames: dict[str, str | None]
 
     def trajectory(self, robot: Robot) -> Trajectory:
-        """The trajectory of a robot with some of these joints and tools, in its order."""
+        """The trajectory of a robot with some of these joints and tools; its dampers are at their least."""
         position = _polynomial(POSITION, 9, [self.q[name] for name in robot.joint_names])
         stiffness = _polynomial(STIFFNESS, 5, [self.stiffness[name] for name in robot.joint_names])
         frames, wrench = tuple(self.frames.get(name) for name in robot.tool_names), None
@@ -219,9 +220,10 @@ class TreeMotion(NamedTuple):
                 WRENCH, 5, [each for name in robot.tool_names for each in self.wrenches[name]]
             )
             wrench = WrenchProfile(course, frames if len(frames) > 1 else str(frames[0]))
-        return Trajectory(
+        declared = Trajectory(
             UniformTimes(1, 40), position, {"stiffness": stiffness}, wrench=wrench, name="polynomials"
         )
+        return adapt_trajectory(robot, declared)
 
 
 def _polynomial(signal: Signal, degree: int, ends: Sequence[FloatArray]) -> RestToRest:
