@@ -21,7 +21,8 @@ from vsacli.results.charts.ranking import Ranking
 from vsacli.results.plots import compare_files, compared_studies, ranking_figure, study_figures
 from vsacli.results.store.damage import reporting_damage
 from vsacli.results.store.excerpt import Excerpt
-from vsacli.results.store.reader import StoredResult, StoredSensitivity, open_stored, stored_format
+from vsacli.results.store.reader import StoredResult, open_stored, stored_format
+from vsacli.results.store.sensitivity_file import StoredSensitivity
 from vsacli.results.store.study_table import StoredStudy
 
 

@@ -414,16 +414,6 @@ class StoredSimulation(StoredResult):
     _to_get = "run simulate again"
 
 
-class StoredSensitivity(StoredResult):
-    """An open sensitivity file; a context manager that closes it."""
-
-    format = file_formats.SENSITIVITY
-    kind = "sensitivity"
-    command = "sensitivity"
-    _of_runs = ()
-    _to_get = "run sensitivity again"
-
-
 def _changes(file: StoredInput) -> dict[str, Any]:
     return {"changes": file.changes} if file.changes else {}
 
