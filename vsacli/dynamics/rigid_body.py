@@ -240,9 +240,13 @@ def link_dynamics(robot: Robot, frame: WrenchFrame | None = None) -> LinkDynamic
 
 
 def without_drives(robot: Robot) -> Robot:
-    """Return the robot with a common placeholder for its drives, for robots with equal links to be equal."""
+    """Return the robot with a common placeholder for its drives, for robots with equal links to be equal.
+
+    Limits are left out, too, as no program depends on them.
+    """
     nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
     joints = tuple(replace(joint, **nothing) for joint in robot.joints)
+    robot = robot.without_tool_limits()
     return replace(robot, name="links", description="", placeholder=False, joints=joints, sources=())
 
 

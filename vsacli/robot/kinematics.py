@@ -106,7 +106,7 @@ def frames_in_base(robot: Geometry, q: FloatArray) -> RobotFrames:
     base = _constant_frame(robot.base)
     frame_0, seats, links, _ = frames(robot, q)
     links_in_base = tuple(map(base.compose, links))
-    tools = _tool_frames(robot, links_in_base)
+    tools = _tool_frames(robot, links_in_base)  # not composed from frame 0: other rounding than ever
     return RobotFrames(base.compose(frame_0), tuple(map(base.compose, seats)), links_in_base, tools)
 
 

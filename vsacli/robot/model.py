@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -235,6 +235,16 @@ class Robot(DeclaredRecord):
     def limited_tools(self) -> tuple[str, ...]:
         """Names of the tools with a `min_stiffness`."""
         return tuple(tool.name for tool in self.tools if tool.min_stiffness is not None)
+
+    def without_tool_limits(self, names: Collection[str] | None = None) -> Self:
+        """Return the robot without the `min_stiffness` of some of its tools, by default of all."""
+        if not self.limited_tools:
+            return self
+        tools = (
+            replace(tool, min_stiffness=None) if names is None or tool.name in names else tool
+            for tool in self.tools
+        )
+        return replace(self, tools=tuple(tools))
 
     @property
     def labels(self) -> Labels:

@@ -74,9 +74,9 @@ def fixes(
     trajectory = adapt_trajectory(robot, trajectory)
     check_min_margin(min_margin)
     if robot.limited_tools:
-        from vsacli.studies.search.tool_fixes import with_stiff_tools, without_limits
+        from vsacli.studies.search.tool_fixes import with_stiff_tools
 
-        of_joints = fixes(without_limits(robot), trajectory, min_margin, progress=progress)
+        of_joints = fixes(robot.without_tool_limits(), trajectory, min_margin, progress=progress)
         return with_stiff_tools(robot, trajectory, of_joints)
     acceptance = Acceptance(robot, min_margin, RecordedLimits(trajectory))
     asked = Task(acceptance, trajectory)

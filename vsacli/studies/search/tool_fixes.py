@@ -48,15 +48,6 @@ BISECTIONS = 20
 """Halvings of the range of a factor: at most 1e-5 of it remains, less than its four digits."""
 
 
-def without_limits(robot: Robot, names: Collection[str] | None = None) -> Robot:
-    """Return the robot without the limits of some of its tools, by default of all."""
-    tools = (
-        replace(tool, min_stiffness=None) if names is None or tool.name in names else tool
-        for tool in robot.tools
-    )
-    return replace(robot, tools=tuple(tools))
-
-
 def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> Fixes:
     """Return the fixes of a robot whose tools have limits.
 
@@ -77,7 +68,7 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
     candidates = [Fix(0.0, robot, trajectory, asked=trajectory), *of_joints.fixes]
     chosen, hopeless = _confirmed_fixes(Task(rule, trajectory), candidates)
     if hopeless:
-        limited = replace(rule, robot=without_limits(robot, hopeless))
+        limited = replace(rule, robot=robot.without_tool_limits(hopeless))
         chosen, _ = _confirmed_fixes(Task(limited, trajectory), candidates)
     alone = next((fix.stiffness_factor for fix in chosen if fix.kinds == {"stiffness_factor"}), None)
     not_alone = (JOINTS_FALL_SHORT,) if of_joints.needed else (NOT_CONFIRMED,)
