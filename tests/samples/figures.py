@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +20,6 @@ class Result:
     kind, command = "result", "invdyn"
     complete = True
     declared = VARIABLES
-    report_json: ClassVar = {}
 
     def __init__(
         self,
@@ -39,6 +38,7 @@ class Result:
         self.joint_types = tuple({"R": "revolute", "P": "prismatic"}[letter] for letter in types)
         self.actuators = tuple(actuators or ["antagonistic"] * len(types))
         self.bounds: dict[str, np.ndarray] = {}
+        self.report_json: dict[str, Any] = {}
         self.time = time
         self.samples = time.size
         self._values = variables

@@ -246,7 +246,7 @@ def without_drives(robot: Robot) -> Robot:
     """
     nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
     joints = tuple(replace(joint, **nothing) for joint in robot.joints)
-    robot = robot.without_tool_limits()
+    robot = robot.without_tool_limits(robot.limited_tools)
     return replace(robot, name="links", description="", placeholder=False, joints=joints, sources=())
 
 

@@ -83,8 +83,7 @@ class Robot(DeclaredRecord):
 
     def _problems(self) -> Iterator[FieldProblem]:
         """Yield problems of parents, or else of tools."""
-        problems = list(self._parent_problems())
-        yield from problems or self._tool_problems()
+        yield from list(self._parent_problems()) or self._tool_problems()
 
     def _parent_problems(self) -> Iterator[FieldProblem]:
         names = self.joint_names
@@ -94,10 +93,8 @@ class Robot(DeclaredRecord):
             if joint.parent == joint.name:
                 reason = "a joint is not mounted on its own link; name an earlier joint, or null for the base"
             elif joint.parent in names:
-                reason = (
-                    f"{joint.parent!r} comes later in the file; list joints after the one that carries them "
-                    "(a cycle has no such order)"
-                )
+                order = "list joints after the one that carries them (a cycle has no such order)"
+                reason = f"{joint.parent!r} comes later in the file; {order}"
             else:
                 hint = did_you_mean(str(joint.parent), names[:number]) if number else ""
                 reason = f"no earlier joint is called {joint.parent!r} (null stands for the base){hint}"
@@ -195,11 +192,9 @@ class Robot(DeclaredRecord):
     @cached_property
     def subtrees(self) -> tuple[tuple[int, ...], ...]:
         """Joints that stand on the base together, because one on the base carries the others."""
-        numbers = range(len(self.joints))
+        first = [path[0] for path in self.paths]
         return tuple(
-            tuple(number for number in numbers if self.paths[number][0] == first)
-            for first in numbers
-            if self.parents[first] < 0
+            tuple(number for number, own in enumerate(first) if own == base) for base in dict.fromkeys(first)
         )
 
     @property
@@ -236,14 +231,9 @@ class Robot(DeclaredRecord):
         """Names of the tools with a `min_stiffness`."""
         return tuple(tool.name for tool in self.tools if tool.min_stiffness is not None)
 
-    def without_tool_limits(self, names: Collection[str] | None = None) -> Self:
-        """Return the robot without the `min_stiffness` of some of its tools, by default of all."""
-        if not self.limited_tools:
-            return self
-        tools = (
-            replace(tool, min_stiffness=None) if names is None or tool.name in names else tool
-            for tool in self.tools
-        )
+    def without_tool_limits(self, names: Collection[str]) -> Self:
+        """Return the robot without the `min_stiffness` of some of its tools."""
+        tools = (replace(tool, min_stiffness=None) if tool.name in names else tool for tool in self.tools)
         return replace(self, tools=tuple(tools))
 
     @property

@@ -76,7 +76,9 @@ def fixes(
     if robot.limited_tools:
         from vsacli.studies.search.tool_fixes import with_stiff_tools
 
-        of_joints = fixes(robot.without_tool_limits(), trajectory, min_margin, progress=progress)
+        of_joints = fixes(
+            robot.without_tool_limits(robot.limited_tools), trajectory, min_margin, progress=progress
+        )
         return with_stiff_tools(robot, trajectory, of_joints)
     acceptance = Acceptance(robot, min_margin, RecordedLimits(trajectory))
     asked = Task(acceptance, trajectory)
