@@ -132,7 +132,7 @@ def test_other_branch_and_followed_deflections_agree():
     kernel = InverseDynamics(turned, prescribed=(IntegratedRows(),))
     engine = choose("c", kernel, 1, 1).engine
     found = block_of(kernel, motion, engine, integrated)
-    assert_agree(found, block_of(kernel, motion, deflections=integrated))
+    assert_agree(found, block_of(kernel, motion, further=integrated))
 
 
 @pytest.mark.slow

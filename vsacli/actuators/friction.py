@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base import units
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray, stack_constants
 from vsacli.documents.fields import NON_NEGATIVE, NumberWithUnit, PairOf, number, value
 from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
 
@@ -57,7 +57,7 @@ class Friction(DeclaredRecord):
         backward, forward = (abs(ratio) * size for size in self.coulomb)
         geared = {
             "coulomb": (backward, forward) if ratio > 0 else (forward, backward),
-            "offset": ratio * self.offset or 0.0,
+            "offset": ratio * self.offset + 0.0,  # without the sign of zero
             "width": self.width / abs(ratio),
         }
         return construct_unchecked(Friction, geared)
@@ -83,15 +83,17 @@ class FrictionLaws(NamedTuple):
     @classmethod
     def of(cls, frictions: Sequence[Friction | None]) -> FrictionLaws | None:
         """Return the laws, one per entry on the last axis; None if no entry has friction."""
+        laws = cls.over_samples(frictions)
+        return laws and cls(*(values[:, 0] for values in laws))
+
+    @classmethod
+    def over_samples(cls, frictions: Sequence[Friction | None]) -> FrictionLaws | None:
+        """Return the laws, one per entry on the first axis, before an axis of samples; see `of`."""
         if not any(frictions):
             return None
         laws = [friction or NO_FRICTION for friction in frictions]
         rows = [(*law.coulomb, law.offset, law.width) for law in laws]
-        return cls(*map(np.stack, zip(*rows, strict=True)))
-
-    def with_axis_behind(self) -> FrictionLaws:
-        """Return the laws with a further last axis, for samples."""
-        return FrictionLaws(*(values[..., None] for values in self))
+        return cls(*map(stack_constants, zip(*rows, strict=True)))
 
     @property
     def sharp(self) -> BoolArray:

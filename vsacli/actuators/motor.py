@@ -9,11 +9,9 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from vsacli.actuators.friction import NO_FRICTION, Friction
 from vsacli.base import units
-from vsacli.base.arrays import FloatArray
+from vsacli.base.arrays import FloatArray, stack_constants
 from vsacli.base.errors import FieldProblem
 from vsacli.base.units import Quantity, constant
 from vsacli.documents.fields import (
@@ -262,15 +260,17 @@ class Windings(NamedTuple):
     @classmethod
     def of(cls, motors: Sequence[JointMotor | None]) -> Windings | None:
         """Return the constants, one entry per motor on the last axis; None if no torque constant is given."""
+        constants = cls.over_samples(motors)
+        return constants and cls(*(values[:, 0] for values in constants))
+
+    @classmethod
+    def over_samples(cls, motors: Sequence[JointMotor | None]) -> Windings | None:
+        """Return the constants, one entry per motor on the first axis, before one of samples; see `of`."""
         rows = [[getattr(motor, name, None) for name in cls._fields] for motor in motors]
         if all(constant is None for constant, _ in rows):
             return None
         filled_rows = [[math.nan if value is None else value for value in row] for row in rows]
-        return cls(*map(np.stack, zip(*filled_rows, strict=True)))
-
-    def with_axis_behind(self) -> Windings:
-        """Return the constants with a further last axis, for samples."""
-        return Windings(*(values[..., None] for values in self))
+        return cls(*map(stack_constants, zip(*filled_rows, strict=True)))
 
     def variables(self, torque: FloatArray, velocity: FloatArray) -> dict[str, FloatArray]:
         """Return the variables `ELECTRICAL` by name, A, V, W.

@@ -49,6 +49,7 @@ class Minima(NamedTuple):
 
     Attributes:
         block: Variables of the minimum's own joint at each minimum, as of a robot with one joint; a row each.
+        variant: Variant of the robot, by index.
         quantity: Quantity that has the minimum, by index in `MinimaSearch.quantities`.
         joint: Joint of the quantity, by index.
         clearance: Clearance at the minimum.
@@ -56,6 +57,7 @@ class Minima(NamedTuple):
     """
 
     block: Block
+    variant: IndexArray
     quantity: IndexArray
     joint: IndexArray
     clearance: FloatArray
@@ -65,6 +67,7 @@ class Minima(NamedTuple):
         """Return a selection of the minima."""
         return Minima(
             self.block.taken(chosen),
+            self.variant[chosen],
             self.quantity[chosen],
             self.joint[chosen],
             self.clearance[chosen],
@@ -87,10 +90,12 @@ class Minima(NamedTuple):
 
 
 class MinimaSearch:
-    """A search for minima between the samples of a run, while its blocks pass.
+    """A search for minima between the samples of the runs of a batch, while their blocks pass.
+
+    Several runs pass in a single block, one after the other.
 
     Args:
-        dynamics: Inverse dynamics along the trajectory of the run.
+        dynamics: Inverse dynamics along the trajectories.
         min_margin: Margin that is flagged.
         uncertainty: Uncertainty of recorded signals, which corrects flags of limits; None without any.
 
@@ -102,17 +107,17 @@ class MinimaSearch:
     def __init__(
         self, dynamics: RunDynamics, min_margin: float, uncertainty: RunUncertainty | None = None
     ) -> None:
-        trajectory = dynamics.trajectory
+        trajectory = dynamics.trajectories[0]
         self.quantities = bounded_quantities(dynamics.robot)
         self.notes = () if trajectory.known_between else (SAMPLES_ONLY,)
-        self._dynamics, self._trajectory, self._uncertainty = dynamics, trajectory, uncertainty
-        self._joints = len(dynamics.robot.joints)
+        self._dynamics, self._samples, self._uncertainty = dynamics, trajectory.samples, uncertainty
+        self._joints, self._variants = len(dynamics.robot.joints), len(dynamics.trajectories)
         self._joint = np.array([quantity.joint_index for quantity in self.quantities], dtype=np.intp)
         self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=FLAG_TYPE)
-        self._sides = Sides(self.quantities, min_margin)
+        self._sides = Sides(self.quantities, min_margin, self._variants)
         self._lowest = [np.empty(0)] * len(self._sides.quantity)
         self._least_at_steps = np.full(len(self._sides.quantity), np.inf)
-        self._least_between: dict[int, tuple[float, Finding]] = {}
+        self._least_between: list[dict[int, tuple[float, Finding]]] = [{} for _ in range(self._variants)]
         self._pending_minima: list[Minima] = []
         self._released = 0
         looking = not self.notes and bool(self.quantities)
@@ -124,15 +129,15 @@ class MinimaSearch:
     def search_around(self, block: Block) -> None:
         """Look around each sample of the next block as computed, as far as the next sample is known."""
         if self._scans:
-            self._scan()
+            self._scan(block)
             self._scans = False
         elif self._searches:
-            steps = block.time, self._sides.values(block)
+            steps = self._times_by_side(block.time), self._by_side(self._sides.values(block))
             before = self._sides_over_time
             self._sides_over_time = (
                 SampledFunctions(0, *steps).opened() if before is None else before.last(2).followed_by(*steps)
             )
-            ended = self._sides_over_time.stop == self._trajectory.samples
+            ended = self._sides_over_time.stop == self._samples
             self._search(
                 self._sides_over_time.closed() if ended else self._sides_over_time, self._sides_over_time
             )
@@ -158,38 +163,57 @@ class MinimaSearch:
         self._pending_minima, self._released = later, stop
         return nearest
 
-    def add(self, minima: Minima) -> None:
-        """Merge minima of samples that are part of the run into the report."""
+    def add(self, minima: Minima, variant: int = 0) -> None:
+        """Merge minima of samples that are part of the run of a variant into its report."""
+        least_between = self._least_between[variant]
         for number in set(minima.quantity.tolist()):
             of_quantity, quantity = minima.where(minima.quantity == number), self.quantities[number]
             least = int(of_quantity.clearance.argmin())
             clearance = float(of_quantity.clearance[least])
-            if clearance < self._least_between.get(number, (math.inf,))[0]:
+            if clearance < least_between.get(number, (math.inf,))[0]:
                 worst = quantity.at(of_quantity.of_joint(quantity.joint_index), least, between=True)
-                self._least_between[number] = clearance, worst
+                least_between[number] = clearance, worst
 
-    def reports(self) -> list[dict[str, Finding]]:
+    def reports(self, variant: int = 0) -> list[dict[str, Finding]]:
         """Return for each joint the clearances that are lower between the samples than at any of them."""
         reports: list[dict[str, Finding]] = [{} for _ in range(self._joints)]
+        if not self._least_between[variant]:
+            return reports
         at_steps, sides = np.full(len(self.quantities), np.inf), self._sides
-        every = np.arange(len(sides.quantity))
-        np.minimum.at(at_steps, sides.quantity, sides.clearance(every, self._least_at_steps))
-        nearest_last = sorted(self._least_between.items(), reverse=True, key=lambda entry: entry[1][0])
+        own = np.arange(sides.count) + variant * sides.count
+        np.minimum.at(
+            at_steps, sides.quantity[: sides.count], sides.clearance(own, self._least_at_steps[own])
+        )
+        nearest_last = sorted(
+            self._least_between[variant].items(), reverse=True, key=lambda entry: entry[1][0]
+        )
         for number, (clearance, worst) in nearest_last:  # both motors have one kind: the lower one overwrites
             if clearance < at_steps[number]:
                 reports[self._joint[number]][worst.kind] = worst
         return reports
 
-    def _scan(self) -> None:
-        """Search a whole run of few samples, at the same number of times from each sample to the next."""
-        steps = self._trajectory.times.block(0, self._trajectory.samples)
-        per_interval = -(-SCANNED // (len(steps) - 1))
-        time = np.append(
-            steps[:-1, None] + np.diff(steps)[:, None] * np.arange(per_interval) / per_interval, steps[-1]
-        )
-        values = [self._sides.values(block) for _, block in self._dynamics.blocks_at(time)]
-        sides = SampledFunctions(0, time, np.hstack(values))
-        self._search(sides.opened().closed(), SampledFunctions(0, steps, sides.value[:, ::per_interval]))
+    def _by_side(self, values: FloatArray) -> FloatArray:
+        """Return values of sides at the samples of one variant after the other, (sides of all, samples)."""
+        by_variant = values.reshape(self._sides.count, self._variants, -1)
+        return by_variant.swapaxes(0, 1).reshape(len(self._sides.quantity), by_variant.shape[-1])
+
+    def _times_by_side(self, time: FloatArray) -> FloatArray:
+        """Return the times of samples for `SampledFunctions`, a row if they are those of all variants."""
+        times = time.reshape(self._variants, -1)
+        return times[0] if (times == times[0]).all() else np.repeat(times, self._sides.count, axis=0)
+
+    def _scan(self, block: Block) -> None:
+        """Search whole runs of few samples, at the same number of times from each sample to the next."""
+        steps = block.time.reshape(self._variants, -1)
+        per_interval = -(-SCANNED // (self._samples - 1))
+        shares = np.arange(1, per_interval) / per_interval
+        further = steps[:, :-1, None] + np.diff(steps)[..., None] * shares
+        variant = np.repeat(np.arange(self._variants), further[0].size)
+        parts = [self._sides.values(part) for _, part in self._dynamics.blocks_at(further.ravel(), variant)]
+        at_steps, between = map(self._by_side, (self._sides.values(block), np.hstack(parts)))
+        time = self._times_by_side(_interleaved(steps, further.reshape(self._variants, -1)))
+        sides = SampledFunctions(0, time, _interleaved(at_steps, between))
+        self._search(sides.opened().closed(), SampledFunctions(0, self._times_by_side(steps), at_steps))
 
     def _search(self, sampled: SampledFunctions, steps: SampledFunctions) -> None:
         """Find the minima where values are known, and keep those lower than the samples around them.
@@ -199,10 +223,10 @@ class MinimaSearch:
         self._least_at_steps = np.minimum(self._least_at_steps, steps.value.min(axis=1))
         sides = self._sides
         minima = narrow_brackets(
-            self._select_candidates(find_brackets(sampled), steps.time), self._evaluate, sides.critical
+            self._select_candidates(find_brackets(sampled), steps), self._evaluate, sides.critical
         )
         side, time, value = minima.function, minima.time[:, 1], minima.value[:, 1]
-        after = np.clip(np.searchsorted(steps.time, time), 1, len(steps.time) - 1)
+        after = np.clip(steps.places(side, time), 1, steps.time.shape[-1] - 1)
         at_steps = np.minimum(*(steps.value[side, place] for place in (after - 1, after)))
         noise = MINIMUM_ACCURACY * np.abs(value - sides.critical[side]) + ROUNDING * sides.size[side]
         lower = value < at_steps - np.where(np.isfinite(value), noise, 0.0)
@@ -210,16 +234,18 @@ class MinimaSearch:
         further = sides.beyond(side, value) & ~sides.beyond(side, at_steps)
         kept |= further[:, :DECISIVE].any(axis=1)
         if kept.any():
-            nearest = after - (time - steps.time[after - 1] < steps.time[after] - time)
+            before, behind = (steps.times(side, place) for place in (after - 1, after))
+            nearest = after - (time - before < behind - time)
             self._add_minima(minima.where(kept), steps.first + nearest[kept])
 
-    def _select_candidates(self, candidates: Brackets, steps: FloatArray) -> Brackets:
+    def _select_candidates(self, candidates: Brackets, steps: SampledFunctions) -> Brackets:
         """Return the brackets that may have the lowest minima of each side so far, between samples.
 
         A minimum is kept if it may have more flags than the middle time, or if it may be the lowest.
         """
         middle, side, sides = candidates.time[:, 1], candidates.function, self._sides
-        at_step = steps[np.clip(np.searchsorted(steps, middle), 0, len(steps) - 1)] == middle
+        place = np.clip(steps.places(side, middle), 0, steps.time.shape[-1] - 1)
+        at_step = steps.times(side, place) == middle
         ahead = np.maximum(sides.next_flag_values(side, candidates.value[:, 1]), self._least_at_steps[side])
         with np.errstate(invalid="ignore"):  # inf - inf next to an infinite clearance
             fall = candidates.fall_bound
@@ -237,24 +263,34 @@ class MinimaSearch:
     def _add_minima(self, minima: Brackets, steps: IndexArray) -> None:
         """Keep the variables at minima, with the flags of the minimal quantities, for the nearest sample."""
         clearance = self._sides.clearance(minima.function, minima.value[:, 1])
-        for part, block in self._dynamics.blocks_at(minima.time[:, 1]):
-            quantity = self._sides.quantity[minima.function[part]]
+        variants, quantities = np.divmod(self._sides.quantity[minima.function], len(self.quantities))
+        steps = steps + self._samples * variants
+        for part, block in self._dynamics.blocks_at(minima.time[:, 1], variants):
+            quantity = quantities[part]
             joint = self._joint[quantity]
             judged = block if self._uncertainty is None else self._uncertainty.judged(block)
             at_minima = np.arange(len(joint)), joint, np.newaxis
             variables = {name: array[at_minima] for name, array in _joint_variables(judged).items()}
             variables["flags"] &= self._bits[quantity, None]
-            rows = quantity, joint, clearance[part], steps[part]
+            rows = variants[part], quantity, joint, clearance[part], steps[part]
             self._pending_minima.append(Minima(judged.replaced(**variables), *rows))
 
     def _evaluate(self, side: IndexArray, times: FloatArray) -> FloatArray:
         """Return the values of sides (n,) at times of their own, (n, times)."""
-        wanted = np.repeat(side, times.shape[1])
+        variant, wanted = np.divmod(np.repeat(side, times.shape[1]), self._sides.count)
         parts = [
             self._sides.values(block)[wanted[part], np.arange(len(block.time))]
-            for part, block in self._dynamics.blocks_at(times.ravel())
+            for part, block in self._dynamics.blocks_at(times.ravel(), variant)
         ]
         return np.concatenate(parts).reshape(times.shape)
+
+
+def _interleaved(at_steps: FloatArray, between: FloatArray) -> FloatArray:
+    """Return values at steps, each followed by those between it and the next one, (rows, all)."""
+    rows = len(at_steps)
+    inside = between.reshape(rows, at_steps.shape[1] - 1, -1)
+    ahead = np.concatenate((at_steps[:, :-1, None], inside), axis=2).reshape(rows, -1)
+    return np.hstack((ahead, at_steps[:, -1:]))
 
 
 def _joint_variables(block: Block) -> dict[str, AnyArray]:

@@ -39,7 +39,7 @@ class DifferenceErrors:
     A time has all its scales only until its neighbors are known: a long chain has many columns.
 
     Args:
-        steps: Difference steps of all times, (scales, times), s.
+        steps: Difference steps of all times of each variant, (scales, times, variants), s.
         bound: Least bound on an error; the error nearest to its bound decides.
         noise_gain: Multiple of the estimated noise that is allowed.
     """
@@ -62,11 +62,11 @@ class DifferenceErrors:
         """Merge some times.
 
         Args:
-            values: Values of the variable, (scales, offsets, times, joints, motors).
+            values: Values of the variable, (scales, offsets, times, variants, joints, motors).
             derivatives: Derivatives to be checked, as above.
-            compared: Whether the difference is compared, (scales, times, joints).
-            size: Scale of the errors, if larger than the derivatives; (times, joints, motors).
-            grain: Smallest noise of the values, (scales, times, joints, motors).
+            compared: Whether the difference is compared, (scales, times, variants, joints).
+            size: Scale of the errors, if larger than the derivatives; (times, variants, joints, motors).
+            grain: Smallest noise of the values, (scales, times, variants, joints, motors).
         """
         difference, *noise = (
             _combined(weights, each)
@@ -109,7 +109,7 @@ class DifferenceErrors:
         begin = self._first_open
         now = slice(self._judged - begin, end - begin)
         difference, derivative, *noise, is_compared = self._open
-        steps = self._steps[:, self._judged : end, None, None]
+        steps = self._steps[:, self._judged : end, :, None, None]
         of_value, of_derivative = (_largest_near(each)[:, now] for each in noise)
         admitted = self._noise_gain * (of_value / steps + of_derivative)
         error = np.abs(difference[:, now] / steps - derivative[:, now])
@@ -121,16 +121,16 @@ class DifferenceErrors:
         self._open = tuple(each[:, self._first_open - begin :].copy() for each in self._open)
 
     def relative(self) -> tuple[FloatArray, FloatArray]:
-        """Return the error nearest to its bound of any joint at each time, and that bound, (times,) each."""
+        """Return the error nearest to its bound of any joint, and that bound, (times, variants) each."""
         self._judge(self._steps.shape[1])
         error, admitted = map(np.concatenate, zip(*self._errors_and_bounds, strict=True))
-        scale = np.maximum(self._peak, SMALL_JOINT * np.max(self._peak))
+        scale = np.maximum(self._peak, SMALL_JOINT * np.max(self._peak, axis=(-2, -1), keepdims=True))
         error, bound = (
-            np.divide(each, scale, out=np.zeros_like(each), where=scale != 0).reshape(len(each), -1)
+            np.divide(each, scale, out=np.zeros_like(each), where=scale != 0).reshape(*each.shape[:2], -1)
             for each in (error, admitted)
         )
-        worst = np.argmax(error / np.maximum(bound, self._bound), axis=1)[:, None]
-        error, bound = (np.take_along_axis(each, worst, axis=1)[:, 0] for each in (error, bound))
+        worst = np.argmax(error / np.maximum(bound, self._bound), axis=2)[..., None]
+        error, bound = (np.take_along_axis(each, worst, axis=2)[..., 0] for each in (error, bound))
         return error, bound
 
 

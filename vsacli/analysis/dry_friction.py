@@ -71,7 +71,7 @@ class FrictionPassages:
 
     def notes(self, dynamics: RunDynamics) -> Iterator[str]:
         """Yield a sentence for each joint on friction that the samples do not show."""
-        trajectory = dynamics.trajectory
+        trajectory = dynamics.trajectories[0]
         for (index, joint, width), passages, peak in zip(
             self._joints, self._passages, self._peaks, strict=True
         ):

@@ -101,30 +101,36 @@ class Sides:
 
     So a peak has the same place and value whatever its limit is, and a tighter limit never finds a lower one.
 
+    The sides of all variants of a batch follow each other, those of the first one first.
+
     Args:
-        quantities: Quantities with bounds.
+        quantities: Quantities with bounds, the same for each variant.
         min_margin: Margin that is flagged.
+        variants: Number of variants.
 
     Attributes:
-        quantity: Index of the quantity of each side, (sides,).
+        count: Number of sides of a variant.
+        quantity: Index of the quantity of each side, (sides,); that of the second variant follows all of the
+            first.
         size: Distance from the bound that is a clearance of 1, (sides,).
         critical: Value at which the gravest flag of each side is set, (sides,).
     """
 
-    def __init__(self, quantities: list[Bounded], min_margin: float) -> None:
+    def __init__(self, quantities: list[Bounded], min_margin: float, variants: int = 1) -> None:
         sides = [(number, side) for number, each in enumerate(quantities) for side in each.sides(min_margin)]
-        self._quantities = quantities
-        self.quantity = np.array([number for number, _ in sides], dtype=np.intp)
-        table = np.array([side for _, side in sides]).reshape(-1, 6)
+        self._quantities, self.count = quantities, len(sides)
+        of_one = np.array([number for number, _ in sides], dtype=np.intp)
+        self.quantity = (of_one + len(quantities) * np.arange(variants)[:, None]).ravel()
+        table = np.tile(np.array([side for _, side in sides]).reshape(-1, 6), (variants, 1))
         self._sign, self._bound, self.size = table[:, :3].T
         self._tolerances = table[:, 3:]
         self.critical = self._bound - self._tolerances[:, 0]
 
     def values(self, block: Block) -> FloatArray:
-        """Return the values of all sides, (sides, samples)."""
+        """Return the values of all sides of a single variant, (sides, samples), or of each sample's own."""
         of_joints = {each.joint_index: block.of_joint(each.joint_index) for each in self._quantities}
-        quantities = (self._quantities[number] for number in self.quantity)
-        signed = zip(quantities, self._sign.tolist(), strict=True)
+        quantities = (self._quantities[number] for number in self.quantity[: self.count])
+        signed = zip(quantities, self._sign[: self.count].tolist(), strict=True)
         rows = [quantity.signed_values(of_joints[quantity.joint_index], sign) for quantity, sign in signed]
         return np.array(rows).reshape(-1, len(block.time))
 
@@ -193,7 +199,7 @@ class SampledFunctions(NamedTuple):
 
     Attributes:
         first: Index of the first time.
-        time: Times, ascending, (times,).
+        time: Times, ascending, (times,), or those of each function, (functions, times).
         value: Values at these times, (functions, times).
     """
 
@@ -204,24 +210,40 @@ class SampledFunctions(NamedTuple):
     @property
     def stop(self) -> int:
         """Index of the time after the last one."""
-        return self.first + len(self.time)
+        return self.first + self.time.shape[-1]
 
     def last(self, count: int) -> SampledFunctions:
         """Return the last `count` times."""
-        dropped = max(0, len(self.time) - count)
-        return SampledFunctions(self.first + dropped, self.time[dropped:], self.value[:, dropped:])
+        dropped = max(0, self.time.shape[-1] - count)
+        return SampledFunctions(self.first + dropped, self.time[..., dropped:], self.value[:, dropped:])
 
     def followed_by(self, time: FloatArray, value: FloatArray) -> SampledFunctions:
         """Return these times followed by others."""
-        return SampledFunctions(self.first, np.append(self.time, time), np.hstack((self.value, value)))
+        times = np.concatenate((self.time, time), axis=-1)
+        return SampledFunctions(self.first, times, np.hstack((self.value, value)))
 
     def opened(self) -> SampledFunctions:
         """Return these with the first time twice, so that it has a neighbor on either side."""
-        return SampledFunctions(self.first - 1, self.time[:1], self.value[:, :1]).followed_by(*self[1:])
+        first = SampledFunctions(self.first - 1, self.time[..., :1], self.value[:, :1])
+        return first.followed_by(*self[1:])
 
     def closed(self) -> SampledFunctions:
         """Return these with the last time twice, slightly higher: the end of a fall is a minimum."""
-        return self.followed_by(self.time[-1:], np.nextafter(self.value[:, -1:], np.inf))
+        return self.followed_by(self.time[..., -1:], np.nextafter(self.value[:, -1:], np.inf))
+
+    def places(self, function: IndexArray, time: FloatArray) -> IndexArray:
+        """Return where times, (n,), of functions are among the times of these functions, from the left."""
+        if self.time.ndim == 1:
+            return np.searchsorted(self.time, time)
+        places = np.empty(len(time), dtype=np.intp)
+        for number in set(function.tolist()):
+            own = function == number
+            places[own] = np.searchsorted(self.time[number], time[own])
+        return places
+
+    def times(self, function: IndexArray, place: IndexArray) -> FloatArray:
+        """Return the times of functions at places, (n,)."""
+        return self.time[place] if self.time.ndim == 1 else self.time[function, place]
 
 
 class Brackets(NamedTuple):
@@ -288,11 +310,11 @@ def find_brackets(functions: SampledFunctions) -> Brackets:
 
     Of equal adjacent values, the last is the middle.
     """
-    time, values = functions.time, functions.value
+    values = functions.value
     falls = values[:, 1:] <= values[:, :-1]
     function, before = np.nonzero(falls[:, :-1] & ~falls[:, 1:])
-    around = before[:, None] + np.arange(3)
-    return Brackets(function, time[around], values[function[:, None], around])
+    around = function[:, None], before[:, None] + np.arange(3)
+    return Brackets(function, functions.times(*around), values[around])
 
 
 def narrow_brackets(wide: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brackets:

@@ -1,19 +1,24 @@
-"""Inverse dynamics along the trajectory of a run: its kernel, and deflections that are integrated before."""
+"""Inverse dynamics along the trajectories of a batch: its kernel, and deflections integrated before."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
 from typing import TYPE_CHECKING
 
-from vsacli.base.arrays import FloatArray
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.variables import Block
+from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.compute.engine import NUMPY, Engine
-from vsacli.dynamics.balances import BalancedDynamics
+from vsacli.dynamics.balances import BalancedBlock, BalancedDynamics
 from vsacli.dynamics.deflection_rows import IntegratedRows, InternalRows, internal_rows
 from vsacli.dynamics.inverse import InverseDynamics, block_of, usual_block
+from vsacli.dynamics.variants import Variants
 from vsacli.robot.model import Robot
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.trajectory import Trajectory
@@ -27,57 +32,110 @@ DEFLECTION_SOLVERS = ("root", "ode")
 
 
 class RunDynamics:
-    """Inverse dynamics and its balances at any time of a trajectory.
+    """Inverse dynamics and its balances at any time of the trajectories of a batch of variants.
+
+    Arguments `variant` are the index of the variant of each sample, (samples,).
 
     Args:
-        robot: Robot.
-        trajectory: Commanded motion.
+        variants: Robots; only a single one may have deflections that are integrated.
+        trajectories: Commanded motion of each.
         min_margin: Margin below which a sample is near-singular.
         deflections: Deflections to use instead of the root of (14); None for the root.
         internal: Internal motions of damped transmissions; None without one.
         engine: Backend; may be replaced once it is chosen for the kernel.
 
     Attributes:
+        frame: Frame of the wrench; None without a wrench.
         kernel: Kernel of the engine. Runs with equal kernels share compiled code.
     """
 
     def __init__(
         self,
-        robot: Robot,
-        trajectory: Trajectory,
+        variants: Variants,
+        trajectories: Sequence[Trajectory],
         *,
         min_margin: float = MIN_MARGIN,
         deflections: IntegratedDeflections | None = None,
         internal: InternalMotions | None = None,
         engine: Engine = NUMPY,
     ) -> None:
-        self.robot, self.trajectory, self.engine = robot, trajectory, engine
-        self.deflections, self.internal = deflections, internal
+        self.variants, self.trajectories, self.engine = variants, tuple(trajectories), engine
+        self.deflections, self.internal, self._min_margin = deflections, internal, min_margin
         inputs: list[IntegratedRows | InternalRows] = [] if deflections is None else [IntegratedRows()]
         if internal is not None:
             inputs.append(InternalRows(internal.joints))
-        frame = None if trajectory.wrench is None else trajectory.wrench.frame
-        self.kernel = BalancedDynamics(InverseDynamics(robot, frame, min_margin, tuple(inputs)))
+        wrench = self.trajectories[0].wrench
+        self.frame = None if wrench is None else wrench.frame
+        of_base = BalancedDynamics(InverseDynamics(variants.base, self.frame, min_margin, tuple(inputs)))
+        self.kernel = variants.kernel(of_base)
+
+    @property
+    def robot(self) -> Robot:
+        """The first robot, whose joints, limits and structure are those of all."""
+        return self.variants.robots[0]
+
+    def from_zero(self) -> RunDynamics:
+        """Return the dynamics with time zero at the first sample, where times are rounded least."""
+        moved = copy(self)
+        shifted = {id(each): each.from_zero() for each in self.trajectories}
+        moved.trajectories = tuple(shifted[id(each)] for each in self.trajectories)
+        return moved
+
+    def motion(self, start: int, stop: int) -> Motion:
+        """Return the motion at samples start..stop-1 of each variant, one variant after the other."""
+        motions = {id(each): each.block(start, stop) for each in self.trajectories}
+        return concatenate_motions([motions[id(each)] for each in self.trajectories])
 
     def compute(self, motion: Motion) -> Block:
-        """Return the variables of a part of the trajectory."""
-        time, rows = motion.time, dict[str, FloatArray]()
-        if self.deflections is not None:
-            rows["phi"] = self.deflections.at(time).reshape(-1, len(time))
-        if self.internal is not None:
-            rows |= internal_rows(self.internal.at(time - self.trajectory.start))
-        return block_of(self.kernel, motion, self.engine, rows)
+        """Return the variables of a motion of all variants, see `motion`."""
+        count = len(motion.time) // len(self.trajectories)
+        return self._compute(motion, np.repeat(np.arange(len(self.trajectories)), count))
 
-    def at(self, time: FloatArray) -> Block:
-        """Return the variables at any times of the trajectory."""
-        return self.compute(self.trajectory.at(time))
+    def at(self, time: FloatArray, variant: IndexArray | None = None) -> Block:
+        """Return the variables at any times, (samples,), of the trajectories; of the first one by default."""
+        variant = np.zeros(len(time), dtype=np.intp) if variant is None else variant
+        return self._compute(self._motion_at(time, variant), variant)
 
-    def blocks_at(self, time: FloatArray) -> Iterator[tuple[slice, Block]]:
+    def blocks_at(self, time: FloatArray, variant: IndexArray) -> Iterator[tuple[slice, Block]]:
         """Yield the variables at many times in blocks of the usual size, each with its part of the times."""
         size = usual_block(len(self.robot.joints))
         for start in range(0, len(time), size):
             part = slice(start, start + size)
-            yield part, self.at(time[part])
+            yield part, self.at(time[part], variant[part])
+
+    def _motion_at(self, time: FloatArray, variant: IndexArray) -> Motion:
+        """Return the motion at times; each distinct trajectory is evaluated once."""
+        numbers: dict[int, int] = {}
+        own = np.array([numbers.setdefault(id(each), len(numbers)) for each in self.trajectories])[variant]
+        if len(numbers) == 1:
+            return self.trajectories[0].at(time)
+        order = own.argsort(kind="stable")
+        distinct = list({id(each): each for each in self.trajectories}.values())
+        parts = [distinct[number].at(time[own == number]) for number in sorted(set(own.tolist()))]
+        back = order.argsort()
+        return concatenate_motions(parts).mapped(time, lambda array, _: array[back])
+
+    def _compute(self, motion: Motion, variant: IndexArray) -> Block:
+        time, rows = motion.time, dict[str, Iterable[FloatArray]](self.variants.inputs(variant))
+        if self.deflections is not None:
+            rows["phi"] = self.deflections.at(time).reshape(-1, len(time))
+        if self.internal is not None:
+            rows |= internal_rows(self.internal.at(time - self.trajectories[0].start))
+        return block_of(self.kernel, motion, self.engine, rows, BalancedBlock)
+
+
+def concatenate_motions(motions: Sequence[Motion]) -> Motion:
+    """Return motions with the same signals one after the other."""
+    if len(motions) == 1:
+        return motions[0]
+    time = np.concatenate([motion.time for motion in motions])
+    names = motions[0].of_joints
+    arrays = {name: np.concatenate([motion.of_joints[name] for motion in motions]) for name in names}
+    wrench, wrenches = None, [motion.wrench for motion in motions if motion.wrench is not None]
+    if wrenches:
+        parts = (np.concatenate([getattr(each, name) for each in wrenches]) for name in WRENCH_NAMES)
+        wrench = Wrench(*parts, frame=wrenches[0].frame)
+    return Motion.of(time, arrays, wrench)
 
 
 def choose_deflections(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -18,12 +18,11 @@ from vsacli.actuators.reach import margin
 from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.difference_errors import MIDDLE, NEIGHBORS, OFFSETS, DifferenceErrors
 from vsacli.analysis.run_dynamics import RunDynamics
-from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, evenly, of_joint
+from vsacli.base.arrays import AnyArray, BoolArray, FloatArray, IndexArray, evenly, of_joint
 from vsacli.base.flags import Flag, has_flag
 from vsacli.base.json_records import Stored, named
 from vsacli.base.signals import COMMANDED
 from vsacli.base.variables import VARIABLES, Block
-from vsacli.compute.engine import NUMPY, Engine
 from vsacli.dynamics.balances import (
     balance_errors,
     link_energy,
@@ -34,10 +33,6 @@ from vsacli.dynamics.balances import (
 from vsacli.dynamics.dampers import joints_with_parallel_damper
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from vsacli.dynamics.internal_motion import InternalMotions
 
 SPRING_BOUND = 1e-11
 """Bound on the scaled residual of (14); solutions have 1e-15, and 1e-12 is required of them."""
@@ -102,53 +97,75 @@ class SelfCheck(Stored):
 
 
 class RunCheck:
-    """Self-check of a run; `add` its blocks in order, then call `outcome`.
+    """Self-check of the runs of a batch; `add` its blocks in order, then call `outcomes`.
 
     The program of the run computes residuals at all samples, but would be wrong where the program is. So
     NumPy recomputes them from the variables at `PROBES` samples. Except for branches, loops and tables, a
     program has no path that depends on values; if one of these, or the whole program, is wrong, so is a
-    stretch of the run, and a stretch of more than a 199th of the samples is met.
+    stretch of the run, and a stretch of more than a 199th of the samples is met. The variants of a batch have
+    one program, and share these samples, as they share the times of `ladder`; each has at least `FEWEST`.
     """
 
     def __init__(self, dynamics: RunDynamics) -> None:
-        self._dynamics, self._joints = dynamics, dynamics.robot.joints
-        self._probed = evenly(dynamics.trajectory.samples, PROBES)
+        self._dynamics, self._variants = dynamics, len(dynamics.variants)
+        samples = dynamics.trajectories[0].samples
+        probed = evenly(samples, max(FEWEST, PROBES // self._variants))
+        self._probed = (np.arange(self._variants)[:, None] * samples + probed).ravel()
+        self._of_probed = np.repeat(np.arange(self._variants), len(probed))
         self._excerpts: list[dict[str, AnyArray]] = []
         self._samples = 0
-        self._error, self._shaft_error = 0.0, 0.0
-        self._damped_error, self._damped_size = np.zeros((2, len(joints_with_parallel_damper(self._joints))))
+        self._error, self._shaft_error = np.zeros((2, self._variants))
+        damped = len(joints_with_parallel_damper(dynamics.robot.joints))
+        self._damped_error, self._damped_size = np.zeros((2, self._variants, damped))
 
     def add(self, block: Block) -> None:
-        """Merge a block of `BalancedDynamics`."""
+        """Merge a block of `BalancedDynamics`, with the samples of one variant after the other."""
         first, last = np.searchsorted(self._probed, (self._samples, self._samples + len(block.time)))
         probed = self._probed[first:last] - self._samples
         self._excerpts.append(
             {name: array[probed] for name, array in block.arrays().items() if name in JointVariables._fields}
         )
         self._samples += len(block.time)
-        self._error = np.maximum(self._error, block.spring_error.max())
-        self._shaft_error = np.maximum(self._shaft_error, block.shaft_error.max())
-        self._damped_error = np.maximum(self._damped_error, block.damped_error.max(axis=0))
-        self._damped_size = np.maximum(self._damped_size, block.damped_size.max(axis=0))
+        by_variant = self._variants, len(block.time) // self._variants
+        self._error, self._shaft_error, self._damped_error, self._damped_size = (
+            np.maximum(largest, values.reshape(*by_variant, *values.shape[1:]).max(axis=1))
+            for largest, values in (
+                (self._error, block.spring_error),
+                (self._shaft_error, block.shaft_error),
+                (self._damped_error, block.damped_error),
+                (self._damped_size, block.damped_size),
+            )
+        )
 
-    def outcome(self) -> SelfCheck:
-        """Return the self-check of the blocks so far; integrated deflections drift off (14)."""
-        run = self._dynamics
-        error, error_bound = ladder(run.robot, run.trajectory, run.engine, run.internal)
-        springs, shafts = self._residuals()
-        bound = SPRING_BOUND if run.deflections is None else DRIFT_BOUND
-        return SelfCheck(springs, error, bound, error_bound, shafts)
+    def outcomes(self) -> list[SelfCheck]:
+        """Return the self-check of each run so far; integrated deflections drift off (14)."""
+        bound = SPRING_BOUND if self._dynamics.deflections is None else DRIFT_BOUND
+        errors, error_bounds = ladder(self._dynamics)
+        columns = *self._residuals(), errors, error_bounds
+        return [
+            SelfCheck(springs, error, bound, error_bound, shafts)
+            for springs, shafts, error, error_bound in zip(*(each.tolist() for each in columns), strict=True)
+        ]
 
-    def _residuals(self) -> tuple[float, float]:
-        """Return the largest scaled residual of springs and of shafts; NaN if a value is missing."""
+    def _residuals(self) -> tuple[FloatArray, FloatArray]:
+        """Return the largest scaled residuals of springs and shafts, (variants,); NaN where one is missing."""
         probed = {name: np.concatenate([part[name] for part in self._excerpts]) for name in self._excerpts[0]}
-        of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(self._joints))]
-        recomputed = balance_errors(self._joints, of_joints)
-        error = np.max(recomputed["spring_error"], initial=self._error)
-        damped_error = np.max([self._damped_error, *np.transpose(recomputed["damped_error"])], axis=0)
-        size = np.maximum(self._damped_size, np.finfo(float).tiny)
-        springs = float(np.max(damped_error / size, initial=error))
-        return springs, float(np.max(recomputed["shaft_error"], initial=self._shaft_error))
+        variant = self._of_probed[: len(probed["q"])]
+        joints = self._dynamics.variants.robot_over(variant).joints
+        of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(joints))]
+        recomputed = balance_errors(joints, of_joints)
+        springs, shafts, damped_error = (
+            self._error.copy(),
+            self._shaft_error.copy(),
+            self._damped_error.copy(),
+        )
+        np.maximum.at(springs, variant, recomputed["spring_error"][0])
+        np.maximum.at(shafts, variant, recomputed["shaft_error"][0])
+        np.maximum.at(
+            damped_error, variant, np.transpose(recomputed["damped_error"]).reshape(len(variant), -1)
+        )
+        damped = damped_error / np.maximum(self._damped_size, np.finfo(float).tiny)
+        return np.maximum(springs, damped.max(axis=1, initial=0.0)), shafts
 
 
 class Rung(NamedTuple):
@@ -173,7 +190,11 @@ RUNGS = (
 stiffness where it is not commanded."""
 
 PROBES = 200
-"""Approximate number of times of the derivative check, and of samples at which `RunCheck` recomputes."""
+"""Approximate number of times of the derivative check, and of samples at which `RunCheck` recomputes; for all
+variants of a batch together."""
+
+FEWEST = 2 * NEIGHBORS + 1
+"""Smallest number of these times and samples of a variant: so many estimate the noise."""
 
 JOINTS_AT_ALL_TIMES = 80
 """Number of joints up to which derivatives are checked at `PROBES` times, longer chains at fewer, in inverse
@@ -190,88 +211,106 @@ FIRST_SCALES = STEP_SCALES[:2]
 """Scales tried first: for most motions the smaller ones only add rounding."""
 
 
-def ladder(
-    robot: Robot,
-    trajectory: Trajectory,
-    engine: Engine = NUMPY,
-    internal: InternalMotions | None = None,
-) -> tuple[float, float]:
+def ladder(run: RunDynamics) -> tuple[FloatArray, FloatArray]:
     """Return the largest error of a derivative of `RUNGS` or of a power, relative to its peak, and its bound.
 
     Differences are taken at about 200 times, for long chains at fewer, with individual steps, over which the
-    trajectory is analytic.
-    Motor motion is compared where it is smooth over the difference. The error returned is the one nearest to,
-    or farthest beyond, its bound. Engine and internal motions of damped transmissions are those of the run.
+    trajectories are analytic. Motor motion is compared where it is smooth over the difference. The error of a
+    variant is the one nearest to, or farthest beyond, its bound.
+
+    Args:
+        run: Dynamics of the runs of a batch.
+
+    Returns:
+        Errors and bounds, (variants,) each.
     """
-    trajectory = trajectory.from_zero()
-    times, reach = trajectory.check_points(_number_of_times(len(robot.joints)))
-    steps = np.minimum(reach / 3, trajectory.duration / 500)
-    # Its kernel equals that of the run, so that compiled code is shared.
-    dynamics = RunDynamics(robot, trajectory, internal=internal, engine=engine)
-    errors, bounds, everywhere = _derivative_errors(dynamics, times, FIRST_SCALES[:, None] * steps)
-    if not (everywhere and errors.max() <= CLEAR):
-        errors, bounds, _ = _derivative_errors(dynamics, times, STEP_SCALES[:, None] * steps)
-    rounding = ROUNDING_GAIN * np.finfo(float).eps * trajectory.duration / (FIRST_SCALES[-1] * steps)
-    bounds = np.maximum(bounds, np.maximum(LADDER_BOUND, rounding))
-    worst = np.unravel_index(np.argmax(errors / bounds), errors.shape)
-    return float(errors[worst]), float(bounds[worst])
+    dynamics = run.from_zero()
+    count = _number_of_times(len(run.robot.joints), len(run.variants))
+    points = {id(each): each.check_points(count) for each in dynamics.trajectories}
+    times, reach = np.stack([points[id(each)] for each in dynamics.trajectories], axis=-1)
+    duration = np.array([each.duration for each in dynamics.trajectories])
+    steps = np.minimum(reach / 3, duration / 500)
+    every = np.arange(len(duration))
+    errors, bounds, everywhere = _derivative_errors(
+        dynamics, every, times, FIRST_SCALES[:, None, None] * steps
+    )
+    again = np.flatnonzero(~(everywhere & (errors.max(axis=(0, 1)) <= CLEAR)))
+    if again.size:
+        at_all_scales = STEP_SCALES[:, None, None] * steps[:, again]
+        errors[..., again], bounds[..., again], _ = _derivative_errors(
+            dynamics, again, times[:, again], at_all_scales
+        )
+    rounding = ROUNDING_GAIN * np.finfo(float).eps * duration / (FIRST_SCALES[-1] * steps)
+    bounds = np.maximum(bounds, np.maximum(LADDER_BOUND, rounding)).reshape(-1, len(every))
+    errors = errors.reshape(bounds.shape)
+    worst = np.argmax(errors / bounds, axis=0)
+    return errors[worst, every], bounds[worst, every]
 
 
-def _number_of_times(joints: int) -> int:
-    """Return the number of times to check, at least as many as estimate the noise."""
-    return max(2 * NEIGHBORS + 1, PROBES * JOINTS_AT_ALL_TIMES // max(joints, JOINTS_AT_ALL_TIMES))
+def _number_of_times(joints: int, variants: int) -> int:
+    """Return the number of times to check for each variant."""
+    return max(FEWEST, PROBES * JOINTS_AT_ALL_TIMES // max(joints, JOINTS_AT_ALL_TIMES) // variants)
 
 
 def _derivative_errors(
-    dynamics: RunDynamics, times: FloatArray, steps: FloatArray
-) -> tuple[FloatArray, FloatArray, bool]:
-    """Return errors (derivatives, times) at the best scale, bounds by noise, and whether all was compared.
+    dynamics: RunDynamics, variants: IndexArray, times: FloatArray, steps: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Return errors (derivatives, times, variants) at the best scale, bounds by noise, and what was compared.
 
     Times are computed together up to the size of a block, which bounds the memory as in a run.
 
     Args:
-        dynamics: Inverse dynamics along a trajectory that starts at zero.
-        times: Times to check, (times,), s.
-        steps: Difference steps, (scales, times), s.
+        dynamics: Inverse dynamics along trajectories that start at zero.
+        variants: Indices of the variants to check, (variants,).
+        times: Times to check, (times, variants), s.
+        steps: Difference steps, (scales, times, variants), s.
+
+    Returns:
+        Whether motor motion was compared at all times is (variants,).
     """
-    robot, duration, everywhere = dynamics.robot, dynamics.trajectory.duration, True
+    joints = len(dynamics.robot.joints)
+    durations = np.array([dynamics.trajectories[variant].duration for variant in variants])
+    everywhere = np.ones(len(variants), dtype=bool)
     differences = [DifferenceErrors(steps, LADDER_BOUND, NOISE_GAIN) for _ in (*RUNGS, "energy")]
-    together = max(1, usual_block(len(robot.joints)) // (len(steps) * len(OFFSETS)))
+    together = max(1, usual_block(joints) // (len(steps) * len(OFFSETS) * len(variants)))
     for start in range(0, len(times), together):
         part = slice(start, start + together)
-        grid = times[part] + steps[:, None, part] * OFFSETS[:, None]
-        block = dynamics.at(grid.ravel())
+        grid = times[part] + steps[:, None, part] * OFFSETS[:, None, None]
+        variant = np.broadcast_to(variants, grid.shape).ravel()
+        block = dynamics.at(grid.ravel(), variant)
+        robot = dynamics.variants.robot_over(variant)
         smooth = _motors_move_smoothly(block, grid.shape)
-        everywhere = everywhere and bool(smooth.any(axis=0).all())
+        everywhere &= smooth.any(axis=0).all(axis=(0, 2))
         for rung, of_rung in zip(RUNGS, differences, strict=False):
             value, derivative, whole = (
-                _variable_on_grid(robot, block, name, grid.shape)
+                _variable_on_grid(dynamics.robot, block, name, grid.shape)
                 for name in (rung.value, rung.derivative, rung.whole)
             )
             compared = np.ones_like(smooth) if rung.value.endswith("tau_e") else smooth
-            slowest = np.abs(whole[0, MIDDLE]) / duration**rung.order
+            slowest = np.abs(whole[0, MIDDLE]) / durations[:, None, None] ** rung.order
             of_rung.add(value, derivative, compared, np.maximum(np.abs(derivative[0, MIDDLE]), slowest))
         energy, power, size, grain = (
-            each.reshape(*grid.shape, -1, 1) for each in _energy_balances(dynamics, block)
+            each.reshape(*grid.shape, -1, 1) for each in _energy_balances(dynamics, robot, block)
         )
         compared = np.concatenate((smooth, np.ones_like(smooth[..., :1])), axis=-1)
-        slowest = np.abs(energy[0, MIDDLE]) / duration
+        slowest = np.abs(energy[0, MIDDLE]) / durations[:, None, None]
         differences[-1].add(energy, power, compared, np.maximum(size[0, MIDDLE], slowest), grain[:, MIDDLE])
     relative = [each.relative() for each in differences]
     return np.stack([error for error, _ in relative]), np.stack([bound for _, bound in relative]), everywhere
 
 
-def _energy_balances(dynamics: RunDynamics, block: Block) -> Iterator[FloatArray]:
+def _energy_balances(dynamics: RunDynamics, robot: Robot, block: Block) -> Iterator[FloatArray]:
     """Return energy, the power that changes it, the size of its terms, and the grain; (samples, joints + 1).
+
+    The robot has the numbers of the variant of each sample.
 
     The columns are rotors and springs of each joint, then all links together. The grain is the rounding of
     elastic energies that a formula computes as a difference of terms of the size of stiffness times a radian
     squared, such as K (1 - cos(2 phi)): the result changes by jumps, between which it shows no noise.
     """
-    robot, frame = dynamics.robot, dynamics.kernel.dynamics.frame
     of_joints = [JointVariables.of(block.of_joint(index)) for index in range(len(robot.joints))]
     pairs = list(zip(robot.joints, of_joints, strict=True))
-    powers = [shaft_powers(*pair) for pair in pairs] + [link_powers(robot, block, frame)]
+    powers = [shaft_powers(*pair) for pair in pairs] + [link_powers(robot, block, dynamics.frame)]
     yield np.stack([*(shaft_energy(*pair) for pair in pairs), link_energy(robot, block)], axis=-1)
     yield np.stack([np.sum(terms, axis=0) for terms in powers], axis=-1)
     yield np.stack([np.sum(np.abs(terms), axis=0) for terms in powers], axis=-1)
@@ -281,7 +320,7 @@ def _energy_balances(dynamics: RunDynamics, block: Block) -> Iterator[FloatArray
 
 
 def _variable_on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> FloatArray:
-    """Return a variable of a block of the shape (scales, offsets, times), (*shape, joints, motors or 1)."""
+    """Return a variable of a block on a grid of times and variants, (*shape, joints, motors or 1)."""
     values: FloatArray = getattr(block, name).reshape(*shape, len(robot.joints), -1)
     return np.where([_computed_columns(joint.actuator, name) for joint in robot.joints], values, 0.0)
 
@@ -293,7 +332,7 @@ def _computed_columns(actuator: Actuator, name: str) -> list[bool]:
 
 
 def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
-    """Return which differences, (scales, times, joints), are smooth in a block (scales, offsets, times).
+    """Return which differences, (scales, times, variants, joints), are smooth in a block on a grid.
 
     No sample is infeasible, singular or near-singular, and the margin changes by less than a tenth: motor
     motion has features as short as the distance to the end of the attainable range.

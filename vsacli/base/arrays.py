@@ -7,7 +7,7 @@ samples of one joint.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,6 +43,17 @@ def contiguous_rows(array: FloatArray) -> list[FloatArray]:
     """Return the rows (samples,) of an array over time, contiguous; copy only where they are not."""
     rows = np.moveaxis(array, 0, -1).reshape(-1, len(array))
     return list(map(np.ascontiguousarray, rows))
+
+
+def stack_constants(constants: Sequence[Any]) -> AnyArray:
+    """Return constants along a first axis that broadcast with samples along a second.
+
+    The shape is (constants, 1), or (constants, samples) if a constant is a row with a value for each sample.
+    """
+    if any(isinstance(constant, np.ndarray) and constant.ndim for constant in constants):
+        return np.stack(np.broadcast_arrays(*constants))
+    stacked: AnyArray = np.stack(constants)[:, None]
+    return stacked
 
 
 def checked_shape(name: str, array: ArrayLike, *shape: int) -> FloatArray:

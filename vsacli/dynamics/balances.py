@@ -20,15 +20,15 @@ from vsacli.actuators.friction import REST, Friction
 from vsacli.actuators.motor import JointMotor
 from vsacli.actuators.transmission import JointVariables
 from vsacli.base import units
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray, stack_constants
 from vsacli.base.flags import Flag, has_flag
 from vsacli.base.variables import VARIABLES, Block, Variable
 from vsacli.base.wrench import WRENCH_AXES, WrenchFrame, frames_by_tool
-from vsacli.compute.rows import RowLayout
+from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
 from vsacli.dynamics.dampers import joints_with_parallel_damper, parallel_damper_torques
 from vsacli.dynamics.elastic_torques import carriers, link_constants
-from vsacli.dynamics.inverse import BlockKernel, InverseDynamics, call_at_joints, rows_of_joints
+from vsacli.dynamics.inverse import InverseDynamics, call_at_joints, rows_of_joints
 from vsacli.dynamics.recursion_inputs import Seat
 from vsacli.robot.joint import Joint, Tool
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
@@ -219,7 +219,7 @@ class BalancedBlock(Block):
 
 
 @dataclass(frozen=True)
-class BalancedDynamics(BlockKernel):
+class BalancedDynamics(RowKernel):
     """Kernel of a run: inverse dynamics with `BALANCES` at each sample.
 
     As part of one program the balances take hardly any time.
@@ -228,9 +228,11 @@ class BalancedDynamics(BlockKernel):
         dynamics: Inverse dynamics that are balanced.
     """
 
-    block = BalancedBlock
-
     dynamics: InverseDynamics
+
+    def of_robot(self, robot: Robot) -> BalancedDynamics:
+        """Return the kernel of another robot."""
+        return BalancedDynamics(self.dynamics.of_robot(robot))
 
     @property
     def arguments(self) -> RowLayout:
@@ -319,7 +321,7 @@ def passed_power(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, Fl
     """
     dtheta, ddtheta = of_joint.dtheta, of_joint.ddtheta
     dampings = [motor.damping for motor in joint.actuator.motors]
-    motor_damping = np.array([*dampings, *[np.nan] * (SIDES - len(dampings))])[:, None]
+    motor_damping = stack_constants([*dampings, *[np.nan] * (SIDES - len(dampings))])
     torque = motor_damping * dtheta + of_joint.tau_transmission
     rate = motor_damping * ddtheta
     none = np.full_like(of_joint.q, np.nan)

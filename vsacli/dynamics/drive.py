@@ -15,7 +15,7 @@ from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import ELECTRICAL, Windings
 from vsacli.actuators.reach import OfJoint
 from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray, stack_constants
 from vsacli.base.flags import MIN_MARGIN, Flag, finite, has_flag, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
@@ -86,10 +86,8 @@ def driven_by(
     tau_damper, on_motors = _damper_torques(joint, command, transmitted.dphi)
     if on_motors is not None:
         tau_motor = tau_motor + on_motors
-    windings = Windings.of(actuator.sides)
-    electrical = (
-        {} if windings is None else windings.with_axis_behind().variables(tau_motor, transmitted.dtheta)
-    )
+    windings = Windings.over_samples(actuator.sides)
+    electrical = {} if windings is None else windings.variables(tau_motor, transmitted.dtheta)
     driven = transmitted._replace(
         tau_motor=tau_motor, motor_power=tau_motor * transmitted.dtheta, **electrical
     )
@@ -105,9 +103,9 @@ def shaft_torques(
     """
     motor_damping = _by_motor([motor.damping for motor in actuator.motors])
     torques = _rotor_torques(actuator, ddtheta) + motor_damping * dtheta + tau_transmission  # (73)-(74)
-    friction = FrictionLaws.of([side.friction if side else None for side in actuator.sides])
+    friction = FrictionLaws.over_samples([side.friction if side else None for side in actuator.sides])
     if friction is not None:
-        torques = torques + friction.with_axis_behind().torque(dtheta)
+        torques = torques + friction.torque(dtheta)
     return torques
 
 
@@ -152,4 +150,4 @@ def _motors_not_finite(joint: Joint, arrays: OfJoint) -> BoolArray:
 
 
 def _by_motor(values: list[float]) -> FloatArray:
-    return np.stack([*values, *[math.nan] * (SIDES - len(values))])[:, None]
+    return stack_constants([*values, *[math.nan] * (SIDES - len(values))])

@@ -22,6 +22,7 @@ from vsacli.compute.control_flow import call
 from vsacli.compute.engine import Engine
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.dynamics.losses import LossMeter, LostEnergy, integral, positive_work, work_on_each_other
+from vsacli.dynamics.variants import Variants
 from vsacli.robot.model import Robot
 
 
@@ -114,7 +115,8 @@ def efforts(interval: FloatArray, before: Iterable[FloatArray], after: Iterable[
 class EnergyMeter:
     """Sum of energy over a run: `add` flows, `add_stored` elastic energy, then `report`.
 
-    Terms are added interval by interval, so that rounding does not depend on the division into blocks.
+    Terms are added interval by interval, so that rounding does not depend on the division into blocks. All
+    arrays of a batch of runs have an axis of variants before that of the intervals.
     """
 
     def __init__(self) -> None:
@@ -127,7 +129,7 @@ class EnergyMeter:
         """Add a flow; return the work up to the end of each interval, which overwrites `flow.work`."""
         totals = {name: part for name, part in flow._asdict().items() if name != "work" and part is not None}
         self._layout = RowLayout({name: part.shape[:-1] for name, part in totals.items()})
-        rows = np.concatenate([part.reshape(-1, len(flow.intervals)) for part in totals.values()])
+        rows = np.concatenate([part.reshape(-1, part.shape[-1]) for part in totals.values()])
         columns = np.ascontiguousarray(rows.T)  # so that NumPy adds one interval after the other
         columns[0] += self._totals
         self._totals = np.add.reduce(columns, axis=0)
@@ -138,21 +140,28 @@ class EnergyMeter:
         return work
 
     def add_stored(self, elastic_energy: FloatArray) -> None:
-        """Add the elastic energy at samples, (joints, samples), J, to the peak."""
+        """Add the elastic energy at samples, (joints[, variants], samples), J, to the peak."""
         self._peak = np.fmax(self._peak, np.fmax.reduce(elastic_energy, axis=-1))
 
-    def report(self, robot: Robot) -> list[JointEnergy]:
-        """Return the energy of each joint of a robot; at least one flow must have been added."""
+    def report(self, robot: Robot, variant: int | None = None) -> list[JointEnergy]:
+        """Return the energy of each joint of a robot; at least one flow must have been added.
+
+        Args:
+            robot: Robot.
+            variant: Its index in a batch; None without an axis of variants.
+        """
+        own = ... if variant is None else (..., variant)
         has_motor = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
-        totals = self._layout.arrays(np.asarray(self._totals))
-        work, spent = (np.sum(total, axis=1, where=has_motor) for total in (self._work, totals["spent"]))
+        totals = {name: total[own] for name, total in self._layout.arrays(np.asarray(self._totals)).items()}
+        works = np.asarray(self._work)[own], totals["spent"]
+        work, spent = (np.sum(total, axis=1, where=has_motor) for total in works)
         duration = float(totals["intervals"])
         shared = [joint.actuator.co_contracts for joint in robot.joints]
         efforts = [
             np.where(shared, _mean_root(totals[name], duration), np.nan)
             for name in ("co_contraction", "load")
         ]
-        energies = np.array((self._peak, spent, spent - work, *efforts))
+        energies = np.array((np.asarray(self._peak)[own], spent, spent - work, *efforts))
         lost = zip(_dissipated_energies(robot, totals), _copper_losses(robot, totals), strict=True)
         return [
             replace(JointEnergy(*each), dissipated=dissipated, copper_loss=copper_loss)
@@ -189,31 +198,34 @@ class IntervalEnergy(RowKernel):
     dry friction, and the work by the acceleration of the other motor through B_12.
 
     Attributes:
-        inertia: Inertias of the motors of each joint.
-        coupling: Inertia B_12 of each joint.
+        robot: Robot.
         rubbing: Whether the work of dry friction is an input.
     """
 
-    inertia: tuple[tuple[float, ...], ...]
-    coupling: tuple[float, ...]
+    robot: Robot
     rubbing: bool
 
-    @property
+    def of_robot(self, robot: Robot) -> IntervalEnergy:
+        """Return the kernel of another robot."""
+        return IntervalEnergy(robot, self.rubbing)
+
+    @cached_property
     def at_steps(self) -> tuple[str, ...]:
         """Names of the input variables at both ends of an interval."""
-        return (*AT_STEPS, "ddtheta") if any(self.coupling) else AT_STEPS
+        coupled = any(joint.actuator.coupled_rotors for joint in self.robot.joints)
+        return (*AT_STEPS, "ddtheta") if coupled else AT_STEPS
 
     @cached_property
     def arguments(self) -> RowLayout:
         """Layout of the input rows: length, variables before and after, and the work of dry friction."""
-        motors = (len(self.inertia), SIDES)
+        motors = (len(self.robot.joints), SIDES)
         friction = {"friction": motors} if self.rubbing else {}
         return RowLayout({"interval": (), **dict.fromkeys(self.at_steps, (2, *motors)), **friction})
 
     @cached_property
     def results(self) -> RowLayout:
         """Layout of the output rows, as in `Flow`."""
-        joints = (len(self.inertia),)
+        joints = (len(self.robot.joints),)
         motors = dict.fromkeys(("work", "spent"), (*joints, SIDES))
         return RowLayout({**motors, **dict.fromkeys(("load", "co_contraction"), joints)})
 
@@ -221,12 +233,15 @@ class IntervalEnergy(RowKernel):
         """Compute the energy joint by joint."""
         inputs = self.arguments.unpack(rows)
         (interval,) = inputs["interval"]
-        friction = _motor_pairs(inputs["friction"]) if self.rubbing else [None] * len(self.inertia)
+        joints = self.robot.joints
+        friction = _motor_pairs(inputs["friction"]) if self.rubbing else [None] * len(joints)
         both_ends = [{name: _rows_at_end(inputs[name], end) for name in self.at_steps} for end in range(2)]
         flows = []
-        for joint, constants in enumerate(zip(self.inertia, self.coupling, strict=True)):
-            ends = [{name: of_joints[joint] for name, of_joints in end.items()} for end in both_ends]
-            flows.append(call(interval, _joint_flow, *constants, interval, ends, friction[joint]))
+        for index, joint in enumerate(joints):
+            inertia = tuple(motor.inertia for motor in joint.actuator.motors)
+            ends = [{name: of_joints[index] for name, of_joints in end.items()} for end in both_ends]
+            constants = inertia, joint.actuator.coupled_rotors
+            flows.append(call(interval, _joint_flow, *constants, interval, ends, friction[index]))
         works, spent, of_springs = zip(*flows, strict=True)
         kinds = works, spent, zip(*of_springs, strict=True)
         return [row for kind in kinds for part in kind for row in part]
@@ -266,61 +281,91 @@ def _rows_at_end(rows: Sequence[Any], end: int) -> list[Sequence[Any]]:
 
 
 class RunEnergy:
-    """Energy of a run of the inverse dynamics; `add` its blocks in order, then call `report`.
+    """Energy of the runs of a batch; `add` its blocks in order, then call `report`.
 
     Args:
-        robot: Robot.
+        variants: Robots.
         engine: Backend.
     """
 
-    def __init__(self, robot: Robot, engine: Engine) -> None:
-        self._robot, self._engine = robot, engine
-        actuators = [joint.actuator for joint in robot.joints]
+    def __init__(self, variants: Variants, engine: Engine) -> None:
+        self._variants, self._engine = variants, engine
+        robot = variants.base
         lossy = any(robot.has_variable(VARIABLES[name]) for name in ("dissipated_power", "copper_loss"))
-        self._losses = LossMeter(robot) if lossy else None
-        self._kernel = IntervalEnergy(
-            tuple(tuple(motor.inertia for motor in actuator.motors) for actuator in actuators),
-            tuple(actuator.coupled_rotors for actuator in actuators),
-            rubbing=lossy,
-        )
+        self._losses = [LossMeter(each) for each in variants.robots] if lossy else []
+        of_base = IntervalEnergy(robot, rubbing=lossy)
+        self._at_steps, self._kernel = of_base.at_steps, variants.kernel(of_base)
         self._meter = EnergyMeter()
         self._last: dict[str, list[FloatArray]] = {}
 
     def add(self, block: Block) -> FloatArray:
-        """Add a block of `BalancedDynamics`; return `motor_energy` at its samples, (samples, joints, 2)."""
-        steps = {name: contiguous_rows(getattr(block, name)) for name in ("time", *self._kernel.at_steps)}
-        lost = None if self._losses is None else self._losses.add(block)
+        """Add a block of `BalancedDynamics`; return `motor_energy` at its samples, (samples, joints, 2).
+
+        The block has the samples of one variant after the other.
+        """
+        by_variant = len(self._variants), -1
+        steps = {
+            name: [row.reshape(by_variant) for row in contiguous_rows(getattr(block, name))]
+            for name in ("time", *self._at_steps)
+        }
+        lost = self._add_losses(block)
         first = _select_samples(steps, slice(1))
         before = self._last or first
         # Copies, since views would keep the whole block in memory.
-        self._last = {name: [row[-1:].copy() for row in rows] for name, rows in steps.items()}
-        self._meter.add_stored(np.moveaxis(block.elastic_energy, 0, -1))
+        self._last = {name: [row[:, -1:].copy() for row in rows] for name, rows in steps.items()}
+        self._meter.add_stored(_by_variant(np.moveaxis(block.elastic_energy, 0, -1), len(self._variants)))
         works = [self._add_flow(before, first, lost and lost.during(slice(1)))]
-        if len(block.time) > 1:
+        if steps["time"][0].shape[1] > 1:
             earlier, later = _select_samples(steps, slice(-1)), _select_samples(steps, slice(1, None))
             works.append(self._add_flow(earlier, later, lost and lost.during(slice(1, None))))
-        return over_time(np.concatenate(works, axis=-1))
+        work = np.concatenate(works, axis=-1)
+        return over_time(work.reshape(*work.shape[:-2], -1))
+
+    def _add_losses(self, block: Block) -> LostEnergy | None:
+        """Return the losses in the intervals of all variants, (..., variants, intervals)."""
+        if not self._losses:
+            return None
+        count = len(block.time) // len(self._losses)
+        parts = (slice(number * count, (number + 1) * count) for number in range(len(self._losses)))
+        lost = [meter.add(block.taken(part)) for meter, part in zip(self._losses, parts, strict=True)]
+        return LostEnergy(
+            *(None if each[0] is None else np.stack(each, axis=-2) for each in zip(*lost, strict=True))
+        )
 
     def _add_flow(self, before: _Steps, after: _Steps, lost: LostEnergy | None) -> FloatArray:
         """Add the flow from samples to the next ones; return the work of motors until these."""
         interval = after["time"][0] - before["time"][0]
-        rows = {name: [*before[name], *after[name]] for name in self._kernel.at_steps}
+        rows = {name: _flat_rows([*before[name], *after[name]]) for name in self._at_steps}
         if lost is not None:
-            rows["friction"] = contiguous_rows(over_time(lost.motor_friction))
-        inputs = self._kernel.arguments.pack({"interval": [interval], **rows})
-        flow = Flow(interval, **self._kernel.results.arrays(self._engine.run(self._kernel, inputs)))
+            rows["friction"] = _flat_rows(lost.motor_friction.reshape(-1, *interval.shape))
+        variant = np.repeat(np.arange(len(interval)), interval.shape[1])
+        rows |= {"interval": _flat_rows([interval]), **self._variants.inputs(variant)}
+        results = self._kernel.results.arrays(
+            self._engine.run(self._kernel, self._kernel.arguments.pack(rows))
+        )
+        flow = Flow(interval, **{name: _by_variant(rows, len(interval)) for name, rows in results.items()})
         if lost is not None:
             flow = flow._replace(dissipated=lost.dissipated, copper=lost.copper)
         return self._meter.add(flow)
 
-    def report(self) -> list[JointEnergy]:
-        """Return the energy of each joint; at least one block must have been added."""
-        return self._meter.report(self._robot)
+    def report(self, variant: int = 0) -> list[JointEnergy]:
+        """Return the energy of each joint of a variant; at least one block must have been added."""
+        return self._meter.report(self._variants.robots[variant], variant)
 
 
 _Steps = Mapping[str, Sequence[FloatArray]]
-"""Rows (samples,) of variables at consecutive samples, by name."""
+"""Rows (variants, samples) of variables at consecutive samples, by name."""
 
 
 def _select_samples(steps: _Steps, part: slice) -> dict[str, list[FloatArray]]:
-    return {name: [row[part] for row in rows] for name, rows in steps.items()}
+    return {name: [row[:, part] for row in rows] for name, rows in steps.items()}
+
+
+def _flat_rows(rows: Iterable[FloatArray]) -> Sequence[FloatArray]:
+    """Return rows (variants, intervals) as contiguous rows of one variant after the other."""
+    return [np.ascontiguousarray(row).reshape(-1) for row in rows]
+
+
+def _by_variant(values: FloatArray, variants: int) -> FloatArray:
+    """Return values (..., samples) of one variant after the other as (..., variants, samples)."""
+    return values.reshape(*values.shape[:-1], variants, -1)

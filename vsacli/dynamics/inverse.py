@@ -7,11 +7,11 @@ rows, and the results into a `Block`. Before that, `adapt_trajectory` checks a t
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from itertools import repeat
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -61,18 +61,8 @@ class DeflectionStop(Stored):
     reason: str
 
 
-class BlockKernel(RowKernel):
-    """A kernel whose inputs are commands of a robot, and whose results are variables of a block.
-
-    Attributes:
-        block: Class of the blocks that hold the results.
-    """
-
-    block: ClassVar[type[Block]] = Block
-
-
 @dataclass(frozen=True)
-class InverseDynamics(BlockKernel):
+class InverseDynamics(RowKernel):
     """Inverse dynamics (36)-(74) over rows of samples, for an engine.
 
     Inputs are those of `LinkTorques`, the commanded signals of the joints with their derivatives, and
@@ -90,6 +80,10 @@ class InverseDynamics(BlockKernel):
     frame: WrenchFrame | None = None
     min_margin: float = MIN_MARGIN
     prescribed: tuple[IntegratedRows | InternalRows, ...] = ()
+
+    def of_robot(self, robot: Robot) -> InverseDynamics:
+        """Return the kernel of another robot."""
+        return replace(self, robot=robot)
 
     @cached_property
     def links(self) -> LinkTorques:
@@ -280,26 +274,28 @@ def _check_motion(robot: Robot, motion: Motion) -> None:
 
 
 def block_of(
-    kernel: BlockKernel,
+    kernel: RowKernel,
     motion: Motion,
     engine: Engine = NUMPY,
-    deflections: Mapping[str, FloatArray] = MappingProxyType({}),
+    further: Mapping[str, Iterable[FloatArray]] = MappingProxyType({}),
+    block: type[Block] = Block,
 ) -> Block:
     """Return the variables that a kernel computes for a block of samples.
 
     Args:
-        kernel: Kernel to run; it names the class of the block.
+        kernel: Kernel to run; its inputs are commands of a robot, its results variables of a block.
         motion: Commanded motion, as for `compute_block`.
         engine: Backend.
-        deflections: Rows of the deflections that are inputs of the kernel, (rows, samples), by name.
+        further: Rows of further inputs of the kernel, each (samples,), by name.
+        block: Class of the block.
     """
     inputs = kernel.arguments.shapes
     commanded = {name: array for name, array in motion.variables().items() if name in inputs}
     rows = {name: by_joint(array) for name, array in commanded.items()}
-    results = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack({**rows, **deflections})))
+    results = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack({**rows, **further})))
     computed: dict[str, AnyArray] = {name: over_time(array) for name, array in results.items()}
     computed["flags"] = computed["flags"].astype(FLAG_TYPE)
-    return kernel.block(time=motion.time, **{**commanded, **computed})
+    return block(time=motion.time, **{**commanded, **computed})
 
 
 def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMotion]:

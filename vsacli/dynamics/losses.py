@@ -112,18 +112,20 @@ def dissipated_power(joint: Joint, motion: JointVariables) -> FloatArray:
         joint: Joint with its actuator.
         motion: Velocities `dq` and `dtheta`, and for a joint with a damper `damping` and `dphi`.
     """
-    power: FloatArray = _lost_power(joint.damping, FrictionLaws.of([joint.friction]), motion.dq)
+    power: FloatArray = _lost_power(joint.damping, FrictionLaws.over_samples([joint.friction]), motion.dq)
     for velocity in damper_velocities(joint, motion.dq, motion.dphi) if joint.damper else ():
         power = power + motion.damping * velocity * velocity
     for index, motor in enumerate(joint.actuator.motors):
-        power = power + _lost_power(motor.damping, FrictionLaws.of([motor.friction]), motion.dtheta[index])
+        power = power + _lost_power(
+            motor.damping, FrictionLaws.over_samples([motor.friction]), motion.dtheta[index]
+        )
     return power
 
 
 def _lost_power(damping: float, friction: FrictionLaws | None, velocity: FloatArray) -> FloatArray:
     torque = damping * velocity
     if friction is not None:
-        torque = torque + friction.torque(velocity)
+        torque = torque + friction.torque(velocity)[0]
     power: FloatArray = torque * velocity
     return power
 
@@ -154,8 +156,7 @@ class LossMeter:
         sides = [side for joint in robot.joints for side in joint.actuator.sides]
         laws = FrictionLaws.of([side.friction if side else None for side in sides])
         self._of_motors = laws and FrictionLaws(*(values.reshape(-1, SIDES, 1) for values in laws))
-        of_joints = FrictionLaws.of([joint.friction for joint in robot.joints])
-        self._of_joints = of_joints and of_joints.with_axis_behind()
+        self._of_joints = FrictionLaws.over_samples([joint.friction for joint in robot.joints])
         self._has_motor = np.array([side is not None for side in sides]).reshape(-1, SIDES)
         self._motor_damping = np.array([side.damping if side else 0.0 for side in sides]).reshape(-1, SIDES)
         self._joint_damping = np.array([joint.damping for joint in robot.joints])

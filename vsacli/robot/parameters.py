@@ -152,30 +152,46 @@ def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:
     return with_numbers(robot, chosen, seeds([parameter.value for parameter in chosen]))
 
 
-def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
-    """Return a robot with other values of some parameters, which may be scalars of any kind.
+def with_numbers(robot: Robot, chosen: Sequence[Parameter | NumberAtPath], values: Sequence[Scalar]) -> Robot:
+    """Return a robot with other values of some numbers, which may be scalars of any kind.
 
-    Records on the paths are made without their checks, so the robot cannot be checked or written to a file.
+    Rows of samples among them are one value for each sample, see `vsacli.robot.variants`. Records on the
+    paths are made without their checks, so the robot cannot be checked or written to a file.
     """
-    for parameter, scalar in zip(chosen, values, strict=True):
-        robot = _with_number(robot, parameter.path, scalar)
-    return robot
+    entries = [(number.path, scalar) for number, scalar in zip(chosen, values, strict=True)]
+    return _with_scalars(robot, entries) if entries else robot
 
 
-def _with_number(content: Any, path: NumberPath, scalar: Scalar) -> Any:
-    """Return a record or list with another number at a path, or at both sides of an equal pair."""
-    if isinstance(content, tuple):
-        chosen = path[0] if path else ""
-        if not isinstance(chosen, PathIndex):
-            return (_with_number(content[0], path, scalar),) * len(content)
-        return tuple(
-            _with_number(entry, path[1:], scalar) if index == chosen.number else entry
-            for index, entry in enumerate(content)
-        )
+def _with_scalars(content: Any, entries: Sequence[tuple[NumberPath, Scalar]]) -> Any:
+    """Return a record, list or number with scalars at paths, or at both sides of an equal pair."""
+    path, scalar = entries[0]
+    step = path[0] if path else ""
+    if isinstance(content, tuple) and not isinstance(step, PathIndex):
+        return (_with_scalars(content[0], entries),) * len(content)
     if not path:
         return scalar
-    word = str(path[0])
-    return _replace_unchecked(content, {word: _with_number(getattr(content, word), path[1:], scalar)})
+    inside: dict[Any, list[tuple[NumberPath, Scalar]]] = {}
+    for (first, *rest), entry in entries:
+        key = first.number if isinstance(first, PathIndex) else first
+        inside.setdefault(key, []).append((tuple(rest), entry))
+    if isinstance(content, tuple):
+        return tuple(
+            _with_scalars(entry, inside[index]) if index in inside else entry
+            for index, entry in enumerate(content)
+        )
+    return _replace_unchecked(
+        content, {word: _with_scalars(getattr(content, word), entries) for word, entries in inside.items()}
+    )
+
+
+def number_at(robot: Robot, path: NumberPath) -> float:
+    """Return the number at a path, that of the first side of an equal pair."""
+    content: Any = robot
+    for step in path:
+        if isinstance(content, tuple) and not isinstance(step, PathIndex):
+            content = content[0]
+        content = content[step.number] if isinstance(step, PathIndex) else getattr(content, step)
+    return float(content[0] if isinstance(content, tuple) else content)
 
 
 def with_copied_actuator(joint: Joint) -> Joint:

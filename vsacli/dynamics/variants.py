@@ -1,0 +1,133 @@
+"""Robots of one structure that differ in numbers, which kernels take as rows: one call computes all of them.
+
+`Variants` are the robots, `VariantKernel` is the kernel of all. `shared_structure` decides which robots can
+be variants of each other, `numbers_as_rows` which numbers may differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Generic, Protocol, Self, TypeVar
+
+import numpy as np
+
+from vsacli.base.arrays import FloatArray, IndexArray
+from vsacli.compute.rows import RowKernel, RowLayout
+from vsacli.compute.vector import Scalar
+from vsacli.documents.record_values import NumberAtPath
+from vsacli.robot.model import Robot
+from vsacli.robot.parameters import number_at, with_numbers
+
+PARAMETERS = "parameters"
+"""Name of the rows with the varied numbers, behind those of the kernel itself."""
+
+
+class RobotKernel(Protocol):
+    """A kernel that can be that of another robot."""
+
+    @property
+    def arguments(self) -> RowLayout:
+        """Layout of the input rows."""
+
+    @property
+    def results(self) -> RowLayout:
+        """Layout of the output rows."""
+
+    def of_robot(self, robot: Robot) -> Self:
+        """Return the kernel of another robot of the same structure."""
+
+    def __call__(self, rows: Sequence[Any]) -> Sequence[Any]:
+        """Return the output rows."""
+
+
+_Kernel = TypeVar("_Kernel", bound=RobotKernel)
+
+
+@dataclass(frozen=True)
+class VariantKernel(RowKernel, Generic[_Kernel]):
+    """A kernel with some numbers of its robot as further input rows.
+
+    Attributes:
+        kernel: Kernel of `robot`.
+        robot: Robot; its own values of the varied numbers do not count.
+        varied: Numbers of the robot that are rows.
+    """
+
+    kernel: _Kernel
+    robot: Robot
+    varied: tuple[NumberAtPath, ...]
+
+    @cached_property
+    def arguments(self) -> RowLayout:
+        """Layout of the input rows: those of the kernel, then the varied numbers."""
+        return RowLayout({**self.kernel.arguments.shapes, PARAMETERS: (len(self.varied),)})
+
+    @property
+    def results(self) -> RowLayout:
+        """Layout of the output rows, that of the kernel."""
+        return self.kernel.results
+
+    def __call__(self, rows: Sequence[Scalar]) -> Sequence[Scalar]:
+        """Compute with the numbers of each sample."""
+        first = len(rows) - len(self.varied)
+        robot = with_numbers(self.robot, self.varied, rows[first:])
+        return self.kernel.of_robot(robot)(rows[:first])
+
+
+@dataclass(frozen=True, eq=False)
+class Variants:
+    """Robots that are equal except for some numbers.
+
+    Attributes:
+        robots: The robots.
+        base: Robot of their structure, whose own values of the varied numbers do not count.
+        varied: Numbers of `base` that are replaced by those of each variant.
+    """
+
+    robots: tuple[Robot, ...]
+    base: Robot
+    varied: tuple[NumberAtPath, ...] = ()
+
+    @classmethod
+    def of_one(cls, robot: Robot) -> Self:
+        """Return a single robot, all of whose numbers are constants of the kernel."""
+        return cls((robot,), robot)
+
+    def __len__(self) -> int:
+        return len(self.robots)
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Varied numbers of all robots, (numbers, variants)."""
+        values = [[number_at(robot, number.path) for robot in self.robots] for number in self.varied]
+        return np.array(values).reshape(len(self.varied), len(self.robots))
+
+    def kernel(self, of_base: _Kernel) -> _Kernel | VariantKernel[_Kernel]:
+        """Return the kernel of all variants from that of `base`."""
+        return VariantKernel(of_base, self.base, self.varied) if self.varied else of_base
+
+    def inputs(self, variant: IndexArray) -> dict[str, Sequence[FloatArray]]:
+        """Return the further input rows of `kernel`, by name, from the variant of each sample."""
+        return {PARAMETERS: self._rows(variant)} if self.varied else {}
+
+    def robot_over(self, variant: IndexArray) -> Robot:
+        """Return a robot whose varied numbers are rows, (samples,), from the variant of each sample."""
+        return with_numbers(self.base, self.varied, self._rows(variant))
+
+    def _rows(self, variant: IndexArray) -> Sequence[FloatArray]:
+        return list(np.ascontiguousarray(self.values[:, variant]))
+
+
+def shared_structure(robot: Robot, varied: Sequence[NumberAtPath]) -> Robot | None:
+    """Return the robot with each varied number as in `varied`; None if it lacks one of them.
+
+    Robots for which this returns equal robots can be variants of each other.
+    """
+    try:
+        structure = with_numbers(robot, varied, [number.value for number in varied])
+        own = [number_at(robot, number.path) for number in varied]
+    except (AttributeError, IndexError, TypeError):  # the robot has another record at a path
+        return None
+    return structure if with_numbers(structure, varied, own) == robot else None
