@@ -20,12 +20,15 @@ from samples.robots import random_robot, vsa_3r
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.report import Report
+from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
+from vsacli.compute.engine import NUMPY, Engine
 from vsacli.compute.engine.engines import Kernel
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.elastic_torques import LinkTorques
+from vsacli.dynamics.variants import Variants
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.times import UniformTimes
@@ -162,11 +165,17 @@ def fast_recording(**options: Any) -> Trajectory:
     return Trajectory.from_samples(time, q, np.full_like(q, 1000.0), fit="interpolate", **options)
 
 
+def ladder_of(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> tuple[float, float]:
+    """Return the error of a run nearest to its bound, and that bound."""
+    errors, bounds = ladder(RunDynamics(Variants.of_one(robot), [trajectory], engine=engine))
+    return float(errors[0]), float(bounds[0])
+
+
 def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
     """Those of long chains are computed some after the others."""
-    whole = ladder(*load("7R"))
+    whole = ladder_of(*load("7R"))
     monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
-    assert ladder(*load("7R")) == whole
+    assert ladder_of(*load("7R")) == whole
 
 
 class Counted:
@@ -190,7 +199,7 @@ def test_blocks_of_long_chains_do_not_grow_in_number(joints: int):
     )
     hold = Trajectory(UniformTimes(1.0, 20.0), position, {"stiffness": stiffness}, name="hold")
     counted = Counted()
-    ladder(robot, hold, counted)
+    ladder_of(robot, hold, counted)
     assert counted.calls == 2  # 4 and 20 if there were as many times as for short ones
 
 
@@ -208,7 +217,7 @@ def test_memory_of_long_chains_is_that_of_the_times_computed_together(monkeypatc
     monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
     tracemalloc.start()
     try:
-        ladder(chain, trajectory)
+        ladder_of(chain, trajectory)
         assert tracemalloc.get_traced_memory()[1] < 16e6  # 10.4e6
     finally:
         tracemalloc.stop()
@@ -217,7 +226,7 @@ def test_memory_of_long_chains_is_that_of_the_times_computed_together(monkeypatc
 @pytest.mark.slow
 def test_bound_follows_rounding_where_sampling_is_fast():
     trajectory = fast_recording()
-    error, bound = ladder(vsa_3r(), trajectory)
+    error, bound = ladder_of(vsa_3r(), trajectory)
     # Steps of a 48th of the knot spans' 1e-4 s; what rounding leaves is a tenth of the bound and less.
     assert bound == pytest.approx(ROUNDING_GAIN * EPS * 10 * 48 / 1e-4, rel=1e-6)
     assert LADDER_BOUND < bound < 1e-6
@@ -230,7 +239,7 @@ def test_bound_follows_rounding_where_sampling_is_fast():
 @pytest.mark.parametrize("defect", [1e-2, 1e-6])
 def test_wrong_derivative_is_found_where_sampling_is_fast(order: int, defect: float, monkeypatch):
     spoil_torque(monkeypatch, order, scaled(1 + defect))
-    error, bound = ladder(vsa_3r(), fast_recording())
+    error, bound = ladder_of(vsa_3r(), fast_recording())
     assert error == pytest.approx(defect, rel=0.05)
     assert error > bound
 

@@ -239,7 +239,7 @@ def test_the_choice_is_the_same_again():
 @pytest.mark.parametrize(("joints", "shares"), [(10, False), (100, True)])
 def test_long_chains_of_branches_share_functions(joints: int, shares: bool):
     """Written out, 100 joints took the compiler 13 s."""
-    kernel = IntervalEnergy(((0.1, 0.1),) * joints, (0.0,) * joints, rubbing=False)
+    kernel = IntervalEnergy(_chain(shipped_robot("tendon_1r"), joints), rubbing=False)
     assert is_of_calls(kernel_program(kernel)) is shares
     assert kernel_code(kernel).compiling_seconds < 4
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -26,6 +26,8 @@ from vsacli.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     from vsacli.dynamics.integrated_deflections import IntegratedDeflections
     from vsacli.dynamics.internal_motion import InternalMotions
+
+_Value = TypeVar("_Value")
 
 DEFLECTION_SOLVERS = ("root", "ode")
 """Methods for deflections: the root of (14) at each sample, or integration of (19) from the first root."""
@@ -77,14 +79,21 @@ class RunDynamics:
     def from_zero(self) -> RunDynamics:
         """Return the dynamics with time zero at the first sample, where times are rounded least."""
         moved = copy(self)
-        shifted = {id(each): each.from_zero() for each in self.trajectories}
-        moved.trajectories = tuple(shifted[id(each)] for each in self.trajectories)
+        moved.trajectories = tuple(self.by_trajectory(Trajectory.from_zero))
         return moved
+
+    def by_trajectory(self, function: Callable[[Trajectory], _Value]) -> list[_Value]:
+        """Return a function of the trajectory of each variant, called once for each distinct one."""
+        values = {id(each): function(each) for each in self._distinct}
+        return [values[id(each)] for each in self.trajectories]
+
+    @property
+    def _distinct(self) -> list[Trajectory]:
+        return list({id(each): each for each in self.trajectories}.values())
 
     def motion(self, start: int, stop: int) -> Motion:
         """Return the motion at samples start..stop-1 of each variant, one variant after the other."""
-        motions = {id(each): each.block(start, stop) for each in self.trajectories}
-        return concatenate_motions([motions[id(each)] for each in self.trajectories])
+        return concatenate_motions(self.by_trajectory(lambda each: each.block(start, stop)))
 
     def compute(self, motion: Motion) -> Block:
         """Return the variables of a motion of all variants, see `motion`."""
@@ -105,15 +114,15 @@ class RunDynamics:
 
     def _motion_at(self, time: FloatArray, variant: IndexArray) -> Motion:
         """Return the motion at times; each distinct trajectory is evaluated once."""
-        numbers: dict[int, int] = {}
-        own = np.array([numbers.setdefault(id(each), len(numbers)) for each in self.trajectories])[variant]
-        if len(numbers) == 1:
-            return self.trajectories[0].at(time)
-        order = own.argsort(kind="stable")
-        distinct = list({id(each): each for each in self.trajectories}.values())
-        parts = [distinct[number].at(time[own == number]) for number in sorted(set(own.tolist()))]
-        back = order.argsort()
-        return concatenate_motions(parts).mapped(time, lambda array, _: array[back])
+        distinct = self._distinct
+        if len(distinct) == 1:
+            return distinct[0].at(time)
+        number_by_id = {id(each): number for number, each in enumerate(distinct)}
+        numbers = np.array([number_by_id[id(each)] for each in self.trajectories])[variant]
+        order = numbers.argsort(kind="stable")
+        parts = [distinct[number].at(time[numbers == number]) for number in sorted(set(numbers.tolist()))]
+        place = order.argsort()
+        return concatenate_motions(parts).mapped(time, lambda array, _: array[place])
 
     def _compute(self, motion: Motion, variant: IndexArray) -> Block:
         time, rows = motion.time, dict[str, Iterable[FloatArray]](self.variants.inputs(variant))

@@ -148,24 +148,24 @@ class RunCheck:
         ]
 
     def _residuals(self) -> tuple[FloatArray, FloatArray]:
-        """Return the largest scaled residuals of springs and shafts, (variants,); NaN where one is missing."""
+        """Return the largest scaled residuals of springs and shafts, (variants,), NaN where a value is."""
         probed = {name: np.concatenate([part[name] for part in self._excerpts]) for name in self._excerpts[0]}
         variant = self._of_probed[: len(probed["q"])]
         joints = self._dynamics.variants.robot_over(variant).joints
         of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(joints))]
         recomputed = balance_errors(joints, of_joints)
+        largest_probed = (
+            np.reshape(values, (-1, self._variants, len(variant) // self._variants)).max(axis=2)
+            for values in (recomputed["spring_error"], recomputed["shaft_error"], recomputed["damped_error"])
+        )
         springs, shafts, damped_error = (
-            self._error.copy(),
-            self._shaft_error.copy(),
-            self._damped_error.copy(),
+            np.maximum(of_blocks, probed_error)
+            for of_blocks, probed_error in zip(
+                (self._error, self._shaft_error, self._damped_error.T), largest_probed, strict=True
+            )
         )
-        np.maximum.at(springs, variant, recomputed["spring_error"][0])
-        np.maximum.at(shafts, variant, recomputed["shaft_error"][0])
-        np.maximum.at(
-            damped_error, variant, np.transpose(recomputed["damped_error"]).reshape(len(variant), -1)
-        )
-        damped = damped_error / np.maximum(self._damped_size, np.finfo(float).tiny)
-        return np.maximum(springs, damped.max(axis=1, initial=0.0)), shafts
+        damped = damped_error / np.maximum(self._damped_size.T, np.finfo(float).tiny)
+        return np.max([*springs, *damped], axis=0), shafts[0]
 
 
 class Rung(NamedTuple):
@@ -226,8 +226,7 @@ def ladder(run: RunDynamics) -> tuple[FloatArray, FloatArray]:
     """
     dynamics = run.from_zero()
     count = _number_of_times(len(run.robot.joints), len(run.variants))
-    points = {id(each): each.check_points(count) for each in dynamics.trajectories}
-    times, reach = np.stack([points[id(each)] for each in dynamics.trajectories], axis=-1)
+    times, reach = np.stack(dynamics.by_trajectory(lambda each: each.check_points(count)), axis=-1)
     duration = np.array([each.duration for each in dynamics.trajectories])
     steps = np.minimum(reach / 3, duration / 500)
     every = np.arange(len(duration))

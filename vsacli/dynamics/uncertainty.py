@@ -20,7 +20,7 @@ from vsacli.base.signals import COMMANDED, Signal, orders_of_derivation
 from vsacli.base.variables import UNCERTAIN
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench
 from vsacli.compute.engine import NUMPY, Engine
-from vsacli.dynamics.balances import BalancedDynamics
+from vsacli.dynamics.balances import BalancedBlock, BalancedDynamics
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.inverse import (
     COMPUTED,
@@ -168,7 +168,7 @@ def propagate_deviations(
     kernel = BalancedDynamics(InverseDynamics(undamped, frame))
 
     def variables(shifted: Motion) -> dict[str, AnyArray]:
-        block = block_of(kernel, shifted, engine)
+        block = block_of(kernel, shifted, engine, block=BalancedBlock)
         gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
         return {**{name: getattr(block, name) for name in _COMPUTED}, MARGIN: gap}
 
