@@ -193,7 +193,8 @@ def test_the_table_from_python_is_that_of_the_command(own_folder: Path, grid_tab
         ("rate: [1000], duration: {linspace: [3, 4, 900]}", "c"),
         ("rate: [1000], duration: {linspace: [3, 4, 30]}", "numpy"),
         ("rate: [5], duration: {linspace: [3, 4, 300]}", "numpy"),
-        ("rate: [1000], joints.elbow.link.mass: {linspace: [3, 4, 300]}", "numpy"),
+        ("rate: [1000], joints.elbow.link.mass: {linspace: [3, 4, 300]}", "c"),
+        ("rate: [1000], joints.elbow.actuator.motor.max_torque: {linspace: [300, 400, 300]}", "numpy"),
         ("rate: [1000], joints.elbow.link.mass: [3, 4], duration: {linspace: [3, 4, 900]}", "c"),
     ],
 )

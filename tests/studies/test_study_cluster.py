@@ -148,7 +148,7 @@ sys.meta_path.insert(0, Lacking())
         ),
         (
             "from vsacli.studies.sweeps.rows import Computer\nimport os\n"
-            "Computer.row = lambda *_: os._exit(1)\n",
+            "Computer.rows = lambda *_: os._exit(1)\n",
             "runs lost with their processes: 6",
         ),
     ],
@@ -167,7 +167,7 @@ def test_a_worker_reads_the_study_again(tmp_path: Path) -> None:
     job = Job.of(found)
     rows = answer(job, [4, 1]).rows
     assert [row.values.tobytes() for row in rows] == [
-        Computer(found).row(run).values.tobytes() for run in (4, 1)
+        row.values.tobytes() for run in (4, 1) for row in Computer(found).rows([run])
     ]
     other = dict(job.computed_by) | {"NumPy": "1.0", "the C compiler": "gcc 2"}
     strange = answer(job._replace(computed_by=tuple(other.items())), [0]).problems[0]

@@ -59,6 +59,8 @@ class Batch:
         asked: Names of the requested variables; if recorded signals leave them too uncertain, the verdict is
             unreliable. Those of `ON_REQUEST` are computed only if they are among them.
         tell: Callback for messages of the choice of the engine: failures, and work that takes long.
+        kernel_samples: Number of samples of all batches with this kernel, for the choice of the engine; by
+            default those of this batch.
 
     Attributes:
         choice: Engine that was chosen, with the reason.
@@ -81,6 +83,7 @@ class Batch:
         threads: int | None = None,
         asked: Collection[str] = (JUDGED,),
         tell: Tell = unheard,
+        kernel_samples: int | None = None,
     ) -> None:
         check_min_margin(min_margin)
         self.variants, self.trajectories = variants, _adapt_trajectories(variants.robots, trajectories)
@@ -99,8 +102,8 @@ class Batch:
         )
         self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
         busy = int(self._ahead)  # one thread updates the summaries while the others compute
-        all_samples = trajectory.samples * len(variants)
-        self.choice = choose(engine, self._dynamics.kernel, all_samples, threads, tell, busy=busy)
+        samples = kernel_samples or trajectory.samples * len(variants)
+        self.choice = choose(engine, self._dynamics.kernel, samples, threads, tell, busy=busy)
         self._dynamics.engine = self.choice.engine
         self._uncertainty = _prepare_uncertainty(robot, trajectory, asked, self.choice.engine)
         self._minima_search = MinimaSearch(self._dynamics, min_margin, self._uncertainty)

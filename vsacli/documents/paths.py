@@ -6,7 +6,6 @@ The words of a path are keys of mappings. An entry of a list is given by its ind
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, TypeVar
 
@@ -206,7 +205,7 @@ class _Replacement(NamedTuple):
         inside = self._replace(scope=self.scope._replace(variant=variant))
         content = inside.in_value(kind, getattr(record, word), rest, (*place, word))
         try:
-            return dataclasses.replace(record, **{word: content})
+            return record.with_field(word, content)
         except InvalidRecordError as error:
             problems = [str(problem.in_units(variant).inside(*place)) for problem in error.fields]
             raise InputError(Problem("", 0, message) for message in problems) from None

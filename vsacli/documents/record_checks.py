@@ -21,6 +21,7 @@ from vsacli.documents.fields import (
     SMALLEST,
     Boolean,
     Check,
+    Field,
     FieldPath,
     Interval,
     Items,
@@ -65,6 +66,18 @@ class DeclaredRecord:
         _refuse(record, record._problems())
         return record
 
+    def with_field(self, name: str, content: Any) -> Self:
+        """Return the record with another value of a field; the others, which were checked, are not again.
+
+        Raises:
+            InvalidRecordError: the value is invalid, or does not go with the others.
+        """
+        same = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # type: ignore[arg-type]  # records are dataclasses
+        record = construct_unchecked(type(self), {**same, name: content})
+        _refuse(record, _problems_of_field(declared_fields(type(self))[name], name, content))
+        _refuse(record, record._problems())
+        return record
+
     def _problems(self) -> Iterable[FieldProblem]:
         """Return the problems between fields, each of which is valid by itself.
 
@@ -92,10 +105,15 @@ _defaults: Callable[[type], Mapping[str, Any]] = cache(
 
 def field_problems(cls: type, values: Mapping[str, Any]) -> Iterator[FieldProblem]:
     """Yield the problems of each field of a record by itself; fields without a value have none."""
-    for name, (field, default) in declared_fields(cls).items():
-        content = values.get(name)
-        if not (content is None and (default is None or name not in values)):
-            yield from value_problems(field.kind, field.check, content, (name,))
+    for name, declared in declared_fields(cls).items():
+        if name in values:
+            yield from _problems_of_field(declared, name, values[name])
+
+
+def _problems_of_field(declared: tuple[Field, Any], name: str, content: Any) -> Iterator[FieldProblem]:
+    field, default = declared
+    if not (content is None and default is None):
+        yield from value_problems(field.kind, field.check, content, (name,))
 
 
 def value_problems(

@@ -16,9 +16,8 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import Scalar
-from vsacli.documents.record_values import NumberAtPath
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import number_at, with_numbers
+from vsacli.robot.parameters import Parameter, number_at, with_numbers
 
 PARAMETERS = "parameters"
 """Name of the rows with the varied numbers, behind those of the kernel itself."""
@@ -57,7 +56,7 @@ class VariantKernel(RowKernel, Generic[_Kernel]):
 
     kernel: _Kernel
     robot: Robot
-    varied: tuple[NumberAtPath, ...]
+    varied: tuple[Parameter, ...]
 
     @cached_property
     def arguments(self) -> RowLayout:
@@ -88,7 +87,7 @@ class Variants:
 
     robots: tuple[Robot, ...]
     base: Robot
-    varied: tuple[NumberAtPath, ...] = ()
+    varied: tuple[Parameter, ...] = ()
 
     @classmethod
     def of_one(cls, robot: Robot) -> Self:
@@ -120,7 +119,7 @@ class Variants:
         return list(np.ascontiguousarray(self.values[:, variant]))
 
 
-def shared_structure(robot: Robot, varied: Sequence[NumberAtPath]) -> Robot | None:
+def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> Robot | None:
     """Return the robot with each varied number as in `varied`; None if it lacks one of them.
 
     Robots for which this returns equal robots can be variants of each other.

@@ -40,6 +40,9 @@ from vsacli.robot.joint import FRAME_0, Joint, Pose, Tool
 if TYPE_CHECKING:
     from vsacli.robot.plausibility.checked_robot import CheckedRobot
 
+AT_LINK = Pose()
+"""Place of a tool at the frame of its link."""
+
 END_EFFECTOR = "end_effector"
 """Name of the tool of a robot without `tools`."""
 
@@ -101,9 +104,9 @@ class Robot(DeclaredRecord):
             yield FieldProblem(("joints", number, "parent"), reason)
 
     def _tool_problems(self) -> Iterator[FieldProblem]:
-        if self.tool != Pose() and self.tools:
+        if self.tool != AT_LINK and self.tools:
             yield FieldProblem(("tool",), "give `tool` or `tools`, not both")
-        if self.tool != Pose() and not self.tools and len(self.tips) > 1:
+        if self.tool != AT_LINK and not self.tools and len(self.tips) > 1:
             tips = ", ".join(self.joint_names[tip] for tip in self.tips)
             example = f"tools: {{NAME: {{joint: {self.joint_names[self.tips[-1]]}, xyz: [...]}}}}"
             yield FieldProblem(("tool",), f"which of the tips {tips} carries it? Give `{example}` instead")

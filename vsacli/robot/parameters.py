@@ -152,7 +152,7 @@ def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:
     return with_numbers(robot, chosen, seeds([parameter.value for parameter in chosen]))
 
 
-def with_numbers(robot: Robot, chosen: Sequence[Parameter | NumberAtPath], values: Sequence[Scalar]) -> Robot:
+def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
     """Return a robot with other values of some numbers, which may be scalars of any kind.
 
     Rows of samples among them are one value for each sample, see `vsacli.robot.variants`. Records on the

@@ -29,8 +29,12 @@ from vsacli.studies.sweeps.study import Study
 if TYPE_CHECKING:
     from distributed import Client
 
-RUNS_A_PROCESS = 25
-"""Smallest number of short runs per process: starting a process takes as long as about 25 of them."""
+SINGLE_RUNS_A_PROCESS, BATCHED_RUNS_A_PROCESS = 25, 350
+"""Smallest numbers of short runs per process, computed one by one and in batches: starting a process takes as
+long as about so many of them."""
+
+TASKS_A_PROCESS = 4
+"""Number of tasks into which the waiting runs are divided for each process, so that all end together."""
 
 LOCAL = "local"
 """Address that stands for a cluster of processes on this machine."""
@@ -70,7 +74,8 @@ def executor(
         InputError: the cluster does not answer, or Dask is not installed.
     """
     short = dask is None and study.file.optimize is None
-    paying = 1 + runs // RUNS_A_PROCESS if short else runs
+    fewest = BATCHED_RUNS_A_PROCESS if study.runs_of_batch > 1 else SINGLE_RUNS_A_PROCESS
+    paying = 1 + runs // fewest if short else runs
     count = min(processors(), paying) if processes is None else min(processes, runs)
     if dask is not None:
         with Cluster(study, dask, count, tell) as cluster:
@@ -79,7 +84,7 @@ def executor(
         with Processes(study, count) as several:
             yield several.rows
     else:
-        yield lambda runs: map(Computer(study).row, runs)
+        yield Computer(study).rows
 
 
 class Executor(ABC):
@@ -93,6 +98,7 @@ class Executor(ABC):
         self._study, self._job = study, Job.of(study)
         self._open = ExitStack()
         self._seconds_a_run = TASK_SECONDS
+        self._apart: set[int] = set()  # runs of lost tasks, of which one may end its process again
 
     def __enter__(self) -> Self:
         return self
@@ -105,6 +111,11 @@ class Executor(ABC):
     @abstractmethod
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
         """Take the runs of the next task from those waiting; none while enough tasks are submitted."""
+
+    def take(self, waiting: deque[int], count: int) -> list[int]:
+        """Take the next runs from those waiting; one that was lost with others is a task of its own."""
+        count = 1 if waiting[0] in self._apart else min(count, len(waiting))
+        return [waiting.popleft() for _ in range(count)]
 
     @abstractmethod
     def submit(self, runs: Sequence[int]) -> Future[Answer]:
@@ -125,15 +136,19 @@ class Executor(ABC):
             while waiting and (task := self.next_task(waiting, len(given))):
                 given[self.submit(task)] = task
             for future in wait(given, return_when=FIRST_COMPLETED).done:
-                yield from self._rows_of(future, given.pop(future))
+                yield from self._rows_of(future, given.pop(future), waiting)
 
-    def _rows_of(self, future: Future[Answer], runs: Sequence[int]) -> Sequence[Row]:
-        """Return the rows of a task that has ended."""
+    def _rows_of(self, future: Future[Answer], runs: Sequence[int], waiting: deque[int]) -> Sequence[Row]:
+        """Return the rows of a task that has ended; several runs of a lost task wait again, each apart."""
         try:
             found = future.result()
         except Exception as error:
             how = self.reason(future, error)
-            return [lost(self._study, run, how) for run in runs]
+            if len(runs) == 1:
+                return [lost(self._study, *runs, how)]
+            self._apart.update(runs)
+            waiting.extendleft(reversed(runs))
+            return []
         if found.problems:
             raise InputError(found.problems)
         self._seconds_a_run = found.seconds / len(found.rows)
@@ -182,7 +197,7 @@ class Worker:
 
 
 class Processes(Executor):
-    """Processes on this machine, each with one run at a time.
+    """Processes on this machine, each with one run or batch at a time.
 
     Args:
         study: study to compute.
@@ -195,8 +210,9 @@ class Processes(Executor):
         self.workers: list[Worker] = []
 
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
-        """See `Executor.next_task`; a single run, so that a killed process loses no more."""
-        return [waiting.popleft()] if given < self._count else []
+        """See `Executor.next_task`."""
+        share = len(waiting) // (TASKS_A_PROCESS * self._count)
+        return self.take(waiting, min(self._study.runs_of_batch, 1 + share)) if given < self._count else []
 
     def submit(self, runs: Sequence[int]) -> Future[Answer]:
         """See `Executor.submit`; processes start when there are tasks for them."""
@@ -287,8 +303,8 @@ class Cluster(Executor):
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
         """See `Executor.next_task`; about `TASK_SECONDS` of runs, fewer at the end to end together."""
         tasks = TASKS_A_THREAD * max(1, sum(self._client.nthreads().values()))
-        count = min(1 + len(waiting) // tasks, max(1, int(TASK_SECONDS / self._seconds_a_run)), len(waiting))
-        return [waiting.popleft() for _ in range(count)] if given < tasks else []
+        of_seconds = max(self._study.runs_of_batch, int(TASK_SECONDS / self._seconds_a_run))
+        return self.take(waiting, min(1 + len(waiting) // tasks, of_seconds)) if given < tasks else []
 
     def submit(self, runs: Sequence[int]) -> Future[Answer]:
         """See `Executor.submit`."""

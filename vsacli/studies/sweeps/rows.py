@@ -9,16 +9,20 @@ import json
 import os
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple, Self
 
 import numpy as np
 
-from vsacli.analysis.run import Run
+from vsacli.analysis.batch import Batch
+from vsacli.analysis.variant_groups import PreparedRun, batches
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.texts import one_line
+from vsacli.documents.reading import format_changes
+from vsacli.dynamics.variants import Variants
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.studies.sweeps.columns import Recorder, first_limit, scalars
@@ -80,35 +84,68 @@ def lost(study: Study, run: int, how: str) -> Row:
     return failed(run, study.key(study.point(run)), f"{LOST} {how}")
 
 
-class Computer:
-    """Computation of the runs of a study, one after the other.
+class _Prepared(NamedTuple):
+    """A run that is ready to be computed.
 
-    The trajectory is read again only if it, or the robot's joints, differ from those of the previous run.
+    Attributes:
+        run: number of the run.
+        key: digest of everything that the row depends on.
+        inputs: robot and trajectory.
+        costs: costs of the optimum, if the trajectory is one.
+    """
+
+    run: int
+    key: str
+    inputs: PreparedRun
+    costs: Sequence[FloatArray]
+
+    def failed(self, reason: str) -> Row:
+        """Return the row of the run if it cannot be computed."""
+        return failed(self.run, self.key, reason)
+
+
+class Computer:
+    """Computation of the runs of a study, those that differ in numbers alone together.
+
+    A trajectory is read again only if it, or the robot's joints, differ from those of the previous run.
     """
 
     def __init__(self, study: Study) -> None:
         self._study = study
         self._read: tuple[tuple[int, str], CommandedJoints, Trajectory] | None = None
 
-    def row(self, run: int) -> Row:
-        """Return the row of a run; errors of the run become part of the row.
+    def rows(self, runs: Sequence[int]) -> Iterator[Row]:
+        """Yield the rows of runs; errors of a run become part of its row.
 
         Raises:
             ChangedError: a file of the study has changed.
         """
+        together = self._study.runs_of_batch
+        for first in range(0, len(runs), together):
+            prepared = list[_Prepared]()
+            for run in runs[first : first + together]:
+                ready = self._prepare(run)
+                if isinstance(ready, Row):
+                    yield ready
+                else:
+                    prepared.append(ready)
+            for variants, members in batches([each.inputs for each in prepared], self._study.varied):
+                yield from self._batch_rows(variants, [prepared[index] for index in members])
+
+    def _prepare(self, run: int) -> _Prepared | Row:
         point = self._study.point(run)
         key = self._study.key(point)
         try:
-            return self._computed(run, key, point)
+            return self._inputs(run, key, point)
         except ChangedError:
             raise
         except InputError as error:
             self._study.check_files()
             return failed(run, key, str(self._study.as_named(error)))
         except Exception as error:  # one run must not cost the others
-            return failed(run, key, f"a bug, please report it: {type(error).__name__}: {error}")
+            return failed(run, key, _bug(error, point))
 
-    def _computed(self, run: int, key: str, point: Point) -> Row:
+    def _inputs(self, run: int, key: str, point: Point) -> _Prepared | Row:
         changes = point.changes
         robot = self._study.read.robot(changes.robot)
         if robot.joint_names != self._study.robot.joint_names:
@@ -123,13 +160,51 @@ class Computer:
             if optimum.trajectory is None:
                 return _without_values(run, key, IMPOSSIBLE, "; ".join(optimum.reasons))
             trajectory, costs = optimum.trajectory, optimize.costs_of(optimum)
-        computed = Run(robot, trajectory, engine=self._study.engine, threads=1)
-        recorder = Recorder(self._study.over_time, self._study.file.every)
-        for block in computed:
-            recorder.add(block)
-        report = computed.report()
-        values = np.concatenate([*costs, scalars(self._study.kept, report)])
-        return Row(run, key, report.verdict, first_limit(report), "", values, recorder.curves)
+        return _Prepared(run, key, PreparedRun(robot, trajectory), costs)
+
+    def _batch_rows(self, variants: Variants, prepared: Sequence[_Prepared]) -> list[Row]:
+        """Return the rows of a batch; if it fails, each run is computed alone."""
+        try:
+            return self._computed(variants, prepared)
+        except Exception as error:
+            if len(prepared) == 1:
+                (run,) = prepared
+                if isinstance(error, InputError):
+                    return [run.failed(str(self._study.as_named(error)))]
+                return [run.failed(_bug(error, self._study.point(run.run)))]
+        rows = list[Row]()
+        for robot, run in zip(variants.robots, prepared, strict=True):
+            rows += self._batch_rows(replace(variants, robots=(robot,)), [run])
+        return rows
+
+    def _computed(self, variants: Variants, prepared: Sequence[_Prepared]) -> list[Row]:
+        trajectories = [each.inputs.trajectory for each in prepared]
+        study = self._study
+        batch = Batch(
+            variants,
+            trajectories,
+            engine=study.engine,
+            threads=1,
+            kernel_samples=study.samples_of_kernel if variants.varied else None,
+        )
+        recorders = [Recorder(study.over_time, study.file.every) for _ in prepared]
+        for block in batch:
+            count = len(block.time) // len(prepared)
+            for number, recorder in enumerate(recorders):
+                recorder.add(block.taken(slice(number * count, (number + 1) * count)))
+        reports = map(batch.findings, range(len(prepared)))
+        return [
+            Row(
+                run,
+                key,
+                report.verdict,
+                first_limit(report),
+                "",
+                np.concatenate([*costs, scalars(study.kept, report)]),
+                recorder.curves,
+            )
+            for (run, key, _, costs), report, recorder in zip(prepared, reports, recorders, strict=True)
+        ]
 
     def _trajectory(self, robot: Robot, index: int, changes: ChangesByFile) -> Trajectory:
         place, joints = (index, json.dumps(changes.trajectory)), CommandedJoints.of(robot)
@@ -137,6 +212,11 @@ class Computer:
             declared = declared_trajectory(self._study.trajectories[index], robot, changes.trajectory)
             self._read = (place, joints, declared)
         return self._read[2]
+
+
+def _bug(error: Exception, point: Point) -> str:
+    values = "; ".join(format_changes(point.values))
+    return f"a bug, please report it: {type(error).__name__}: {error}{f' ({values})' if values else ''}"
 
 
 class Job(NamedTuple):
@@ -194,7 +274,7 @@ def answer(job: Job, runs: Sequence[int]) -> Answer:
     try:
         computer = _computer(job, threading.get_ident())
         begin = time.perf_counter()
-        rows = tuple(map(computer.row, runs))
+        rows = tuple(computer.rows(runs))
     except InputError as error:
         return Answer(0.0, problems=error.problems)
     return Answer(time.perf_counter() - begin, rows)

@@ -6,64 +6,38 @@ import glob
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from vsacli.analysis.variant_groups import BATCH_SAMPLES, numbers_as_rows
 from vsacli.base import file_formats
 from vsacli.base.did_you_mean import near_file
 from vsacli.base.errors import InputError
 from vsacli.base.texts import MOST_LETTERS
 from vsacli.base.variables import VARIABLES
 from vsacli.base.version import __version__
-from vsacli.compute.engine import Settled, settle
+from vsacli.compute.engine import settle
+from vsacli.compute.engine.choice import check_engine
 from vsacli.documents.reading import Changes, read_document
 from vsacli.documents.source import Problems, Source
 from vsacli.documents.tree import MapNode, parse_yaml
 from vsacli.dynamics.inverse import InverseDynamics
+from vsacli.dynamics.variants import Variants
 from vsacli.results.store.study_table import TEXTS
 from vsacli.robot.file import RobotFileWithSource, read_robot_file
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, parameters
 from vsacli.studies.sweeps.columns import KEPT, Column, curve_columns
 from vsacli.studies.sweeps.dimensions import Design, Dimension, Entries
 from vsacli.studies.sweeps.study_file import StudyFile
 from vsacli.trajectory.changes import ChangesByFile, divide_changes_by_file
-from vsacli.trajectory.file import load_trajectory
-
-
-def settled_engine(
-    name: str, robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
-) -> Settled:
-    """Return the engine of a study.
-
-    Args:
-        name: name of the engine, see `settle`.
-        robot: robot as in its file.
-        trajectories: paths of the trajectory files.
-        dimensions: varied quantities.
-        design: points for each trajectory.
-
-    Raises:
-        InputError: the engine is unknown, or its C compiler is missing.
-    """
-    # C code is compiled for each robot, so it pays if each robot has enough samples
-    samples = _samples_of_robot(robot, trajectories, dimensions, design) if name == "auto" else 0
-    return settle(name, InverseDynamics(robot), samples)
-
-
-def _samples_of_robot(
-    robot: Robot, trajectories: Sequence[str], dimensions: Sequence[Dimension], design: Design
-) -> int:
-    """Return the samples in all runs of one robot, assuming those of the first run of each trajectory."""
-    changes = divide_changes_by_file(design.values(0)).trajectory
-    robots = design.different(
-        [each for each in dimensions if divide_changes_by_file({each.path: None}).robot]
-    )
-    return sum(_samples_of_run(path, robot, changes) for path in trajectories) * design.points // robots
+from vsacli.trajectory.file import declared_trajectory, load_trajectory
 
 
 def _samples_of_run(path: str, robot: Robot, changes: Changes) -> int:
@@ -117,8 +91,8 @@ class Study:
     dimensions: tuple[Dimension, ...]
     design: Design
     warnings: tuple[str, ...]
-    engine: str
-    compiler: str
+    engine: str = "numpy"
+    compiler: str = ""
 
     @property
     def runs(self) -> int:
@@ -154,6 +128,58 @@ class Study:
         """Return the inputs of a run; runs of one trajectory are consecutive."""
         trajectory, point = divmod(run, self.design.points)
         return Point(trajectory, self.design.values(point))
+
+    @cached_property
+    def varied(self) -> tuple[Parameter, ...]:
+        """Numbers of the robot that are rows of the kernel; none if the first run cannot be computed.
+
+        They depend on the study alone, so that a row does not depend on the runs that are computed with it.
+        """
+        if self.file.optimize is not None:
+            return ()
+        changes = self.point(0).changes
+        try:
+            robot = self.read.robot(changes.robot)
+            trajectory = declared_trajectory(self.trajectories[0], robot, changes.trajectory)
+            candidates = [parameter for each in self.dimensions for parameter in _led_to(robot, each)]
+            return numbers_as_rows(robot, trajectory, list(dict.fromkeys(candidates)))
+        except InputError:
+            return ()
+
+    @cached_property
+    def samples_of_kernel(self) -> int:
+        """Number of samples in all runs that share a kernel, assuming those of the first run."""
+        changes = self.point(0).changes.trajectory
+        robots = self.design.different([each for each in self.dimensions if not self._is_row(each)])
+        runs = sum(_samples_of_run(path, self.robot, changes) for path in self.trajectories)
+        return runs * self.design.points // robots
+
+    @cached_property
+    def runs_of_batch(self) -> int:
+        """Number of runs that are computed together, if their robots differ in `varied` alone."""
+        samples = _samples_of_run(self.trajectories[0], self.robot, self.point(0).changes.trajectory)
+        return max(1, BATCH_SAMPLES // samples) if self.varied else 1
+
+    def _is_row(self, dimension: Dimension) -> bool:
+        """Return whether a dimension is of the motion, or of numbers that are rows of the kernel."""
+        if not divide_changes_by_file({dimension.path: None}).robot:
+            return True
+        paths = {str(parameter) for parameter in self.varied}
+        leads = [str(parameter) for parameter in _led_to(self.robot, dimension)]
+        return dimension.numeric and bool(leads) and paths.issuperset(leads)
+
+    def with_engine(self, name: str) -> Study:
+        """Return the study with the engine of a name, see `settle`.
+
+        Raises:
+            InputError: the engine is unknown, or its C compiler is missing.
+        """
+        check_engine(name)
+        if name == "numpy":
+            return self
+        kernel = Variants((self.robot,), self.robot, self.varied).kernel(InverseDynamics(self.robot))
+        settled = settle(name, kernel, self.samples_of_kernel if name == "auto" else 0)
+        return replace(self, engine=settled.name, compiler=settled.compiler)
 
     @cached_property
     def digest(self) -> str:
@@ -276,11 +302,17 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
         raise InputError.one(str(error), source.path) from None
     entries.try_values()
     sources = tuple(each.sources for each in loaded)
-    settled = settled_engine(engine, robot, trajectories, dimensions, design)
     warnings = dict.fromkeys((*robot.warnings, *(text for each in loaded for text in each.warnings)))
-    return Study(
-        file, source, read, robot, trajectories, sources, dimensions, design, tuple(warnings), *settled
-    )
+    study = Study(file, source, read, robot, trajectories, sources, dimensions, design, tuple(warnings))
+    return study.with_engine(engine)
+
+
+def _led_to(robot: Robot, dimension: Dimension) -> Iterator[Parameter]:
+    """Yield the parameters of a robot to which a dimension leads, or which are part of what it leads to."""
+    for parameter in parameters(robot):
+        paths = str(parameter), ".".join(parameter.by_index)
+        if any(fnmatchcase(path, end) for path in paths for end in (dimension.path, f"{dimension.path}.*")):
+            yield parameter
 
 
 def _check_named(source: Source, key: str, name: str) -> None:
