@@ -153,11 +153,9 @@ class Batch:
         if self._tools is not None:
             block = self._tools.add(block)
         self._check.add(block)
-        count = len(block.time) // len(self.variants)
-        for variant in range(len(self.variants)):
-            own = block.taken(slice(variant * count, (variant + 1) * count))
+        for variant, own in enumerate(block.divided(len(self.variants))):
             self._summarize(variant, own, [each.where(each.variant == variant) for each in between])
-        self._samples += count
+        self._samples += len(block.time) // len(self.variants)
         return self._without_balances(block)
 
     def _until_infeasible(self, block: Block, between: list[Minima]) -> tuple[Block, list[Minima]]:

@@ -279,7 +279,7 @@ def _derivative_errors(
         block = dynamics.at(grid.ravel(), variant)
         robot = dynamics.variants.robot_over(variant)
         smooth = _motors_move_smoothly(block, grid.shape)
-        everywhere &= smooth.any(axis=0).all(axis=(0, 2))
+        everywhere &= np.all(np.any(smooth, axis=0), axis=(0, 2))
         for rung, of_rung in zip(RUNGS, differences, strict=False):
             value, derivative, whole = (
                 _variable_on_grid(dynamics.robot, block, name, grid.shape)

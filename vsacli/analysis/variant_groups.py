@@ -26,14 +26,14 @@ from vsacli.robot.parameters import Parameter, with_numbers
 from vsacli.trajectory.trajectory import Trajectory
 
 CHANGE = 1e-3
-"""Relative change of a number, or its value instead of zero, by which it is tried as a row."""
+"""Relative change of a number, or its value instead of zero, by which it is tried as a row; twice as much in
+the other of two robots."""
 
 TRIAL_TIMES = 4
 """Number of times along a trajectory at which numbers are tried; more than one, so that rows are arrays."""
 
 AGREEMENT = 1e-13
-"""Largest deviation of a trial, relative to the peak of a variable: zeros and ones of the geometry are exact
-as constants, and computed as rows."""
+"""Largest deviation of a trial, relative to the peak of a variable: constants 0 and 1 are folded."""
 
 BATCH_SAMPLES = 2**16
 """Largest number of samples in the batch of several runs, which are in memory together: 50 MB for three
@@ -67,9 +67,13 @@ def numbers_as_rows(
 
 def _can_be_rows(robot: Robot, trajectory: Trajectory, numbers: Sequence[Parameter]) -> bool:
     """Return whether results with these numbers as rows agree with those of constants."""
-    changed = [number.value * (1 + CHANGE) if number.value else CHANGE for number in numbers]
     with suppress(*NOT_ROWS), np.errstate(all="ignore"):
-        robots = robot, with_numbers(robot, numbers, changed)
+        robots = tuple(
+            with_numbers(
+                robot, numbers, [each.value * (1 + change) if each.value else change for each in numbers]
+            )
+            for change in (CHANGE, 2 * CHANGE)
+        )
         if _limits(robots[0]) != _limits(robots[1]):
             return False
         rows = _trial(Variants(robots, robot, tuple(numbers)), trajectory)

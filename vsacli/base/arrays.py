@@ -50,9 +50,11 @@ def stack_constants(constants: Sequence[Any]) -> AnyArray:
 
     The shape is (constants, 1), or (constants, samples) if a constant is a row with a value for each sample.
     """
-    if any(isinstance(constant, np.ndarray) and constant.ndim for constant in constants):
-        return np.stack(np.broadcast_arrays(*constants))
-    stacked: AnyArray = np.stack(constants)[:, None]
+    row = next((constant for constant in constants if np.ndim(constant)), None)
+    if row is None:
+        stacked: AnyArray = np.stack(constants)[:, None]
+    else:
+        stacked = np.stack([each if np.ndim(each) else np.full_like(row, each) for each in constants])
     return stacked
 
 

@@ -296,6 +296,11 @@ class Block:
         """Return a block of the selected samples; a single number removes the axis of samples."""
         return type(self)(**{name: array[steps] for name, array in self.arrays().items()})
 
+    def divided(self, parts: int) -> Iterator[Self]:
+        """Yield blocks of equal numbers of consecutive samples."""
+        count = len(self.time) // parts
+        return (self.taken(slice(part * count, (part + 1) * count)) for part in range(parts))
+
     def replaced(self, **arrays: AnyArray) -> Self:
         """Return a copy of the block with variables replaced or added."""
         return type(self)(**{**self.arrays(), **arrays})

@@ -6,14 +6,16 @@ The words of a path are keys of mappings. An entry of a list is given by its ind
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple, TypeVar
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple, Self, TypeVar
 
 from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.base.texts import on_one_line
 from vsacli.documents import tree
 from vsacli.documents.fields import Items, ItemsByName, PairOf, ValueKind, declared_fields, variant_inside
+from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_reader import read_value
 from vsacli.documents.record_values import entry_names
 from vsacli.documents.source import Problems
@@ -22,7 +24,7 @@ from vsacli.documents.tree import Scope
 ALL = "*"
 SIDES = ("0", "1")
 
-_Record = TypeVar("_Record")
+_Record = TypeVar("_Record", bound=DeclaredRecord)
 
 
 def find(content: Any, path: str) -> Any:
@@ -133,8 +135,7 @@ def replace(
             and the path to it.
     """
     scope = Scope(Problems(file), members or {}, exempt or {})
-    replaced: _Record = _Replacement(_node_of_value(value), scope).in_record(record, path.split("."), ())
-    return replaced
+    return _Replacements(scope).in_record(record, [_Change.of(path, value)], ())
 
 
 def replace_all(
@@ -144,14 +145,28 @@ def replace_all(
     exempt: Mapping[str, Mapping[str, str]] | None = None,
     file: str = "",
 ) -> _Record:
-    """Return a record with new values at several paths, replaced in turn; see `replace`.
+    """Return a record with new values at several paths; see `replace`.
 
-    Values that are refused are tried again after the others: keys that need each other, such as `gear_ratio`
-    and `side` of a motor, may be given in any order.
+    All are replaced at once, and each record is checked once. Where that is refused, they are replaced in
+    turn, and values that are refused are tried again after the others: keys that need each other, such as
+    `gear_ratio` and `side` of a motor, may be given in any order.
 
     Raises:
         ReplacementError: the first value that is refused, though the others are replaced.
     """
+    scope = Scope(Problems(file), members or {}, exempt or {})
+    with suppress(InputError):
+        return _Replacements(scope).in_record(record, [_Change.of(*each) for each in values.items()], ())
+    return _replace_in_turn(record, values, members, exempt, file)
+
+
+def _replace_in_turn(
+    record: _Record,
+    values: Mapping[str, Any],
+    members: Mapping[str, str] | None,
+    exempt: Mapping[str, Mapping[str, str]] | None,
+    file: str,
+) -> _Record:
     refused: dict[str, Any] = {}
     first = None
     for path, value in values.items():
@@ -164,7 +179,7 @@ def replace_all(
         return record
     if len(refused) == len(values):
         raise first
-    return replace_all(record, refused, members, exempt, file)
+    return _replace_in_turn(record, refused, members, exempt, file)
 
 
 def _node_of_value(value: Any) -> tree.Node:
@@ -182,61 +197,82 @@ def _node_of_value(value: Any) -> tree.Node:
     return tree.TextNode(0, "" if value is None else str(value), plain=True)
 
 
-class _Replacement(NamedTuple):
-    """A replacement for a value in a record, with the context of its meaning.
+class _Change(NamedTuple):
+    """A value to be replaced: the words of the rest of the path to it, and the replacement."""
 
-    Methods return a copy of their argument that contains the replacement. The words are the rest of the path;
-    the place is its beginning, for messages.
+    words: list[str]
+    node: tree.Node
+
+    @classmethod
+    def of(cls, path: str, value: Any) -> Self:
+        """Return the change of a value at a path."""
+        return cls(path.split("."), _node_of_value(value))
+
+    @property
+    def inside(self) -> _Change:
+        """The change as seen from where the first word leads to."""
+        return self._replace(words=self.words[1:])
+
+
+class _Replacements(NamedTuple):
+    """Replacements for values in a record, with the context of their meaning.
+
+    Methods return a copy of their argument that contains the replacements. The place is the beginning of the
+    paths, for messages. Changes of which one is inside another are refused.
     """
 
-    node: tree.Node
     scope: Scope
 
-    def in_record(self, record: Any, words: list[str], place: tuple[str, ...]) -> Any:
-        """Return a record with the replacement in it."""
-        word, *rest = words
+    def in_record(self, record: _Record, changes: Sequence[_Change], place: tuple[str, ...]) -> _Record:
+        """Return a record with the replacements in it."""
         cls: type = type(record)
         fields = declared_fields(cls)
-        if word not in fields:
-            raise _missing_word_error(word, fields, place)
-        kind = fields[word][0].kind
         chosen = getattr(record, getattr(cls, "unit_variant", ""), None)
         variant = variant_inside(cls, chosen, self.scope.variant)
-        inside = self._replace(scope=self.scope._replace(variant=variant))
-        content = inside.in_value(kind, getattr(record, word), rest, (*place, word))
+        inside, contents = _Replacements(self.scope._replace(variant=variant)), {}
+        for word, within in _by_first_word(changes).items():
+            if word not in fields:
+                raise _missing_word_error(word, fields, place)
+            kind = fields[word][0].kind
+            contents[word] = inside.in_value(kind, getattr(record, word), within, (*place, word))
         try:
-            return record.with_field(word, content)
+            return record.with_fields(contents)
         except InvalidRecordError as error:
             problems = [str(problem.in_units(variant).inside(*place)) for problem in error.fields]
             raise InputError(Problem("", 0, message) for message in problems) from None
 
-    def in_value(self, kind: ValueKind, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
-        """Return a value with the replacement in it, or the replacement itself at the end of the path."""
-        if not words:
-            return self._read_value(kind, place)
+    def in_value(
+        self, kind: ValueKind, content: Any, changes: Sequence[_Change], place: tuple[str, ...]
+    ) -> Any:
+        """Return a value with the replacements in it, or the replacement itself at the end of its path."""
+        words, node = changes[0]
+        if not all(each.words for each in changes):
+            _check_single(changes, place)
+            return self._read_value(kind, node, place)
         named = isinstance(kind, ItemsByName) and len(words) == 1 and words[0] != ALL
-        if named and isinstance(self.node, tree.MapNode):
-            return self._with_entry(kind, content or (), words[0], self.node, place)
+        if named and isinstance(node, tree.MapNode):
+            _check_single(changes, place)
+            return self._with_entry(kind, content or (), words[0], node, place)
         if content is None:
             raise InputError.one(f"there is nothing at {_dotted_path(place)}; replace it as a whole")
-        if isinstance(kind, PairOf) and words[0] not in SIDES:
-            return self._in_pair(kind, content, words, place)
+        if isinstance(kind, PairOf) and not any(each.words[0] in SIDES for each in changes):
+            return self._in_pair(kind, content, changes, place)
         if kind.item is not None:
-            return self._in_list(kind, kind.item, content, words, place)
+            return self._in_list(kind, kind.item, content, changes, place)
         if words == ["type"] and "" not in kind.records:
             reason = "the type cannot be changed alone, since each type has other keys"
-            example = f"'{_dotted_path(place)}={{type: {tree.plain(self.node)}, ...}}'"
+            example = f"'{_dotted_path(place)}={{type: {tree.plain(node)}, ...}}'"
             raise InputError.one(f"{_dotted_path(place)}.type: {reason}; give the whole mapping, {example}")
         if kind.records:
-            return self.in_record(content, words, place)
+            return self.in_record(content, changes, place)
         raise _missing_word_error(words[0], (), place)
 
-    def _read_value(self, kind: ValueKind, place: tuple[str, ...]) -> Any:
+    def _read_value(self, kind: ValueKind, node: tree.Node, place: tuple[str, ...]) -> Any:
         label, problems = _dotted_path(place), Problems(self.scope.problems.file)
-        if kind.records and not isinstance(kind, Items | PairOf) and isinstance(self.node, tree.TextNode):
+        if kind.records and not isinstance(kind, Items | PairOf) and isinstance(node, tree.TextNode):
             keys = dict.fromkeys(key for cls in kind.records.values() for key in declared_fields(cls))
             raise InputError.one(f"{label} is a mapping; set one of its keys: {', '.join(keys)}")
-        content = read_value(kind, self.node, label, self.scope._replace(problems=problems))
+        content = read_value(kind, node, label, self.scope._replace(problems=problems))
         try:
             problems.check()
         except InputError as error:
@@ -244,36 +280,45 @@ class _Replacement(NamedTuple):
             raise InputError(Problem("", 0, f"{label}: {message}") for message in messages) from None
         return content
 
-    def _in_pair(self, kind: PairOf, content: Any, words: list[str], place: tuple[str, ...]) -> Any:
+    def _in_pair(self, kind: PairOf, content: Any, changes: Sequence[_Change], place: tuple[str, ...]) -> Any:
         """Return both sides of a joint; equal sides stay one object."""
-        word, *rest = words
         if content[0] == content[1]:
-            both = self.in_value(kind.item, content[0], rest if word == ALL else words, place)
+            of_both = [each.inside if each.words[0] == ALL else each for each in changes]
+            both = self.in_value(kind.item, content[0], of_both, place)
             return both, both
-        if word != ALL:
-            choices = f"0, 1 or {ALL}, as in {_dotted_path((*place, '0', *words))}"
-            raise InputError.one(f"{_dotted_path(place)}: its two sides differ; say which by {choices}")
-        return self._in_list(kind, kind.item, content, words, place)
+        for words, _ in changes:
+            if words[0] != ALL:
+                choices = f"0, 1 or {ALL}, as in {_dotted_path((*place, '0', *words))}"
+                raise InputError.one(f"{_dotted_path(place)}: its two sides differ; say which by {choices}")
+        return self._in_list(kind, kind.item, content, changes, place)
 
     def _in_list(
-        self, kind: ValueKind, entry_kind: ValueKind, content: Any, words: list[str], place: tuple[str, ...]
+        self,
+        kind: ValueKind,
+        entry_kind: ValueKind,
+        content: Any,
+        changes: Sequence[_Change],
+        place: tuple[str, ...],
     ) -> Any:
-        """Return a list with the replacement in the entry that a word names, or in all entries."""
-        word, *rest = words
+        """Return a list with the replacements in the entries that words name, or in all entries."""
         names = entry_names(kind, content, self.scope.members)
-        indices = _indices(names)
-        if word != ALL and word not in indices:
-            raise _missing_word_error(word, indices, place)
-        entries = list(content)
-        if word != ALL and entries[indices[word]] is None:
-            exempt = self.scope.exempt.get(getattr(kind, "purpose", ""), {})
-            reason = exempt.get(names[indices[word]], "it has none")
-            raise InputError.one(f"{_dotted_path((*place, word))}: no value goes there: {reason}")
-        nonempty_indices = [index for index, entry in enumerate(entries) if entry is not None]
-        for index in nonempty_indices if word == ALL else [indices[word]]:
-            inside = self._replace(scope=self.scope.of_member(names[index]))
+        indices, entries = _indices(names), list(content)
+        by_index: dict[int, list[_Change]] = {}
+        for change in changes:
+            word = change.words[0]
+            if word != ALL and word not in indices:
+                raise _missing_word_error(word, indices, place)
+            if word != ALL and entries[indices[word]] is None:
+                exempt = self.scope.exempt.get(getattr(kind, "purpose", ""), {})
+                reason = exempt.get(names[indices[word]], "it has none")
+                raise InputError.one(f"{_dotted_path((*place, word))}: no value goes there: {reason}")
+            nonempty_indices = [index for index, entry in enumerate(entries) if entry is not None]
+            for index in nonempty_indices if word == ALL else [indices[word]]:
+                by_index.setdefault(index, []).append(change.inside)
+        for index, within in by_index.items():
+            inside = _Replacements(self.scope.of_member(names[index]))
             entry_place = (*place, names[index] or str(index))
-            entries[index] = inside.in_value(entry_kind, content[index], rest, entry_place)
+            entries[index] = inside.in_value(entry_kind, content[index], within, entry_place)
         return tuple(entries)
 
     def _with_entry(
@@ -285,5 +330,18 @@ class _Replacement(NamedTuple):
         name = word if index is None else names[index]
         entries = {key: tree.TextNode(0, name, plain=False), **mapping.entries}
         named = mapping._replace(entries=entries, key_lines={key: 0, **mapping.key_lines})
-        entry = self._replace(node=named)._read_value(kind.item or kind, (*place, name))
+        entry = self._read_value(kind.item or kind, named, (*place, name))
         return tuple({**dict(zip(names, content, strict=True)), name: entry}.values())
+
+
+def _by_first_word(changes: Iterable[_Change]) -> dict[str, list[_Change]]:
+    by_word: dict[str, list[_Change]] = {}
+    for change in changes:
+        by_word.setdefault(change.words[0], []).append(change.inside)
+    return by_word
+
+
+def _check_single(changes: Sequence[_Change], place: tuple[str, ...]) -> None:
+    """Refuse changes of a value of which one replaces it as a whole."""
+    if len(changes) > 1:
+        raise InputError.one(f"{_dotted_path(place)} and a part of it are replaced")

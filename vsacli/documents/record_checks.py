@@ -9,6 +9,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cache
+from itertools import chain
 from typing import Any, Self, TypeVar
 
 from vsacli.base.did_you_mean import did_you_mean
@@ -66,15 +67,17 @@ class DeclaredRecord:
         _refuse(record, record._problems())
         return record
 
-    def with_field(self, name: str, content: Any) -> Self:
-        """Return the record with another value of a field; the others, which were checked, are not again.
+    def with_fields(self, contents: Mapping[str, Any]) -> Self:
+        """Return the record with other values of some fields; the rest, which was checked, is not again.
 
         Raises:
-            InvalidRecordError: the value is invalid, or does not go with the others.
+            InvalidRecordError: a value is invalid, or does not go with the others.
         """
-        same = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # type: ignore[arg-type]  # records are dataclasses
-        record = construct_unchecked(type(self), {**same, name: content})
-        _refuse(record, _problems_of_field(declared_fields(type(self))[name], name, content))
+        same = {name: getattr(self, name) for name in _defaults(type(self))}
+        record = construct_unchecked(type(self), {**same, **contents})
+        fields = declared_fields(type(self))
+        by_field = (_problems_of_field(fields[name], name, content) for name, content in contents.items())
+        _refuse(record, chain.from_iterable(by_field))
         _refuse(record, record._problems())
         return record
 

@@ -325,12 +325,13 @@ class RunEnergy:
         """Return the losses in the intervals of all variants, (..., variants, intervals)."""
         if not self._losses:
             return None
-        count = len(block.time) // len(self._losses)
-        parts = (slice(number * count, (number + 1) * count) for number in range(len(self._losses)))
-        lost = [meter.add(block.taken(part)) for meter, part in zip(self._losses, parts, strict=True)]
-        return LostEnergy(
-            *(None if each[0] is None else np.stack(each, axis=-2) for each in zip(*lost, strict=True))
+        of_variants = zip(self._losses, block.divided(len(self._losses)), strict=True)
+        lost = [meter.add(own) for meter, own in of_variants]
+        friction, dissipated, copper = (
+            [each for each in of_kind if each is not None] for of_kind in zip(*lost, strict=True)
         )
+        heat = np.stack(copper, axis=-2) if copper else None
+        return LostEnergy(np.stack(friction, axis=-2), np.stack(dissipated, axis=-2), heat)
 
     def _add_flow(self, before: _Steps, after: _Steps, lost: LostEnergy | None) -> FloatArray:
         """Add the flow from samples to the next ones; return the work of motors until these."""

@@ -15,12 +15,16 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.rows import RowKernel, RowLayout
-from vsacli.compute.vector import Scalar
+from vsacli.compute.vector import Scalar, trigonometric
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, number_at, with_numbers
 
 PARAMETERS = "parameters"
 """Name of the rows with the varied numbers, behind those of the kernel itself."""
+
+
+TURNED = frozenset(("alpha", "rpy"))
+"""Words of paths to angles of the geometry."""
 
 
 class RobotKernel(Protocol):
@@ -122,11 +126,15 @@ class Variants:
 def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> Robot | None:
     """Return the robot with each varied number as in `varied`; None if it lacks one of them.
 
+    It is also None if a twist is a multiple of a right angle: its zeros and ones are exact only as constants.
     Robots for which this returns equal robots can be variants of each other.
     """
     try:
         structure = with_numbers(robot, varied, [number.value for number in varied])
         own = [number_at(robot, number.path) for number in varied]
     except (AttributeError, IndexError, TypeError):  # the robot has another record at a path
+        return None
+    twists = (value for number, value in zip(varied, own, strict=True) if not TURNED.isdisjoint(number.path))
+    if any(type(trigonometric(name, twist)) is int for twist in twists for name in ("cos", "sin")):
         return None
     return structure if with_numbers(structure, varied, own) == robot else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import ClassVar, NamedTuple
@@ -13,12 +13,16 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import scipy
 
+from vsacli.analysis.run_dynamics import RunDynamics
+from vsacli.analysis.variant_groups import BATCH_SAMPLES, PreparedRun, batches, numbers_as_rows
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has_flag
 from vsacli.base.json_records import Published, named
 from vsacli.base.units import Quantity
+from vsacli.base.variables import Block
+from vsacli.compute.engine import choose
 from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import LARGEST
@@ -239,29 +243,54 @@ def monte_carlo(
         InputError: the tolerances are so large that every drawn robot is invalid.
     """
     trajectory, random = adapt_trajectory(robot, trajectory), np.random.default_rng(seed)
-    sums = _Sums(trajectory.samples, len(robot.joints))
-    refused = 0
-    for _ in range(runs):
-        drawn = {
-            str(each): each.value + tolerance.drawn(random)
-            for each, tolerance in zip(chosen, tolerances, strict=True)
-            if tolerance is not None
-        }
-        try:
-            sums.add(*_run_torques(robot.replace(drawn), trajectory))
-        except InputError as error:
-            refused += 1
-            if refused == runs:
-                raise InputError.one(
-                    f"none of {runs} drawn robots is valid; choose smaller tolerances: {error}"
-                ) from None
-        progress(1)
+    uncertain = [(each, of_it) for each, of_it in zip(chosen, tolerances, strict=True) if of_it is not None]
+    varied = numbers_as_rows(robot, trajectory, [parameter for parameter, _ in uncertain])
+    kernel_samples = runs * trajectory.samples
+    together = max(1, BATCH_SAMPLES // trajectory.samples)
+    sums, refused = _Sums(trajectory.samples, len(robot.joints)), 0
+    for first in range(0, runs, together):
+        robots = list[Robot]()
+        for _ in range(first, min(first + together, runs)):
+            values = {str(each): each.value + tolerance.drawn(random) for each, tolerance in uncertain}
+            try:
+                robots.append(robot.replace(values))
+            except InputError as error:
+                refused += 1
+                if refused == runs:
+                    advice = f"none of {runs} drawn robots is valid; choose smaller tolerances"
+                    raise InputError.one(f"{advice}: {error}") from None
+        for torque, lost in _torques_of_robots(robots, trajectory, varied, kernel_samples):
+            sums.add(torque, lost)
+        progress(min(together, runs - first))
     return MonteCarlo(
         drawn=runs,
         refused=refused,
         lost=dict(zip(robot.joint_names, sums.lost.tolist(), strict=True)),
         torque=dict(zip(robot.joint_names, sums.deviation.tolist(), strict=True)),
     )
+
+
+def _torques_of_robots(
+    robots: Sequence[Robot], trajectory: Trajectory, varied: Sequence[Parameter], kernel_samples: int
+) -> Iterator[tuple[FloatArray, BoolArray]]:
+    """Yield the values of `_run_torques` of each robot; those that differ in varied numbers run together."""
+    torques = dict[int, tuple[FloatArray, BoolArray]]()
+    for variants, members in batches([PreparedRun(each, trajectory) for each in robots], varied):
+        if len(members) == 1:
+            torques[members[0]] = _run_torques(variants.robots[0], trajectory)
+            continue
+        dynamics = RunDynamics(variants, [trajectory] * len(members))
+        dynamics.engine = choose("numpy", dynamics.kernel, kernel_samples).engine
+        block = dynamics.compute(dynamics.motion(0, trajectory.samples))
+        for index, own in zip(members, block.divided(len(members)), strict=True):
+            torques[index] = own.tau_motor, _failed_joints(own)
+    yield from (torques[index] for index in range(len(robots)))
+
+
+def _failed_joints(block: Block) -> BoolArray:
+    """Return a mask of joints with an infeasible or singular sample, (joints,)."""
+    failed: BoolArray = np.any(has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR), axis=0)
+    return failed
 
 
 def _run_torques(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:
@@ -271,9 +300,7 @@ def _run_torques(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, Bool
         compute_block(robot, trajectory.block(start, start + size))
         for start in range(0, trajectory.samples, size)
     ]
-    lost = np.any(
-        [has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=0) for block in blocks], axis=0
-    )
+    lost = np.any([_failed_joints(block) for block in blocks], axis=0)
     return np.concatenate([block.tau_motor for block in blocks]), lost
 
 

@@ -145,7 +145,7 @@ class Executor(ABC):
         except Exception as error:
             how = self.reason(future, error)
             if len(runs) == 1:
-                return [lost(self._study, *runs, how)]
+                return [lost(self._study, runs[0], how)]
             self._apart.update(runs)
             waiting.extendleft(reversed(runs))
             return []

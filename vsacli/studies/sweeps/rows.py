@@ -189,9 +189,8 @@ class Computer:
         )
         recorders = [Recorder(study.over_time, study.file.every) for _ in prepared]
         for block in batch:
-            count = len(block.time) // len(prepared)
-            for number, recorder in enumerate(recorders):
-                recorder.add(block.taken(slice(number * count, (number + 1) * count)))
+            for recorder, own in zip(recorders, block.divided(len(prepared)), strict=True):
+                recorder.add(own)
         reports = map(batch.findings, range(len(prepared)))
         return [
             Row(

@@ -1,0 +1,149 @@
+"""Runs of a batch are what each is alone: robots that differ in numbers, along motions of any duration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from samples.marks import slow_but
+from samples.robots import vsa_3r
+from samples.shipped import shipped_run
+from samples.trees import tree_run
+from samples.valid_runs import valid_run
+
+from vsacli import Trajectory
+from vsacli.analysis.batch import Batch
+from vsacli.analysis.run import Run
+from vsacli.analysis.variant_groups import PreparedRun, batches, numbers_as_rows
+from vsacli.base.json_records import JsonObject
+from vsacli.base.variables import Block
+from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter, parameters, with_numbers
+from vsacli.trajectory.times import UniformTimes
+
+VARIANTS = 5
+PEAK_SHARE = 1e-13
+"""Deviation of a variable, relative to its peak: exact zeros and ones of constants are computed as rows."""
+
+
+def drawn_run(seed: int) -> tuple[Robot, Trajectory]:
+    """A chain or tree with actuators of any kind, prismatic joints and wrenches among them."""
+    if seed % 2:
+        return valid_run(seed)
+    robot, motion = tree_run(seed, joints=2 + seed % 5)
+    return robot, motion.trajectory(robot)
+
+
+def drawn_variants(
+    robot: Robot, trajectory: Trajectory, seed: int
+) -> tuple[list[PreparedRun], Sequence[Parameter]]:
+    """Robots with other values of some numbers, and motions of other durations with as many samples."""
+    rng = np.random.default_rng(seed)
+    available = parameters(robot)
+    chosen = [available[place] for place in rng.permutation(len(available))[:8]]
+    varied = numbers_as_rows(robot, trajectory, chosen)
+    runs = []
+    for _ in range(VARIANTS):
+        values = [each.value * (1 + 0.02 * rng.standard_normal()) for each in varied]
+        runs.append(
+            PreparedRun(with_numbers(robot, varied, values), stretched(trajectory, rng.choice([1, 1.5])))
+        )
+    return runs, varied
+
+
+def stretched(trajectory: Trajectory, factor: float) -> Trajectory:
+    """The motion in another duration, with as many samples."""
+    times = UniformTimes(
+        factor * trajectory.duration, (trajectory.samples - 1) / trajectory.duration / factor
+    )
+    changed = trajectory.changed(lambda _, profile: profile.stretched(factor), times)
+    assert changed.samples == trajectory.samples
+    return changed
+
+
+def assert_equal_blocks(one: Block, other: Block) -> None:
+    assert np.array_equal(one.flags, other.flags)
+    for name, array in one.arrays().items():
+        alone = getattr(other, name)
+        peak = np.max(np.abs(alone), where=np.isfinite(alone), initial=0.0)
+        np.testing.assert_allclose(array, alone, rtol=0, atol=PEAK_SHARE * peak, err_msg=name)
+
+
+def assert_equal_reports(one: JsonObject, other: JsonObject) -> None:
+    """The reports of JSON, whose numbers may differ by rounding; without the residuals of the self-check."""
+    if isinstance(other, dict):
+        assert one.keys() == other.keys()
+        for key in other.keys() - {"self_check"}:
+            assert_equal_reports(one[key], other[key])
+    elif isinstance(other, list):
+        assert len(one) == len(other)
+        for pair in zip(one, other, strict=True):
+            assert_equal_reports(*pair)
+    elif isinstance(other, float):
+        # A margin is a difference of stiffnesses, and so known to their rounding.
+        assert one == pytest.approx(other, rel=1e-11, abs=1e-12, nan_ok=True)
+    else:
+        assert one == other
+
+
+@pytest.mark.cases(8)
+@pytest.mark.parametrize("seed", slow_but([1, 2], range(40)))
+def test_a_batch_gives_what_each_run_gives(seed: int) -> None:
+    robot, trajectory = drawn_run(seed)
+    runs, varied = drawn_variants(robot, trajectory, seed)
+    for variants, members in batches(runs, varied):
+        batch = Batch(variants, [runs[index].trajectory for index in members])
+        (block,) = batch
+        for number, (index, own) in enumerate(zip(members, block.divided(len(members)), strict=True)):
+            alone = Run(*runs[index], block_samples=10**6)
+            (expected,) = alone
+            assert_equal_blocks(own, expected)
+            assert_equal_reports(batch.findings(number).as_json(), alone.findings(0).as_json())
+
+
+def test_variants_are_one_batch_and_other_structures_their_own() -> None:
+    robot, trajectory = vsa_3r(), shipped_run("vsa_3r", "rest_to_rest")[1]
+    heavy, limited = (
+        robot.replace("joints.elbow.link.mass", 4),
+        robot.replace("joints.elbow.actuator.motor.max_torque", 300),
+    )
+    varied = numbers_as_rows(robot, trajectory, parameters(robot, ["joints.*.link.mass"]))
+    coarse = trajectory.sampled(UniformTimes(trajectory.duration, 100))
+    runs = [PreparedRun(each, coarse) for each in (robot, limited, heavy)]
+    found = list(batches([*runs, PreparedRun(robot, trajectory)], varied))
+    assert [members for _, members in found] == [[0, 2], [1], [3]]
+
+
+@pytest.mark.parametrize(
+    ("robot", "path"),
+    [
+        ("maccepa_1r", "joints.elbow.actuator.mechanism.k"),  # enters tables
+        ("planar_2r", "joints.shoulder.actuator.motor.gear_ratio"),  # its sign decides
+    ],
+)
+def test_numbers_that_decide_on_the_equations_are_no_rows(robot: str, path: str) -> None:
+    arm, trajectory = shipped_run(robot, robot)
+    chosen = parameters(arm, [path, "joints.*.link.mass"])
+    assert path not in map(str, numbers_as_rows(arm, trajectory, chosen))
+    assert len(numbers_as_rows(arm, trajectory, chosen)) == len(chosen) - 1
+
+
+def test_a_right_angle_is_exact_only_alone() -> None:
+    robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
+    varied = numbers_as_rows(robot, trajectory, parameters(robot, ["joints.base.dh.alpha"]))
+    robots = [robot.replace("joints.base.dh.alpha", angle) for angle in ("89 deg", "90 deg", "91 deg")]
+    found = batches([PreparedRun(each, trajectory) for each in robots], varied)
+    assert [members for _, members in found] == [[0, 2], [1]]
+
+
+def test_a_recorded_motion_is_alone() -> None:
+    robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
+    times = np.linspace(0, trajectory.duration, 401)
+    motion = trajectory.at(times)
+    noise = 1e-5 * np.random.default_rng(0).standard_normal(motion.q.shape)
+    recorded = Trajectory.from_samples(times, motion.q + noise, motion.commanded["stiffness"], fit="smooth")
+    masses = parameters(robot, ["joints.*.link.mass"])
+    assert numbers_as_rows(robot, recorded, masses) == ()
+    runs = [PreparedRun(robot, recorded)] * 2
+    assert [members for _, members in batches(runs, masses)] == [[0], [1]]
