@@ -153,8 +153,8 @@ class Batch:
         if self._tools is not None:
             block = self._tools.add(block)
         self._check.add(block)
-        for variant, own in enumerate(block.divided(len(self.variants))):
-            self._summarize(variant, own, [each.where(each.variant == variant) for each in between])
+        for variant, part in enumerate(block.divided(len(self.variants))):
+            self._summarize(variant, part, [each.where(each.variant == variant) for each in between])
         self._samples += len(block.time) // len(self.variants)
         return self._without_balances(block)
 

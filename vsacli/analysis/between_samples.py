@@ -180,9 +180,11 @@ class MinimaSearch:
         if not self._least_between[variant]:
             return reports
         at_steps, sides = np.full(len(self.quantities), np.inf), self._sides
-        own = np.arange(sides.count) + variant * sides.count
+        of_variant = np.arange(sides.count) + variant * sides.count
         np.minimum.at(
-            at_steps, sides.quantity[: sides.count], sides.clearance(own, self._least_at_steps[own])
+            at_steps,
+            sides.quantity[: sides.count],
+            sides.clearance(of_variant, self._least_at_steps[of_variant]),
         )
         nearest_last = sorted(
             self._least_between[variant].items(), reverse=True, key=lambda entry: entry[1][0]

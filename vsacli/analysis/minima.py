@@ -237,8 +237,8 @@ class SampledFunctions(NamedTuple):
             return np.searchsorted(self.time, time)
         places = np.empty(len(time), dtype=np.intp)
         for number in set(function.tolist()):
-            own = function == number
-            places[own] = np.searchsorted(self.time[number], time[own])
+            of_number = function == number
+            places[of_number] = np.searchsorted(self.time[number], time[of_number])
         return places
 
     def times(self, function: IndexArray, place: IndexArray) -> FloatArray:

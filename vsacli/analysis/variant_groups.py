@@ -1,4 +1,4 @@
-"""Which numbers of a robot can be rows of the kernel, and which runs can be one batch.
+"""Numbers of a robot that can be rows of the kernel, and runs that can be one batch.
 
 A number can be a row if it enters elementwise arithmetic alone. One that decides which operations there are,
 or goes into tables computed before, cannot: NumPy refuses an array where a single value is needed. Results
@@ -76,8 +76,8 @@ def _can_be_rows(robot: Robot, trajectory: Trajectory, numbers: Sequence[Paramet
         )
         if _limits(robots[0]) != _limits(robots[1]):
             return False
-        rows = _trial(Variants(robots, robot, tuple(numbers)), trajectory)
-        constants = [_trial(Variants.of_one(each), trajectory) for each in robots]
+        rows = _at_trial_times(Variants(robots, robot, tuple(numbers)), trajectory)
+        constants = [_at_trial_times(Variants.of_one(each), trajectory) for each in robots]
         return all(_agree(rows.taken(slice(place, None, 2)), each) for place, each in enumerate(constants))
     return False
 
@@ -86,7 +86,7 @@ def _limits(robot: Robot) -> list[list[LimitCheck]]:
     return [limit_checks(joint) for joint in robot.joints]
 
 
-def _trial(variants: Variants, trajectory: Trajectory) -> Block:
+def _at_trial_times(variants: Variants, trajectory: Trajectory) -> Block:
     """Return the variables of variants at some times of a trajectory, the variants at each time in turn."""
     count = len(variants)
     times = trajectory.start + trajectory.duration * (np.arange(TRIAL_TIMES) + 0.5) / TRIAL_TIMES

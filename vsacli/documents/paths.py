@@ -135,7 +135,7 @@ def replace(
             and the path to it.
     """
     scope = Scope(Problems(file), members or {}, exempt or {})
-    return _Replacements(scope).in_record(record, [_Change.of(path, value)], ())
+    return _Replacements(scope).in_record(record, [_NewValue.of(path, value)], ())
 
 
 def replace_all(
@@ -156,7 +156,7 @@ def replace_all(
     """
     scope = Scope(Problems(file), members or {}, exempt or {})
     with suppress(InputError):
-        return _Replacements(scope).in_record(record, [_Change.of(*each) for each in values.items()], ())
+        return _Replacements(scope).in_record(record, [_NewValue.of(*each) for each in values.items()], ())
     return _replace_in_turn(record, values, members, exempt, file)
 
 
@@ -197,7 +197,7 @@ def _node_of_value(value: Any) -> tree.Node:
     return tree.TextNode(0, "" if value is None else str(value), plain=True)
 
 
-class _Change(NamedTuple):
+class _NewValue(NamedTuple):
     """A value to be replaced: the words of the rest of the path to it, and the replacement."""
 
     words: list[str]
@@ -209,7 +209,7 @@ class _Change(NamedTuple):
         return cls(path.split("."), _node_of_value(value))
 
     @property
-    def inside(self) -> _Change:
+    def inside(self) -> _NewValue:
         """The change as seen from where the first word leads to."""
         return self._replace(words=self.words[1:])
 
@@ -223,7 +223,7 @@ class _Replacements(NamedTuple):
 
     scope: Scope
 
-    def in_record(self, record: _Record, changes: Sequence[_Change], place: tuple[str, ...]) -> _Record:
+    def in_record(self, record: _Record, changes: Sequence[_NewValue], place: tuple[str, ...]) -> _Record:
         """Return a record with the replacements in it."""
         cls: type = type(record)
         fields = declared_fields(cls)
@@ -242,7 +242,7 @@ class _Replacements(NamedTuple):
             raise InputError(Problem("", 0, message) for message in problems) from None
 
     def in_value(
-        self, kind: ValueKind, content: Any, changes: Sequence[_Change], place: tuple[str, ...]
+        self, kind: ValueKind, content: Any, changes: Sequence[_NewValue], place: tuple[str, ...]
     ) -> Any:
         """Return a value with the replacements in it, or the replacement itself at the end of its path."""
         words, node = changes[0]
@@ -280,7 +280,9 @@ class _Replacements(NamedTuple):
             raise InputError(Problem("", 0, f"{label}: {message}") for message in messages) from None
         return content
 
-    def _in_pair(self, kind: PairOf, content: Any, changes: Sequence[_Change], place: tuple[str, ...]) -> Any:
+    def _in_pair(
+        self, kind: PairOf, content: Any, changes: Sequence[_NewValue], place: tuple[str, ...]
+    ) -> Any:
         """Return both sides of a joint; equal sides stay one object."""
         if content[0] == content[1]:
             of_both = [each.inside if each.words[0] == ALL else each for each in changes]
@@ -297,13 +299,13 @@ class _Replacements(NamedTuple):
         kind: ValueKind,
         entry_kind: ValueKind,
         content: Any,
-        changes: Sequence[_Change],
+        changes: Sequence[_NewValue],
         place: tuple[str, ...],
     ) -> Any:
         """Return a list with the replacements in the entries that words name, or in all entries."""
         names = entry_names(kind, content, self.scope.members)
         indices, entries = _indices(names), list(content)
-        by_index: dict[int, list[_Change]] = {}
+        by_index: dict[int, list[_NewValue]] = {}
         for change in changes:
             word = change.words[0]
             if word != ALL and word not in indices:
@@ -334,14 +336,14 @@ class _Replacements(NamedTuple):
         return tuple({**dict(zip(names, content, strict=True)), name: entry}.values())
 
 
-def _by_first_word(changes: Iterable[_Change]) -> dict[str, list[_Change]]:
-    by_word: dict[str, list[_Change]] = {}
+def _by_first_word(changes: Iterable[_NewValue]) -> dict[str, list[_NewValue]]:
+    by_word: dict[str, list[_NewValue]] = {}
     for change in changes:
         by_word.setdefault(change.words[0], []).append(change.inside)
     return by_word
 
 
-def _check_single(changes: Sequence[_Change], place: tuple[str, ...]) -> None:
+def _check_single(changes: Sequence[_NewValue], place: tuple[str, ...]) -> None:
     """Refuse changes of a value of which one replaces it as a whole."""
     if len(changes) > 1:
         raise InputError.one(f"{_dotted_path(place)} and a part of it are replaced")

@@ -73,8 +73,7 @@ class DeclaredRecord:
         Raises:
             InvalidRecordError: a value is invalid, or does not go with the others.
         """
-        same = {name: getattr(self, name) for name in _defaults(type(self))}
-        record = construct_unchecked(type(self), {**same, **contents})
+        record = replaced_unchecked(self, contents)
         fields = declared_fields(type(self))
         by_field = (_problems_of_field(fields[name], name, content) for name, content in contents.items())
         _refuse(record, chain.from_iterable(by_field))
@@ -99,6 +98,12 @@ def construct_unchecked(cls: type[_Record], values: Mapping[str, Any]) -> _Recor
     record = object.__new__(cls)
     vars(record).update(_defaults(cls), **values)
     return record
+
+
+def replaced_unchecked(record: _Record, contents: Mapping[str, Any]) -> _Record:
+    """Return a record with other values in some fields, without its checks and cached values."""
+    same = {name: getattr(record, name) for name in _defaults(type(record))}
+    return construct_unchecked(type(record), {**same, **contents})
 
 
 _defaults: Callable[[type], Mapping[str, Any]] = cache(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -26,7 +26,9 @@ from vsacli.documents.fields import (
     declared_fields,
     variant_inside,
 )
-from vsacli.documents.record_checks import DeclaredRecord
+from vsacli.documents.record_checks import DeclaredRecord, replaced_unchecked
+
+_Record = TypeVar("_Record")
 
 
 class ResolvedField(NamedTuple):
@@ -223,3 +225,39 @@ def entry_names(kind: ValueKind, content: Any, members: Mapping[str, str]) -> li
     if isinstance(kind, PerJoint) and members:
         return list(members)
     return [getattr(entry, "name", "") if isinstance(kind, Items) else "" for entry in content]
+
+
+def with_scalars(record: _Record, scalars: Sequence[tuple[NumberPath, Any]]) -> _Record:
+    """Return a record with scalars of any kind at paths, unchecked; at both sides of an equal pair."""
+    return _with_scalars(record, scalars) if scalars else record
+
+
+def _with_scalars(content: Any, entries: Sequence[tuple[NumberPath, Any]]) -> Any:
+    path, scalar = entries[0]
+    step = path[0] if path else ""
+    if isinstance(content, tuple) and not isinstance(step, PathIndex):
+        return (_with_scalars(content[0], entries),) * len(content)
+    if not path:
+        return scalar
+    inside: dict[Any, list[tuple[NumberPath, Any]]] = {}
+    for (first, *rest), entry in entries:
+        key = first.number if isinstance(first, PathIndex) else first
+        inside.setdefault(key, []).append((tuple(rest), entry))
+    if isinstance(content, tuple):
+        return tuple(
+            _with_scalars(entry, inside[index]) if index in inside else entry
+            for index, entry in enumerate(content)
+        )
+    return replaced_unchecked(
+        content, {word: _with_scalars(getattr(content, word), entries) for word, entries in inside.items()}
+    )
+
+
+def number_at(record: Any, path: NumberPath) -> float:
+    """Return the number at a path, that of the first side of an equal pair."""
+    content = record
+    for step in path:
+        if isinstance(content, tuple) and not isinstance(step, PathIndex):
+            content = content[0]
+        content = content[step.number] if isinstance(step, PathIndex) else getattr(content, step)
+    return float(content[0] if isinstance(content, tuple) else content)

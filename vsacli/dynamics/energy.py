@@ -150,10 +150,10 @@ class EnergyMeter:
             robot: Robot.
             variant: Its index in a batch; None without an axis of variants.
         """
-        own = ... if variant is None else (..., variant)
+        place = ... if variant is None else (..., variant)
         has_motor = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
-        totals = {name: total[own] for name, total in self._layout.arrays(np.asarray(self._totals)).items()}
-        works = np.asarray(self._work)[own], totals["spent"]
+        totals = {name: total[place] for name, total in self._layout.arrays(np.asarray(self._totals)).items()}
+        works = np.asarray(self._work)[place], totals["spent"]
         work, spent = (np.sum(total, axis=1, where=has_motor) for total in works)
         duration = float(totals["intervals"])
         shared = [joint.actuator.co_contracts for joint in robot.joints]
@@ -161,7 +161,7 @@ class EnergyMeter:
             np.where(shared, _mean_root(totals[name], duration), np.nan)
             for name in ("co_contraction", "load")
         ]
-        energies = np.array((np.asarray(self._peak)[own], spent, spent - work, *efforts))
+        energies = np.array((np.asarray(self._peak)[place], spent, spent - work, *efforts))
         lost = zip(_dissipated_energies(robot, totals), _copper_losses(robot, totals), strict=True)
         return [
             replace(JointEnergy(*each), dissipated=dissipated, copper_loss=copper_loss)
@@ -326,7 +326,7 @@ class RunEnergy:
         if not self._losses:
             return None
         of_variants = zip(self._losses, block.divided(len(self._losses)), strict=True)
-        lost = [meter.add(own) for meter, own in of_variants]
+        lost = [meter.add(part) for meter, part in of_variants]
         friction, dissipated, copper = (
             [each for each in of_kind if each is not None] for of_kind in zip(*lost, strict=True)
         )

@@ -9,15 +9,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import Scalar, trigonometric
+from vsacli.documents.record_values import number_at, with_scalars
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, number_at, with_numbers
+
+if TYPE_CHECKING:
+    from vsacli.robot.parameters import Parameter
 
 PARAMETERS = "parameters"
 """Name of the rows with the varied numbers, behind those of the kernel itself."""
@@ -75,7 +78,7 @@ class VariantKernel(RowKernel, Generic[_Kernel]):
     def __call__(self, rows: Sequence[Scalar]) -> Sequence[Scalar]:
         """Compute with the numbers of each sample."""
         first = len(rows) - len(self.varied)
-        robot = with_numbers(self.robot, self.varied, rows[first:])
+        robot = _with_values(self.robot, self.varied, rows[first:])
         return self.kernel.of_robot(robot)(rows[:first])
 
 
@@ -117,7 +120,7 @@ class Variants:
 
     def robot_over(self, variant: IndexArray) -> Robot:
         """Return a robot whose varied numbers are rows, (samples,), from the variant of each sample."""
-        return with_numbers(self.base, self.varied, self._rows(variant))
+        return _with_values(self.base, self.varied, self._rows(variant))
 
     def _rows(self, variant: IndexArray) -> Sequence[FloatArray]:
         return list(np.ascontiguousarray(self.values[:, variant]))
@@ -130,11 +133,17 @@ def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> Robot | None:
     Robots for which this returns equal robots can be variants of each other.
     """
     try:
-        structure = with_numbers(robot, varied, [number.value for number in varied])
-        own = [number_at(robot, number.path) for number in varied]
+        structure = _with_values(robot, varied, [number.value for number in varied])
+        values = [number_at(robot, number.path) for number in varied]
     except (AttributeError, IndexError, TypeError):  # the robot has another record at a path
         return None
-    twists = (value for number, value in zip(varied, own, strict=True) if not TURNED.isdisjoint(number.path))
+    twists = (
+        value for number, value in zip(varied, values, strict=True) if not TURNED.isdisjoint(number.path)
+    )
     if any(type(trigonometric(name, twist)) is int for twist in twists for name in ("cos", "sin")):
         return None
-    return structure if with_numbers(structure, varied, own) == robot else None
+    return structure if _with_values(structure, varied, values) == robot else None
+
+
+def _with_values(robot: Robot, varied: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
+    return with_scalars(robot, [(number.path, value) for number, value in zip(varied, values, strict=True)])

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from fnmatch import fnmatchcase
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 from vsacli.base.did_you_mean import MOST_NEAR, nearest
 from vsacli.base.errors import InputError
 from vsacli.base.units import Quantity
 from vsacli.compute.duals import seeds
 from vsacli.compute.vector import Scalar
-from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
-from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex, numbers_in_record
+from vsacli.documents.record_checks import replaced_unchecked
+from vsacli.documents.record_values import (
+    NumberAtPath,
+    NumberPath,
+    PathIndex,
+    numbers_in_record,
+    with_scalars,
+)
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
@@ -22,8 +27,6 @@ JOINTS = "joints"
 LIMITS, LARGEST, OF_DAMPER = "limits", "max_", ("damper", "range")
 """Words of paths to numbers that bound results but change none, and so are no parameters: those under
 `limits`, the range of a damper, and names that begin with `max_`."""
-
-_Record = TypeVar("_Record", bound=DeclaredRecord)
 
 
 class Parameter(NamedTuple):
@@ -153,54 +156,14 @@ def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:
 
 
 def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
-    """Return a robot with other values of some numbers, which may be scalars of any kind.
+    """Return a robot with other values of some parameters, which may be scalars of any kind.
 
-    Rows of samples among them are one value for each sample, see `vsacli.robot.variants`. Records on the
-    paths are made without their checks, so the robot cannot be checked or written to a file.
+    Rows of samples among them are one value for each sample. Records on the paths are made without their
+    checks, so the robot cannot be checked or written to a file.
     """
-    entries = [(number.path, scalar) for number, scalar in zip(chosen, values, strict=True)]
-    return _with_scalars(robot, entries) if entries else robot
-
-
-def _with_scalars(content: Any, entries: Sequence[tuple[NumberPath, Scalar]]) -> Any:
-    """Return a record, list or number with scalars at paths, or at both sides of an equal pair."""
-    path, scalar = entries[0]
-    step = path[0] if path else ""
-    if isinstance(content, tuple) and not isinstance(step, PathIndex):
-        return (_with_scalars(content[0], entries),) * len(content)
-    if not path:
-        return scalar
-    inside: dict[Any, list[tuple[NumberPath, Scalar]]] = {}
-    for (first, *rest), entry in entries:
-        key = first.number if isinstance(first, PathIndex) else first
-        inside.setdefault(key, []).append((tuple(rest), entry))
-    if isinstance(content, tuple):
-        return tuple(
-            _with_scalars(entry, inside[index]) if index in inside else entry
-            for index, entry in enumerate(content)
-        )
-    return _replace_unchecked(
-        content, {word: _with_scalars(getattr(content, word), entries) for word, entries in inside.items()}
-    )
-
-
-def number_at(robot: Robot, path: NumberPath) -> float:
-    """Return the number at a path, that of the first side of an equal pair."""
-    content: Any = robot
-    for step in path:
-        if isinstance(content, tuple) and not isinstance(step, PathIndex):
-            content = content[0]
-        content = content[step.number] if isinstance(step, PathIndex) else getattr(content, step)
-    return float(content[0] if isinstance(content, tuple) else content)
+    return with_scalars(robot, [(number.path, scalar) for number, scalar in zip(chosen, values, strict=True)])
 
 
 def with_copied_actuator(joint: Joint) -> Joint:
     """Return the joint with its own copy of the actuator, which several robots may share."""
-    return _replace_unchecked(joint, {"actuator": _replace_unchecked(joint.actuator, {})})
-
-
-def _replace_unchecked(record: _Record, contents: Mapping[str, Any]) -> _Record:
-    """Return a record with other values in some fields, without its checks and cached values."""
-    fields = dataclasses.fields(record)  # type: ignore[arg-type]  # records are dataclasses
-    same = {field.name: getattr(record, field.name) for field in fields}
-    return construct_unchecked(type(record), {**same, **contents})
+    return replaced_unchecked(joint, {"actuator": replaced_unchecked(joint.actuator, {})})

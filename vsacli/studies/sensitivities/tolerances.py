@@ -282,8 +282,8 @@ def _torques_of_robots(
         dynamics = RunDynamics(variants, [trajectory] * len(members))
         dynamics.engine = choose("numpy", dynamics.kernel, kernel_samples).engine
         block = dynamics.compute(dynamics.motion(0, trajectory.samples))
-        for index, own in zip(members, block.divided(len(members)), strict=True):
-            torques[index] = own.tau_motor, _failed_joints(own)
+        for index, part in zip(members, block.divided(len(members)), strict=True):
+            torques[index] = part.tau_motor, _failed_joints(part)
     yield from (torques[index] for index in range(len(robots)))
 
 

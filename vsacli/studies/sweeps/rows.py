@@ -189,8 +189,8 @@ class Computer:
         )
         recorders = [Recorder(study.over_time, study.file.every) for _ in prepared]
         for block in batch:
-            for recorder, own in zip(recorders, block.divided(len(prepared)), strict=True):
-                recorder.add(own)
+            for recorder, part in zip(recorders, block.divided(len(prepared)), strict=True):
+                recorder.add(part)
         reports = map(batch.findings, range(len(prepared)))
         return [
             Row(
