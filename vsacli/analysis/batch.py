@@ -198,7 +198,7 @@ class Batch:
     def _self_checks(self) -> list[SelfCheck]:
         return self._check.outcomes()
 
-    def findings(self, variant: int) -> Report:
+    def findings(self, variant: int = 0) -> Report:
         """Return the report on the run of a variant without the warnings and notes, which take longer.
 
         It has the self-check of the whole run.

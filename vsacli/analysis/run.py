@@ -46,7 +46,7 @@ class Run(Batch):
 
     def report(self) -> Report:
         """Return the report on the blocks so far, with the self-check of the whole run."""
-        report = self.findings(0)
+        report = self.findings()
         undetermined = any(
             joint.uncertainty is not None and joint.uncertainty.undetermined for joint in report.joints
         )

@@ -293,7 +293,7 @@ def _undetermined(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
     if trajectory.estimates:
         run = Run(robot, trajectory)
         deque(run, maxlen=0)
-        for joint in run.report().joints:
+        for joint in run.findings().joints:
             if joint.uncertainty is not None:
                 yield from (
                     f"{joint.name}: {undetermined_text(each)}" for each in joint.uncertainty.undetermined

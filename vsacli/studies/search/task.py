@@ -307,7 +307,7 @@ class Task:
         run = Run(fix.robot, fix.trajectory, min_margin=self.acceptance.min_margin)
         for _ in run:
             pass
-        report = run.report()
+        report = run.findings()
         counted = (each for index, each in enumerate(report.joints) if index not in self.acceptance.ignored)
         short = [joint for joint in counted if self._is_short(joint)]
         soft = [worst.time for tool in report.tools for worst in tool.worst.values()]

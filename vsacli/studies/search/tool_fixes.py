@@ -113,7 +113,7 @@ class _HeldRun:
         self._q, self._stiffness = np.concatenate(q), np.concatenate(stiffness)
         self._frame = None if trajectory.wrench is None else trajectory.wrench.frame
         self._components = None if self._frame is None else np.concatenate(wrench)
-        self.findings = [worst for tool in run.report().tools for worst in tool.worst.values()]
+        self.findings = [worst for tool in run.findings().tools for worst in tool.worst.values()]
 
     def least_stiffness(self, tool: int, scales: FloatArray) -> float:
         """Return the smallest stiffness of a tool with scaled joint stiffness, (joints,); 0 if unstable."""

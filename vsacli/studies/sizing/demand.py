@@ -253,7 +253,7 @@ def demanded(
             left_out += int(np.count_nonzero(np.any(has_flag(block.flags, UNDONE), axis=1)))
             progress(len(block.time))
         parts.append({name: np.concatenate([each[name] for each in blocks]) for name in MOVED})
-        verdict = run.report().verdict
+        verdict = run.findings().verdict
         outcomes.append(Outcome(name, trajectory.duration, verdict, left_out, len(parts[-1]["time"])))
     names = tuple(outcome.trajectory for outcome in outcomes)
     return Demand(tuple(outcomes), tuple(_motors(robot, parts, names)), springs.report())
