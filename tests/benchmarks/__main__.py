@@ -30,6 +30,7 @@ import single_calls
 import small_numbers
 import stages
 import storage
+import variants
 import waits
 import whole_runs
 from machine import description
@@ -64,6 +65,7 @@ def measured(repeats: int, figure: Path) -> dict[str, Callable[[], str]]:
         "machine": lambda: description() + "\n",
         "kernel": lambda: page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats)),
         "batches": lambda: page.batch_table(compiled.batches(SAMPLES, repeats)),
+        "variants": lambda: page.variant_table(variants.compare(repeats)),
         "subnormals": lambda: page.subnormal_table(small_numbers.compare(SAMPLES, repeats)),
         "samples": lambda: page.sample_part(*one_sample.compare(3 * repeats)),
         "calls": lambda: page.call_sentence(single_calls.calls_of_seven_joints()),

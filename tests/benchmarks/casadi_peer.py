@@ -72,8 +72,11 @@ class CasadiPeer:
         return seconds, torques
 
 
-def function_of(robot: Robot) -> casadi.Function:
-    """The torques of the links with two derivatives as a function of the rows of the motion."""
+def function_of(robot: Robot, *arguments: casadi.SX) -> casadi.Function:
+    """The torques of the links with two derivatives as a function of the rows of the motion.
+
+    Further arguments are symbols in the robot.
+    """
     joints = len(robot.joints)
     rows = casadi.SX.sym("rows", ORDERS * joints)
     derivatives = casadi.vertsplit(rows, joints)
@@ -81,7 +84,7 @@ def function_of(robot: Robot) -> casadi.Function:
     state, rates = casadi.vertcat(*derivatives[:4]), casadi.vertcat(*derivatives[1:])
     dtau = casadi.jtimes(tau, state, rates)
     ddtau = casadi.jtimes(dtau, state, rates)
-    return casadi.Function("link_torques", [rows], [casadi.vertcat(tau, dtau, ddtau)])
+    return casadi.Function("link_torques", [rows, *arguments], [casadi.vertcat(tau, dtau, ddtau)])
 
 
 def _torques(robot: Robot, q: casadi.SX, dq: casadi.SX, ddq: casadi.SX) -> casadi.SX:

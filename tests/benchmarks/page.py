@@ -20,6 +20,7 @@ from single_calls import CALLS, SCALAR_FLAGS, Calls
 from stages import Stages
 from storage import Stored
 from timing import Seconds
+from variants import VariantTime
 from waits import Wait
 from whole_runs import WholeRun
 
@@ -56,6 +57,12 @@ def batch_table(taken: Seconds) -> str:
         [*_way(name), micro(seconds), f"{seconds / taken[CASADI]:.2g}"] for name, seconds in taken.items()
     ]
     return table(header, rows)
+
+
+def variant_table(ways: Iterable[VariantTime]) -> str:
+    """Variants of the arm a second, with what each way computes."""
+    header = ("7R arm, variants of 201 samples", "results", "variants a second")
+    return table(header, ([way.name, way.content, f"{float(f'{way.rate:.2g}'):,.0f}"] for way in ways))
 
 
 def _way(name: str) -> list[str]:

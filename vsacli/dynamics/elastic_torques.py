@@ -160,6 +160,10 @@ class LinkTorques(RowKernel):
     robot: Robot
     frame: WrenchFrame | None = None
 
+    def of_robot(self, robot: Robot) -> LinkTorques:
+        """Return the kernel of another robot."""
+        return LinkTorques(robot, self.frame)
+
     @cached_property
     def arguments(self) -> RowLayout:
         """Layout of the input rows."""
