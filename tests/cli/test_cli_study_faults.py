@@ -44,7 +44,7 @@ def test_an_interrupted_study_goes_on(vsacli: Any, grid_study: str, grid_table: 
     """From the rows in the journal, of which the last was cut off."""
     journal = Path("study.h5.journal")
     with Journal(journal) as rows:
-        gather(map(Computer(load_study(grid_study)).row, range(5)), rows, lambda _: None)
+        gather(Computer(load_study(grid_study)).rows(range(5)), rows, lambda _: None)
     journal.write_bytes(journal.read_bytes()[:-9])
     done = vsacli("study", grid_study)
     assert done.err.splitlines() == [f"4 of 6 runs are in {journal} already", "wrote study.h5"]
@@ -55,7 +55,7 @@ def test_an_interrupted_study_goes_on(vsacli: Any, grid_study: str, grid_table: 
 def kept(path: Path, study_file: str) -> bytes:
     """A journal of all six rows, and what is in it."""
     with Journal(path) as rows:
-        gather(map(Computer(load_study(study_file)).row, range(6)), rows, lambda _: None)
+        gather(Computer(load_study(study_file)).rows(range(6)), rows, lambda _: None)
     return path.read_bytes()
 
 
@@ -197,7 +197,7 @@ def test_a_study_that_is_edited_before_it_goes_on_computes_what_is_new(vsacli: A
     """Rows whose values are still asked for stay; a robot that is edited leaves none."""
     journal = Path("study.h5.journal")
     with Journal(journal) as rows:
-        gather(map(Computer(load_study(grid_study)).row, range(6)), rows, lambda _: None)
+        gather(Computer(load_study(grid_study)).rows(range(6)), rows, lambda _: None)
     Path(grid_study).write_text(Path(grid_study).read_text().replace("[1000, 1275]", "[1000, 1300]"))
     kept = journal.read_bytes()
     assert vsacli("study", grid_study).err.startswith("3 of 6 runs are in ")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from copy import copy
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -62,7 +61,7 @@ class RunDynamics:
         engine: Engine = NUMPY,
     ) -> None:
         self.variants, self.trajectories, self.engine = variants, tuple(trajectories), engine
-        self.deflections, self.internal, self._min_margin = deflections, internal, min_margin
+        self.deflections, self.internal = deflections, internal
         inputs: list[IntegratedRows | InternalRows] = [] if deflections is None else [IntegratedRows()]
         if internal is not None:
             inputs.append(InternalRows(internal.joints))
@@ -77,10 +76,13 @@ class RunDynamics:
         return self.variants.robots[0]
 
     def from_zero(self) -> RunDynamics:
-        """Return the dynamics with time zero at the first sample, where times are rounded least."""
-        moved = copy(self)
-        moved.trajectories = tuple(self.by_trajectory(Trajectory.from_zero))
-        return moved
+        """Return the dynamics with time zero at the first sample, where times are rounded least.
+
+        Deflections are the roots of (14). The kernel equals that of a usual run, so that compiled code is
+        shared.
+        """
+        trajectories = self.by_trajectory(Trajectory.from_zero)
+        return RunDynamics(self.variants, trajectories, internal=self.internal, engine=self.engine)
 
     def by_trajectory(self, function: Callable[[Trajectory], _Value]) -> list[_Value]:
         """Return a function of the trajectory of each variant, called once for each distinct one."""
