@@ -199,10 +199,11 @@ def test_no_verdict_improves_by_tightening_a_limit() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.cases(3)
-@pytest.mark.parametrize("first", range(0, 320, 20))
+@pytest.mark.cases(1)
+@pytest.mark.parametrize("first", range(1, 22))
 def test_no_verdict_of_many_improves_by_tightening_a_limit(first: int) -> None:
-    for task in tasks(range(first, first + 20)):
+    """Seeds so far apart that those of one case have every robot; the first one has every quantity, too."""
+    for task in tasks(range(first, 320, 21)):
         check(task)
 
 

@@ -14,6 +14,7 @@ SAME = 1e-11
 """Of the largest entry: rounding of sums in another order, times the condition of K + dg/dq."""
 
 
+@pytest.mark.cases(6)
 @pytest.mark.parametrize("case", tree_cases(24))
 def test_tools_do_not_depend_on_other_branches_nor_on_their_order(case):
     seed, joints = case

@@ -361,10 +361,12 @@ def test_columns_without_names_are_counted(vsacli: Command, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", [0, 100])  # the second half was not used to choose words
-def test_random_headers_and_layouts(tmp_path: Path, first: int) -> None:
+@pytest.mark.cases(2)  # which have every kind of header, layout and fault
+@pytest.mark.parametrize("part", range(5))
+@pytest.mark.parametrize("half", [0, 100])  # the second one was not used to choose words
+def test_random_headers_and_layouts(tmp_path: Path, half: int, part: int) -> None:
     robot = load_robot(ROBOT)
-    for seed in range(first, first + 100):
+    for seed in range(half + part, half + 100, 5):
         log = random_log(seed)
         (tmp_path / "log.csv").write_text(log.content)
         found = describe_recording(tmp_path / "log.csv", robot)

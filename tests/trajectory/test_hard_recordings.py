@@ -106,6 +106,7 @@ def test_ends_at_which_a_filter_rings_are_left_out(seed, rings):
 
 
 @pytest.mark.slow
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("seed", [134, 262, 278, 302, 398, 1270, 2214])
 def test_noise_between_ends_that_ring_counts(seed):
     """Torques were wrong by 1.3 to 32 %, and by 9 deviations and more."""
@@ -115,6 +116,7 @@ def test_noise_between_ends_that_ring_counts(seed):
 
 
 @pytest.mark.slow
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", [1378, 1386, 1410])
 def test_a_motion_that_two_coarse_resolutions_leave_out_is_found_by_the_noise(seed):
     """Torques were wrong by 15 to 82 %, and by up to 18 deviations."""
@@ -124,6 +126,7 @@ def test_a_motion_that_two_coarse_resolutions_leave_out_is_found_by_the_noise(se
 
 
 @pytest.mark.slow
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", [20008, 20018, 20020])
 def test_noise_counts_up_to_a_sharp_edge_at_which_the_filter_rings_like_a_sine(seed):
     """Fourth derivatives were off by 48 to 187 deviations, accelerations by 467 to 2715."""
