@@ -11,10 +11,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from samples.command_line import ROBOT, Outcome, rest_to_rest
 from samples.marks import spread
 
 from vsacli.cli.main import run
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Draw fewer cases where a test leaves their number to Hypothesis, unless all tests run."""
+    settings.register_profile("few", max_examples=40)
+    if config.option.markexpr:
+        settings.load_profile("few")
 
 
 @pytest.hookimpl(tryfirst=True)

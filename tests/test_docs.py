@@ -19,7 +19,7 @@ import page_examples
 import pytest
 from page_examples import PRINTED, blocks, commands, comparable, copy_examples, run_shell
 from samples.command_line import installed
-from samples.forked_commands import command_server
+from samples.forked_commands import ONE_PROCESS, command_server
 from samples.marks import slow
 from site_parts import contents
 
@@ -68,7 +68,7 @@ STUDY = REPOSITORY / "docs" / "recorded.md"
 @pytest.fixture(scope="module")
 def scripts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder with a command `vsacli` that has everything imported."""
-    with command_server(tmp_path_factory.mktemp("server")) as scripts:
+    with command_server(tmp_path_factory.mktemp("server"), ONE_PROCESS) as scripts:
         yield scripts
 
 

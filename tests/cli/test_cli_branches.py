@@ -12,7 +12,7 @@ from samples.branch_order import TreeFiles, differences, write_branches, write_h
 from samples.command_line import Outcome
 from samples.generated_code import STRICT, compile_c
 
-pytestmark = pytest.mark.cases(10)
+pytestmark = pytest.mark.cases(5)
 
 QUICK = 4
 """Joints of the trees of quick tests."""
@@ -58,7 +58,7 @@ def test_another_order_of_many_trees(vsacli: Callable[..., Outcome], command: st
 
 
 @pytest.mark.slow
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(8))
 def test_another_order_has_the_same_fixes(vsacli: Callable[..., Outcome], seed: int) -> None:
     compare_orders(vsacli, write_orders(seed, QUICK), "check-feasibility", "--fixes")
@@ -101,7 +101,7 @@ def test_branches_on_the_base_of_many_trees_alone(vsacli: Callable[..., Outcome]
 
 
 @pytest.mark.slow
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", [1, 2, 3, 5, 6])
 def test_simulations_of_trees_end_on_target(vsacli: Callable[..., Outcome], seed: int) -> None:
     simulate(vsacli, seed, joints=6)

@@ -55,6 +55,7 @@ def test_least_squares_do_not_advise_a_smoothing_spline_that_is_no_better(pendul
     assert "fit: smooth" not in " ".join(trajectory.warnings)
 
 
+@pytest.mark.slow
 def test_a_bandwidth_below_the_motion_makes_its_torques_unreliable():
     rng, time = np.random.default_rng(1), np.arange(1901) / 94
     frequency = np.fft.rfftfreq(len(time), 1 / 94)

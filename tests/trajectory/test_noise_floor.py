@@ -83,7 +83,7 @@ def test_what_is_resolved_is_the_same_without_an_early_end(
 
 
 @pytest.mark.slow
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("seed", range(0, 120, 3))
 def test_drawn_recordings_are_fitted_the_same_without_an_early_end(
     seed: int, monkeypatch: pytest.MonkeyPatch
