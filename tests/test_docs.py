@@ -153,6 +153,8 @@ def check_python_examples(page: Path, folder: Path) -> None:
     What is printed without a comment is one of the page's blocks of text.
     """
     code = "".join(block.text for block in blocks(page) if block.language == "python")
+    if not code:
+        return
     texts = [comparable(block.text) for block in blocks(page) if block.language == "text"]
     outcome = subprocess.run(
         [sys.executable, "-W", "error", "-c", code], cwd=folder, capture_output=True, text=True, check=False

@@ -59,7 +59,8 @@ def random_tree(seed: int, joints: int | None = None) -> Robot:
 def tree_cases(count: int) -> list[Any]:
     """Seeds and numbers of joints, None for any: a small tree of two fingers, and slow cases of all sizes.
 
-    Five at equal distances of fifty, or six of 24, have every kind of actuator, joint and seat, and 1 to 3 tools.
+    Five at equal distances of fifty, or six of 24, have every kind of actuator, joint and seat, and one
+    to three tools.
     """
     quick = (0, 4)
     return slow_but([quick], [quick, *((seed, None) for seed in range(count))])
