@@ -11,18 +11,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
 from samples.command_line import ROBOT, Outcome, rest_to_rest
 from samples.marks import spread
 
 from vsacli.cli.main import run
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    """Draw fewer cases where a test leaves their number to Hypothesis, unless all tests run."""
-    settings.register_profile("few", max_examples=40)
-    if config.option.markexpr:
-        settings.load_profile("few")
+def pytest_collection() -> None:
+    """Look for no garbage while tests are imported and collected: there is hardly any."""
+    gc.disable()
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -42,6 +39,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection_finish() -> None:
     """Exclude what has been imported and collected from garbage collections: it stays to the end."""
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)
