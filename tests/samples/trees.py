@@ -56,14 +56,16 @@ def random_tree(seed: int, joints: int | None = None) -> Robot:
     return replace(robot, tools=_random_tools(rng, robot))
 
 
-def tree_cases(count: int) -> list[Any]:
+def tree_cases(count: int, joints: int | None = None) -> list[Any]:
     """Seeds and numbers of joints, None for any: a small tree of two fingers, and slow cases of all sizes.
+
+    With a number of joints, all slow cases but the first have so many.
 
     Five at equal distances of fifty, or six of 24, have every kind of actuator, joint and seat, and one
     to three tools.
     """
     quick = (0, 4)
-    return slow_but([quick], [quick, *((seed, None) for seed in range(count))])
+    return slow_but([quick], [quick, *((seed, joints if seed else None) for seed in range(count))])
 
 
 def without_resistance(robot: Robot) -> Robot:

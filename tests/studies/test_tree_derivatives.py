@@ -30,7 +30,7 @@ SPEED = 0.2
 
 pytestmark = pytest.mark.cases(4)
 
-trees = pytest.mark.parametrize("case", tree_cases(50))
+trees = pytest.mark.parametrize("case", tree_cases(50, joints=8))
 
 
 @trees
