@@ -72,6 +72,7 @@ def scripts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield scripts
 
 
+@pytest.mark.slow
 def test_generated_parts_are_up_to_date() -> None:
     assert generate.stale(page for page in generate.PAGES if page != STUDY) == [], (
         "run python docs/generate.py"
@@ -238,6 +239,7 @@ def result(folder: Path) -> Path:
     return folder / "result.h5"
 
 
+@pytest.mark.slow
 def test_every_key_of_the_report_is_documented(result: Path, format_pages: str) -> None:
     with h5py.File(result) as file:
         report = json.loads(file["report/json"].asstr()[()])
@@ -263,6 +265,7 @@ def leaves(content: dict[str, Any], prefix: str = "") -> Iterator[str]:
                 yield f"{prefix}{key}"
 
 
+@pytest.mark.slow
 def test_every_attribute_and_group_of_a_result_is_documented(result: Path, format_pages: str) -> None:
     with h5py.File(result) as file:
         attributes = list(file.attrs)

@@ -208,6 +208,7 @@ def test_any_load_and_stiffness_is_solved_to_rounding(decades: float):
         assert residuals(springs, pair.solve(tau_e, stiffness), tau_e, stiffness) <= 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pairs", [10, exhaustive(50)])
 def test_absurd_springs_and_loads_give_numbers(pairs: int):
     rng = np.random.default_rng(1)

@@ -194,6 +194,7 @@ def check(task: Task) -> None:
             assert verdict == (most > bound * (1 + TOLERANCE))
 
 
+@pytest.mark.slow
 def test_no_verdict_improves_by_tightening_a_limit() -> None:
     check(next(tasks(range(8))))
 

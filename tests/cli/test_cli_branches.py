@@ -45,6 +45,7 @@ def compare_orders(
     assert list(differences(json.loads(first.out), json.loads(second.out))) == []
 
 
+@pytest.mark.slow
 def test_another_order_of_the_branches_gives_the_same_report(vsacli: Callable[..., Outcome]) -> None:
     compare_orders(vsacli, write_orders(8, QUICK), "check-feasibility")
 
@@ -107,6 +108,7 @@ def test_simulations_of_trees_end_on_target(vsacli: Callable[..., Outcome], seed
     simulate(vsacli, seed, joints=6)
 
 
+@pytest.mark.slow
 def test_a_simulation_of_a_tree_ends_on_target(vsacli: Callable[..., Outcome]) -> None:
     simulate(vsacli, 1, QUICK)
 

@@ -53,6 +53,7 @@ def files(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.rglob("*") if path.is_file())
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_library_is_kept_and_found(folder: Path):
     assert warnings() == ()
@@ -87,6 +88,7 @@ def test_damaged_library_is_never_loaded(folder: Path, damage: str):
     assert warnings() == ()
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_folder_that_cannot_be_made(tmp_path: Path):
     (tmp_path / "cache").write_text("a file")

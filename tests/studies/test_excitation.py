@@ -77,6 +77,7 @@ def test_limits_of_motors_make_it_smaller() -> None:
                 assert np.abs(values[:, index, number]).max() < (1 - MARGIN + BETWEEN) * bound
 
 
+@pytest.mark.slow
 def test_joints_and_motors_begin_and_end_at_rest(planned: Excitation) -> None:
     run = inverse_dynamics(planned.robot, planned.trajectory)
     for rate in (run.dq, run.ddq, run.d3q, run.d4q, run.dstiffness, run.ddstiffness):

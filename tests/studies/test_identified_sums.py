@@ -143,6 +143,7 @@ def test_missing_positions_are_the_reason_why_rigid_joints_are_not_identified(
         identify(arm, path, fit=["motors"])
 
 
+@pytest.mark.slow
 def test_damping_that_is_zero_stays_zero_unless_its_path_is_given(arm: Robot, record: Path) -> None:
     start = arm.replace("joints.upper.actuator.motor.damping", 0)
     paths = {number.path for number in identify(arm, record).numbers}

@@ -47,6 +47,7 @@ def test_the_default_fit_follows_a_fast_motion_up_to_its_rounding(pendulum):
     assert 0.3 < stated / error < 3
 
 
+@pytest.mark.slow
 def test_least_squares_do_not_advise_a_smoothing_spline_that_is_no_better(pendulum):
     values, _ = pendulum
     noisy = values + 0.03 * np.random.default_rng(0).standard_normal(len(TIME))
@@ -55,6 +56,7 @@ def test_least_squares_do_not_advise_a_smoothing_spline_that_is_no_better(pendul
     assert "fit: smooth" not in " ".join(trajectory.warnings)
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_a_bandwidth_below_the_motion_makes_its_torques_unreliable():
     rng, time = np.random.default_rng(1), np.arange(1901) / 94
