@@ -42,7 +42,7 @@ LONG = (
     *("fixing-a-motion.md", "friction.md", "gallery.md", "identification.md", "index.md", "measured.md"),
     *("models.md", "optimization.md", "performance.md", "plausibility.md", "python.md"),
     *("reading-a-verdict.md", "recorded.md", "recordings.md", "robots.md", "ros-bags.md"),
-    *("sensitivity.md", "serial.md"),
+    *("README.md", "file-formats.md", "sensitivity.md", "serial.md"),
     *("simulation.md", "sizing.md", "studies.md", "urdf.md"),
 )
 """Pages whose examples take more than half a second."""

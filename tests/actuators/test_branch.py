@@ -93,6 +93,7 @@ def test_lower_end_jumps_where_the_outermost_piece_splits():
         assert lower[index] == pytest.approx(curve.stiffness(curve.fold(nodes=3000)), rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pairs", [6, exhaustive(150)])
 @pytest.mark.parametrize("decades", [1e-8, 1e-3, 0.05, 0.5, 2, 4])
 def test_corridor_ends_where_a_dense_scan_says(decades: float, pairs: int):

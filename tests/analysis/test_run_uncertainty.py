@@ -239,6 +239,7 @@ def test_undetermined_derivatives_that_hardly_matter_are_put_into_proportion():
     assert "depend little on it" not in str(shaky)
 
 
+@pytest.mark.slow
 def test_infeasible_steps_within_the_uncertainty_are_counted_and_stay_infeasible():
     soft = swinging((1e-4, 1e-3, 1.0, 0.1, 1.0), stiffness=802.0)
     result = inverse_dynamics(vsa_3r(), soft)

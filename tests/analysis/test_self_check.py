@@ -162,6 +162,7 @@ def fast_recording(**options: Any) -> Trajectory:
     return Trajectory.from_samples(time, q, np.full_like(q, 1000.0), fit="interpolate", **options)
 
 
+@pytest.mark.slow
 def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
     """Those of long chains are computed some after the others."""
     whole = ladder(*load("7R"))
@@ -235,6 +236,7 @@ def test_wrong_derivative_is_found_where_sampling_is_fast(order: int, defect: fl
     assert error > bound
 
 
+@pytest.mark.slow
 def test_stamps_since_1970_pass():
     time = np.arange(1001) / 1000
     q = 0.4 * np.sin(time[:, None] * [1.0, 1.3, 1.7] + [0, 1, 2])

@@ -169,6 +169,7 @@ def test_a_file_that_a_value_names_counts_as_its_content(own_folder: Path) -> No
     assert len(set(keys)) == 2
 
 
+@pytest.mark.slow
 def test_the_table_from_python_is_that_of_the_command(own_folder: Path, grid_table: Path) -> None:
     study(own_folder)
     path, said = "study.yaml", list[str]()

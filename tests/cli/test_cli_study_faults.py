@@ -171,6 +171,7 @@ def test_a_journal_that_was_cut_off_in_its_first_line_is_begun_anew(
     assert not journal.exists()
 
 
+@pytest.mark.slow
 def test_a_full_disk_costs_no_finished_row(
     vsacli: Any, grid_study: str, grid_table: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -77,6 +77,7 @@ def test_what_is_asked_for_decides(vsacli, noisy):
     assert (feasible.code, share < 0.1) in {(0, True), (3, False)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["stiffness_std", "wrench_std"])
 def test_a_deviation_that_there_is_not_is_refused(vsacli, noisy, name):
     done = vsacli("invdyn", ROBOT, noisy("lsq"), "-o", "r.h5", "--variables", name)

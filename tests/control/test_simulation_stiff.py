@@ -127,6 +127,7 @@ def test_runs_end_at_the_same_boundary_with_both_methods(monkeypatch, what):
     assert np.array_equal(implicit.history.flags[-1], explicit.history.flags[-1])
 
 
+@pytest.mark.slow
 def test_what_was_integrated_when_the_budget_is_used_up_is_kept():
     whole = simulate(vsa_3r(), short_motion(3))
     cut = simulate(vsa_3r(), short_motion(3), budget=300)
@@ -166,6 +167,7 @@ def test_a_run_that_ends_before_its_first_step_reports_no_error():
     assert "largest q error" in str(simulate(vsa_3r(), short_motion(3), budget=300).report)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_within_its_budget_does_not_depend_on_it():
     free = simulate(vsa_3r(), short_motion(3))
     enough = simulate(vsa_3r(), short_motion(3), budget=4 * free.report.evaluations)
@@ -216,6 +218,7 @@ def test_the_time_from_which_a_method_was_used_is_a_stamp(monkeypatch):
     assert 1e6 + 0.1 < implicit.start < 1e6 + 0.2
 
 
+@pytest.mark.slow
 def test_a_run_with_the_full_state_that_ends_early_is_told():
     trajectory = short_motion(3, rate=100, duration=0.3)
     report = simulate(vsa_3r(), trajectory, gains=GAINS, feedback="positions", budget=300).report

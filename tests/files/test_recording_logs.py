@@ -161,6 +161,7 @@ def test_columns_that_are_called_as_the_joints(tmp_path: Path) -> None:
     assert taken(found) == {"time": "t", "elbow.q": "elbow_position"}
 
 
+@pytest.mark.slow
 def test_a_quantity_that_is_not_known_is_no_position(tmp_path: Path) -> None:
     """Whatever numbers and joints its columns are called after."""
     names = [

@@ -227,6 +227,7 @@ def test_blocks_of_any_size_give_the_same_file(tmp_path, block, monkeypatch):
     assert contents(SAMPLES) == contents(7) == contents(64)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_early_keeps_the_steps_so_far(tmp_path, block):
     path = tmp_path / "r.h5"
     with writing(path, robot(), PlannedTrajectory(10_000)) as writer:

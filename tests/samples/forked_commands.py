@@ -52,8 +52,8 @@ FROM_ELSEWHERE = (
 def command_server(folder: Path, *options: str) -> Iterator[Path]:
     """Serve commands, and yield a folder for the search path, in which a client stands as `vsacli`.
 
-    With the option `ONE_PROCESS` studies start no others, each of which would import everything again, unless they
-    are told how many; tests that run at the same time keep the machine busy anyway.
+    With the option `ONE_PROCESS` studies start no others, each of which would import everything again,
+    unless they are told how many; tests that run at the same time keep the machine busy anyway.
     """
     command = folder / "bin" / "vsacli"
     command.parent.mkdir()

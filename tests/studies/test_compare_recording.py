@@ -99,6 +99,7 @@ def test_a_signal_that_lags_behind_the_others_is_told(computed, tmp_path):
     assert not abs(lags["base.tau_motor_1"]) >= 5e-4  # NaN says that there is none
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", [(0.0, 1.2), (1.0, 2.2), (2.0, 3.6)])
 def test_a_piece_cut_out_of_the_motion_is_found(computed, tmp_path, cut):
     columns = recorded(computed)

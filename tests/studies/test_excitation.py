@@ -164,6 +164,7 @@ def test_what_a_robot_has_no_limit_of_is_said_with_what_was_assumed() -> None:
     assert np.abs(motion.dq).max() < 1
 
 
+@pytest.mark.slow
 def test_a_robot_that_cannot_do_anything_is_told_why() -> None:
     robot = shipped_robot("coupled_1r")
     (joint,) = robot.joints

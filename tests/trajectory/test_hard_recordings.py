@@ -165,6 +165,7 @@ def test_motions_that_begin_and_end_at_once_do_not_ring():
         assert ringing_ends(spline, (0.05, 3.95), 4) == (0, 0)
 
 
+@pytest.mark.slow
 def test_a_rigid_robot_is_not_warned_about_derivatives_that_it_does_not_use():
     rng = np.random.default_rng(4)
     q = (np.sin(3 * TIME) + 3e-3 * rng.standard_normal(len(TIME)))[:, None]

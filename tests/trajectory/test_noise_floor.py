@@ -49,6 +49,7 @@ MOTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but({"white", "flickering encoder"}, NOISES))
 def test_noise_alone_needs_no_fine_resolution(name: str, monkeypatch: pytest.MonkeyPatch):
     tried = []

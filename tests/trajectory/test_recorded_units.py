@@ -181,6 +181,7 @@ def test_fast_and_rounded_records_have_a_meaningful_fourth_derivative():
     assert np.abs(plain.block(0, 20001).d4q[inside]).max() > 1e6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [250, 4000, 333.3])
 def test_rate_resamples_the_fit(robot, rate):
     names = [f"{name}{i}" for name in POSITION.names for i in (1, 2)] + ["stiffness1", "stiffness2"]

@@ -297,6 +297,7 @@ def test_noise_that_is_known_is_not_estimated():
         assert known.noise[0] == 1e-3
 
 
+@pytest.mark.slow
 def test_a_stiffness_with_filtered_noise():
     time = np.arange(10001) / 1000
     values = 1000 + 100 * np.sin(2 * time)
