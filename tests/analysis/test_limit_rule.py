@@ -201,10 +201,10 @@ def test_no_verdict_improves_by_tightening_a_limit() -> None:
 
 @pytest.mark.slow
 @pytest.mark.cases(1)
-@pytest.mark.parametrize("first", range(1, 22))
+@pytest.mark.parametrize("first", [3, 1, 2, *range(4, 36)])
 def test_no_verdict_of_many_improves_by_tightening_a_limit(first: int) -> None:
-    """Seeds so far apart that those of one case have every robot; the first one has every quantity, too."""
-    for task in tasks(range(first, 320, 21)):
+    """Seeds so far apart that those of a case have every robot; the first has all but limits of positions."""
+    for task in tasks(range(first, 320, 35)):
         check(task)
 
 
