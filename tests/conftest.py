@@ -17,6 +17,11 @@ from samples.marks import spread
 from vsacli.cli.main import run
 
 
+def pytest_collection() -> None:
+    """Look for no garbage while tests are imported and collected: there is hardly any."""
+    gc.disable()
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark slow cases of a test as exhaustive beyond the number in its mark `cases`."""
@@ -34,6 +39,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection_finish() -> None:
     """Exclude what has been imported and collected from garbage collections: it stays to the end."""
     gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -19,7 +19,7 @@ import page_examples
 import pytest
 from page_examples import PRINTED, blocks, commands, comparable, copy_examples, run_shell
 from samples.command_line import installed
-from samples.forked_commands import command_server
+from samples.forked_commands import ONE_PROCESS, command_server
 from samples.marks import slow
 from site_parts import contents
 
@@ -42,7 +42,7 @@ LONG = (
     *("fixing-a-motion.md", "friction.md", "gallery.md", "identification.md", "index.md", "measured.md"),
     *("models.md", "optimization.md", "performance.md", "plausibility.md", "python.md"),
     *("reading-a-verdict.md", "recorded.md", "recordings.md", "robots.md", "ros-bags.md"),
-    *("sensitivity.md", "serial.md"),
+    *("README.md", "file-formats.md", "sensitivity.md", "serial.md"),
     *("simulation.md", "sizing.md", "studies.md", "urdf.md"),
 )
 """Pages whose examples take more than half a second."""
@@ -68,10 +68,11 @@ STUDY = REPOSITORY / "docs" / "recorded.md"
 @pytest.fixture(scope="module")
 def scripts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A folder with a command `vsacli` that has everything imported."""
-    with command_server(tmp_path_factory.mktemp("server")) as scripts:
+    with command_server(tmp_path_factory.mktemp("server"), ONE_PROCESS) as scripts:
         yield scripts
 
 
+@pytest.mark.slow
 def test_generated_parts_are_up_to_date() -> None:
     assert generate.stale(page for page in generate.PAGES if page != STUDY) == [], (
         "run python docs/generate.py"
@@ -153,6 +154,8 @@ def check_python_examples(page: Path, folder: Path) -> None:
     What is printed without a comment is one of the page's blocks of text.
     """
     code = "".join(block.text for block in blocks(page) if block.language == "python")
+    if not code:
+        return
     texts = [comparable(block.text) for block in blocks(page) if block.language == "text"]
     outcome = subprocess.run(
         [sys.executable, "-W", "error", "-c", code], cwd=folder, capture_output=True, text=True, check=False
@@ -236,6 +239,7 @@ def result(folder: Path) -> Path:
     return folder / "result.h5"
 
 
+@pytest.mark.slow
 def test_every_key_of_the_report_is_documented(result: Path, format_pages: str) -> None:
     with h5py.File(result) as file:
         report = json.loads(file["report/json"].asstr()[()])
@@ -261,6 +265,7 @@ def leaves(content: dict[str, Any], prefix: str = "") -> Iterator[str]:
                 yield f"{prefix}{key}"
 
 
+@pytest.mark.slow
 def test_every_attribute_and_group_of_a_result_is_documented(result: Path, format_pages: str) -> None:
     with h5py.File(result) as file:
         attributes = list(file.attrs)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from samples.marks import slow
 from samples.python_processes import run_python
 from samples.sources import PACKAGE
 
@@ -84,7 +85,9 @@ sys.stderr.write(json.dumps([loaded, files]))
     return {name.removeprefix("vsacli.") for name in modules}, lines
 
 
-@pytest.mark.parametrize("task", TASKS.values(), ids=TASKS)
+@pytest.mark.parametrize(
+    "task", [slow(task) if "--plot" in name else task for name, task in TASKS.items()], ids=TASKS
+)
 def test_a_command_loads_its_task(task: Task, tmp_path: Path) -> None:
     modules, lines = load(task, tmp_path)
     assert "cli.main" in modules

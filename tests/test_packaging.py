@@ -56,6 +56,7 @@ def files_below(folder: Path, pattern: str) -> set[str]:
     return {str(path.relative_to(REPOSITORY)) for path in folder.rglob(pattern)}
 
 
+@pytest.mark.slow
 def test_the_wheel_holds_the_package_and_the_examples(wheel: zipfile.Path) -> None:
     package = REPOSITORY / "vsacli"
     modules = files_below(package, "*.py") | files_below(package, "*.c") | files_below(package, "*.in")

@@ -178,6 +178,7 @@ def test_figures_are_those_of_the_command(result: Result, tmp_path: Path) -> Non
     assert {path.name: path.read_bytes() for path in (tmp_path / "figures").iterdir()} == drawn
 
 
+@pytest.mark.slow
 def test_the_dataset_is_what_xarray_makes_of_the_file(result: Result, tmp_path: Path) -> None:
     result.save(tmp_path / "result.h5")
     with (

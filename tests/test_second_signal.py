@@ -14,6 +14,8 @@ import pytest
 from samples import second_signal
 from samples.command_line import REPOSITORY, edited
 
+pytestmark = pytest.mark.slow
+
 NAMES = second_signal.PRETENSION.names
 ARM, MIXED = "vsa_3r.yaml", "mixed_3r.yaml"
 

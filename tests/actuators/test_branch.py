@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracles.scalar_vsa import Curve, Side
 from samples.drives import Stopped
-from samples.marks import slow
+from samples.marks import exhaustive
 from samples.springs import residuals, stiffness_under
 
 from vsacli.actuators.laws import Cubic, PairSolution
@@ -93,8 +93,8 @@ def test_lower_end_jumps_where_the_outermost_piece_splits():
         assert lower[index] == pytest.approx(curve.stiffness(curve.fold(nodes=3000)), rel=1e-9)
 
 
-@pytest.mark.cases(1)
-@pytest.mark.parametrize("pairs", [6, slow(150)])
+@pytest.mark.slow
+@pytest.mark.parametrize("pairs", [6, exhaustive(150)])
 @pytest.mark.parametrize("decades", [1e-8, 1e-3, 0.05, 0.5, 2, 4])
 def test_corridor_ends_where_a_dense_scan_says(decades: float, pairs: int):
     rng = np.random.default_rng(round(1e9 * decades))
@@ -107,7 +107,7 @@ def test_corridor_ends_where_a_dense_scan_says(decades: float, pairs: int):
         assert scanned * (1 - 1e-5) <= lower <= scanned * (1 + 20 * EPS), (springs, tau_e)
 
 
-@pytest.mark.parametrize("pairs", [8, slow(25)])
+@pytest.mark.parametrize("pairs", [8, exhaustive(25)])
 @pytest.mark.parametrize("decades", [1e-3, 0.05, 0.3])
 def test_solution_is_that_of_the_walk(decades: float, pairs: int):
     rng = np.random.default_rng(round(1e9 * decades))
@@ -209,7 +209,8 @@ def test_any_load_and_stiffness_is_solved_to_rounding(decades: float):
         assert residuals(springs, pair.solve(tau_e, stiffness), tau_e, stiffness) <= 1e-12
 
 
-@pytest.mark.parametrize("pairs", [10, slow(50)])
+@pytest.mark.slow
+@pytest.mark.parametrize("pairs", [10, exhaustive(50)])
 def test_absurd_springs_and_loads_give_numbers(pairs: int):
     rng = np.random.default_rng(1)
     sizes = np.concatenate([10 ** rng.uniform(-3, 6, 30), [1e-300, 1e-200, 1e-100, 1e-30, 1e-15, 0]])

@@ -79,6 +79,7 @@ def test_the_work_of_the_motors_is_what_all_springs_and_the_rest_take() -> None:
     assert "co-contraction" not in str(result.report)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_compiled_engine_agrees() -> None:
     robot, motion = robot_of(ARM, [pair(SAMPLES[name].law) for name in COUPLINGS]), motion_of([RANGE] * 3)

@@ -128,6 +128,7 @@ def test_a_law_or_a_stiffness_but_not_both() -> None:
         Elastic(motor=MOTOR, stiffness=3, spring=Cubic(k=1, k_c=1))
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_compiled_engine_agrees() -> None:
     laws = [SAMPLES["sinh"].law, SAMPLES["polynomial"].law, SAMPLES["quadratic"].law]

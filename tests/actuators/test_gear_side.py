@@ -298,6 +298,7 @@ def test_a_new_robot_file_offers_the_side(vsacli):
     assert re.search(r"# +side: +# side of the gear", vsacli("new", "robot", "--joints", "R").out)
 
 
+@pytest.mark.slow
 def test_a_sized_robot_has_motors_on_their_shafts(vsacli, tmp_path):
     arm, swing = (REPOSITORY / name / "planar_2r.yaml" for name in ("robots", "trajectories"))
     (tmp_path / "m.csv").write_text("name,inertia,max_torque\nm,0.01,1000\n")

@@ -131,6 +131,7 @@ def test_the_branch_is_that_of_a_dense_scan(case: Case):
     assert not found.slack_below.any()
 
 
+@pytest.mark.slow
 def test_a_fold_of_the_built_device():
     """At 0.02 N m it is the least stiffness, 0.1313 N m/rad, at 0.2286 rad."""
     found = CASES["maccepa"].solve(np.array([0.02]), np.array([0.1]))

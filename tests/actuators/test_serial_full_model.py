@@ -54,6 +54,7 @@ def test_a_pendulum_follows(name: str) -> None:
     assert_follows(LINK, [actuator], [drive], [stiffness])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kinds",
     [

@@ -100,6 +100,7 @@ def test_signs_follow_from_the_potential() -> None:
     assert sympy.simplify((energy.diff(s) - setting_torque).doit()) == 0
 
 
+@pytest.mark.slow
 def test_a_simulation_ends_where_a_cam_does() -> None:
     """The controller takes cams for longer than they are: phi + s is bounded, not phi and s."""
     turns, cubic = np.linspace(-0.4, 0.4, 25), SAMPLES["cubic"].law

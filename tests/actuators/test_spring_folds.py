@@ -57,6 +57,7 @@ def test_two_humps_have_three_turns():
     assert len(hardening.peaks) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("low", [-1e-6, -1e-7])
 def test_a_measured_curve_that_rounds_at_its_end_has_no_peak_there(low: float):
     deflection = np.linspace(low, 0.5, 30)

@@ -174,6 +174,7 @@ def test_solution_next_to_the_end_of_the_corridor(first: Spring, second: Spring)
     assert residuals((law_1, law_2), of_those, tau_e[within], stiffness[within]) <= 1e-12
 
 
+@pytest.mark.cases(25)
 @every_pair
 def test_demand_at_an_end_of_the_corridor_is_met_there(first: Spring, second: Spring):
     (law_1, curve_1), (law_2, curve_2) = first, second
@@ -188,6 +189,7 @@ def test_demand_at_an_end_of_the_corridor_is_met_there(first: Spring, second: Sp
         np.testing.assert_allclose(sigma, end[reachable], rtol=1e-9)
 
 
+@pytest.mark.cases(25)
 @every_pair
 def test_demand_below_the_corridor_needs_no_bracketing(
     monkeypatch: pytest.MonkeyPatch, first: Spring, second: Spring
@@ -201,6 +203,7 @@ def test_demand_below_the_corridor_needs_no_bracketing(
     assert np.all(np.isfinite([found.phi_1[carried], found.phi_2[carried]]))
 
 
+@pytest.mark.cases(25)
 @every_pair
 def test_a_sample_knows_nothing_of_its_neighbors(first: Spring, second: Spring):
     (law_1, curve_1), (law_2, curve_2) = first, second
@@ -214,6 +217,7 @@ def test_a_sample_knows_nothing_of_its_neighbors(first: Spring, second: Spring):
         )
 
 
+@pytest.mark.cases(25)
 @every_pair
 def test_absurd_demands_are_answered(first: Spring, second: Spring):
     sizes = 10.0 ** np.arange(-20, 101, 40)

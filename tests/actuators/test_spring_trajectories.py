@@ -141,6 +141,7 @@ def dip(laws: tuple[SpringLaw, SpringLaw], closest: float) -> tuple[Result, Floa
     return inverse_dynamics(robot, trajectory), lower
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "pair", slow_but({"cubic, unlike", "sinh, alike", "four-bar", "tendon and cubic"}, PAIRS)
 )

@@ -285,6 +285,7 @@ def test_a_rigid_robot_has_a_figure_of_its_motion() -> None:
     assert len(position.lines) == 3
 
 
+@pytest.mark.slow
 def test_a_comparison_shows_the_motors_that_any_of_the_results_has() -> None:
     antagonistic = rest_to_rest(101, trajectory="two motors")
     one_each = drawn(trajectory="one")

@@ -196,6 +196,7 @@ def test_what_is_found_does_not_depend_on_the_blocks(
     ]
 
 
+@pytest.mark.slow
 def test_every_dip_below_the_corridor_is_found_and_its_nearest_step_marked() -> None:
     """The oracle looks at a hundred times from each step to the next."""
     robot, trajectory = three_joints()

@@ -75,6 +75,7 @@ def test_deviations_are_variables_of_the_result():
         np.testing.assert_array_equal(array, getattr(result, name))
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_size_of_blocks():
     whole, parts = (
         Run(limited(position=0.2999), swinging(STEADY), block_samples=samples) for samples in (2000, 77)
@@ -198,6 +199,7 @@ def test_a_bound_decides_without_being_stated(deviations, verdict):
     assert result.report.joints[0].uncertainty.limits == {}  # no deviation to allow for
 
 
+@pytest.mark.slow
 def test_the_unreliable_ends_of_a_record_do_not_count():
     @dataclasses.dataclass(frozen=True)
     class Frayed(Blurred):
@@ -237,6 +239,7 @@ def test_undetermined_derivatives_that_hardly_matter_are_put_into_proportion():
     assert "depend little on it" not in str(shaky)
 
 
+@pytest.mark.slow
 def test_infeasible_steps_within_the_uncertainty_are_counted_and_stay_infeasible():
     soft = swinging((1e-4, 1e-3, 1.0, 0.1, 1.0), stiffness=802.0)
     result = inverse_dynamics(vsa_3r(), soft)

@@ -171,6 +171,7 @@ def ladder_of(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> t
     return float(errors[0]), float(bounds[0])
 
 
+@pytest.mark.slow
 def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
     """Those of long chains are computed some after the others."""
     whole = ladder_of(*load("7R"))
@@ -244,6 +245,7 @@ def test_wrong_derivative_is_found_where_sampling_is_fast(order: int, defect: fl
     assert error > bound
 
 
+@pytest.mark.slow
 def test_stamps_since_1970_pass():
     time = np.arange(1001) / 1000
     q = 0.4 * np.sin(time[:, None] * [1.0, 1.3, 1.7] + [0, 1, 2])

@@ -99,6 +99,7 @@ def test_words_are_not_cut(width: int) -> None:
 WORD = st.text("abcxyz0123456789.,:%()-/", min_size=1, max_size=12)
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.lists(WORD, min_size=1, max_size=30).map(" ".join), min_size=1, max_size=5),
     st.integers(20, 100),

@@ -12,7 +12,7 @@ from samples.branch_order import TreeFiles, differences, write_branches, write_h
 from samples.command_line import Outcome
 from samples.generated_code import STRICT, compile_c
 
-pytestmark = pytest.mark.cases(10)
+pytestmark = pytest.mark.cases(5)
 
 QUICK = 4
 """Joints of the trees of quick tests."""
@@ -45,6 +45,7 @@ def compare_orders(
     assert list(differences(json.loads(first.out), json.loads(second.out))) == []
 
 
+@pytest.mark.slow
 def test_another_order_of_the_branches_gives_the_same_report(vsacli: Callable[..., Outcome]) -> None:
     compare_orders(vsacli, write_orders(8, QUICK), "check-feasibility")
 
@@ -58,7 +59,7 @@ def test_another_order_of_many_trees(vsacli: Callable[..., Outcome], command: st
 
 
 @pytest.mark.slow
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(8))
 def test_another_order_has_the_same_fixes(vsacli: Callable[..., Outcome], seed: int) -> None:
     compare_orders(vsacli, write_orders(seed, QUICK), "check-feasibility", "--fixes")
@@ -101,12 +102,13 @@ def test_branches_on_the_base_of_many_trees_alone(vsacli: Callable[..., Outcome]
 
 
 @pytest.mark.slow
-@pytest.mark.cases(2)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", [1, 2, 3, 5, 6])
 def test_simulations_of_trees_end_on_target(vsacli: Callable[..., Outcome], seed: int) -> None:
     simulate(vsacli, seed, joints=6)
 
 
+@pytest.mark.slow
 def test_a_simulation_of_a_tree_ends_on_target(vsacli: Callable[..., Outcome]) -> None:
     simulate(vsacli, 1, QUICK)
 

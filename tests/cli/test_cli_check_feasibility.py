@@ -79,6 +79,7 @@ stiffness: {type: constant, value: 830}
 """
 
 
+@pytest.mark.slow
 def test_what_lies_between_the_steps_counts(vsacli, tmp_path):
     """The shoulder sways, and its load is largest between two steps."""
     (tmp_path / "coarse.yaml").write_text(COARSE)

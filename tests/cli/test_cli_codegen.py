@@ -43,6 +43,7 @@ def test_the_written_files_compile(vsacli: Run, tmp_path: Path) -> None:
     compile_c(tmp_path / "arm", *STRICT, "tendon_1r.c", "tendon_1r_test.c", "-o", "test", "-lm")
 
 
+@pytest.mark.slow
 def test_existing_files_stay_unless_told_otherwise(vsacli: Run, tmp_path: Path) -> None:
     (tmp_path / "arm").mkdir()
     (tmp_path / "arm" / "README.md").write_text("mine")

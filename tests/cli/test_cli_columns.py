@@ -55,6 +55,7 @@ def renamed(path: Path, target: Path) -> None:
     columns_file(target, header)
 
 
+@pytest.mark.slow
 def test_compare(vsacli: Command, tmp_path: Path) -> None:
     rest_to_rest(tmp_path / "motion.yaml")
     assert vsacli("invdyn", ROBOT, "motion.yaml", "-o", "r.h5").code == 0

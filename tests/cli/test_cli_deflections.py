@@ -20,6 +20,7 @@ def test_the_default_is_the_root(vsacli, motion, command):
     assert "drift" not in default.out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", [slow("invdyn"), "check-feasibility"])
 def test_drift_is_reported(vsacli, motion, command):
     done = vsacli(command, ROBOT, motion, "--deflection-solver", "ode")
@@ -36,6 +37,7 @@ def test_end_of_the_way_is_reported(vsacli, too_soft):
         assert f"\n{joint}: deflections cannot be integrated beyond t = " in done.out
 
 
+@pytest.mark.slow
 def test_result_file_and_json_hold_the_drift(vsacli, motion, tmp_path):
     done = vsacli("invdyn", ROBOT, motion, "--deflection-solver", "ode", "--json", "-o", "out.h5")
     deflections = json.loads(done.out)["deflections"]

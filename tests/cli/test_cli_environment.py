@@ -108,6 +108,7 @@ def test_closed_streams(command: str, streams: tuple[int, ...], tmp_path: Path) 
     assert ("wrote" in err) == (not {1, 2} & set(streams) and "-o" in COMMANDS[command])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["check-feasibility", slow("check-feasibility --fixes")])
 def test_the_report_needs_no_disk(command: str, report: str, tmp_path: Path) -> None:
     arguments = (*EXAMPLE, *command.split()[1:])

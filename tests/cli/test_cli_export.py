@@ -145,6 +145,7 @@ def test_a_format_of_bytes_needs_a_file(vsacli, tmp_path, feasible_result):
     assert parquet.read_table(tmp_path / "out.parquet").column_names == ["time", *TORQUES]
 
 
+@pytest.mark.slow
 def test_a_simulation_becomes_a_joint_trajectory_as_it_went(vsacli, tmp_path, motion):
     vsacli("simulate", ROBOT, motion, "-o", "s.h5")
     done = vsacli("export", "s.h5", "--format", "joint-trajectory", "--rate", "20")

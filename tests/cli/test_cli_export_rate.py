@@ -45,6 +45,7 @@ def test_a_declared_trajectory_is_computed_at_the_rate(tmp_path, vsacli, rate):
     np.testing.assert_allclose(rows, expected[:: 3000 // rate][: len(rows)], rtol=1e-10, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_motion_known_at_its_samples_alone_is_not(tmp_path, vsacli):
     (tmp_path / "quick.yaml").write_text(TASK.replace("0.963", "0.96"))
     result, table = tmp_path / "r.h5", tmp_path / "moved.csv"

@@ -82,21 +82,20 @@ def robot_with(folder, **limits):
     return path
 
 
-def written(vsacli, robot, task, text, kind):
-    """The fix that takes one kind of change alone, and the file with it."""
+def written(vsacli, robot, task, text, kind, number):
+    """What is said of the fix of this number, which takes one kind of change alone, and the file with it."""
     task.write_text(text)
-    found = json.loads(vsacli("check-feasibility", robot, task, "--fixes", "--json").out)["fixes"]
-    numbers = [
-        number for number, each in enumerate(found["fixes"], 1) if each.keys() == {"size", kind, "text"}
-    ]
-    done = vsacli("check-feasibility", robot, task, "--write-fix", numbers[0], "-o", "fixed.yaml")
+    done = vsacli("check-feasibility", robot, task, "--write-fix", number, "-o", "fixed.yaml", "--json")
     assert done.code == 3, done.err
-    return found["fixes"][numbers[0] - 1]["text"], (task.parent / "fixed.yaml").read_text()
+    fixes = json.loads(done.out)["fixes"]["fixes"]
+    numbers = [place for place, each in enumerate(fixes, 1) if each.keys() == {"size", kind, "text"}]
+    assert number == numbers[0]
+    return fixes[number - 1]["text"], (task.parent / "fixed.yaml").read_text()
 
 
 @pytest.mark.slow
 def test_values_change_where_they_stand(tmp_path, vsacli):
-    said, text = written(vsacli, ROBOT, tmp_path / "fast.yaml", FAST, "stiffness_offset")
+    said, text = written(vsacli, ROBOT, tmp_path / "fast.yaml", FAST, "stiffness_offset", 3)
     assert said.startswith("raise the stiffness of base by")
     name, base, shoulder = changed_lines(FAST, text)
     assert name == 'name: "fast-fixed"                        # for the demonstration'
@@ -110,7 +109,7 @@ def test_values_change_where_they_stand(tmp_path, vsacli):
 @pytest.mark.slow
 def test_a_slower_motion_lasts_whole_periods(tmp_path, vsacli):
     text = FAST.replace("duration: 0.45 ", "rate: 500\nduration: 0.45 ")
-    said, fixed = written(vsacli, ROBOT, tmp_path / "fast.yaml", text, "slow_down")
+    said, fixed = written(vsacli, ROBOT, tmp_path / "fast.yaml", text, "slow_down", 4)
     assert said.startswith("slow down by a factor ")
     name, duration = changed_lines(text, fixed)
     assert name.startswith("name: ")
@@ -126,7 +125,7 @@ def test_a_slower_motion_lasts_whole_periods(tmp_path, vsacli):
 @pytest.mark.parametrize(
     ("rate", "start", "derivatives", "asked"),
     [
-        (500, 0.0, 0, None),
+        (250, 0.0, 0, None),
         (963, 1.7e9, 0, None),
         (500, 0.0, 4, None),
         (1000, 0.0, 0, 500),
@@ -149,7 +148,7 @@ def test_a_slower_recording_keeps_its_rate_over_whole_periods(
     fixes = json.loads(done.out)["fixes"]["fixes"]
     slower = [number for number, each in enumerate(fixes, 1) if "slow_down" in each]
     assert {"slow_down", "stiffness_offset"} <= {key for number in slower for key in fixes[number - 1]}
-    for number in slower:
+    for number in {frozenset(fixes[number - 1]): number for number in slower}.values():
         written = ("--write-fix", number, "-o", f"fixed-{number}.yaml")
         assert vsacli("check-feasibility", ROBOT, task, *written).code == 3
         assert vsacli("check-feasibility", ROBOT, f"fixed-{number}.yaml").code == 0
@@ -171,7 +170,7 @@ def test_a_slower_recording_keeps_its_rate_over_whole_periods(
 
 @pytest.mark.slow
 def test_another_profile_leaves_the_rest_of_the_file(tmp_path, vsacli):
-    _, fixed = written(vsacli, ROBOT, tmp_path / "fast.yaml", FAST, "stiffness_profile")
+    _, fixed = written(vsacli, ROBOT, tmp_path / "fast.yaml", FAST, "stiffness_profile", 1)
     assert "  end: [90 deg, 45 deg, -60 deg]  # as in the paper" in fixed
     assert "# duration: 0.45                    # s" in fixed
     assert 'stiffness: {type: csv, file: "fixed.csv"}' in fixed
@@ -224,7 +223,7 @@ def test_the_stiffness_that_helps_is_said(tmp_path, vsacli):
 @pytest.mark.slow
 def test_transitions_that_are_too_short_are_lengthened_alone(tmp_path, vsacli):
     robot = robot_with(tmp_path, base=120, shoulder=120, elbow=120)
-    said, fixed = written(vsacli, robot, tmp_path / "changing.yaml", CHANGING, "transition")
+    said, fixed = written(vsacli, robot, tmp_path / "changing.yaml", CHANGING, "transition", 1)
     assert said.startswith("lengthen the transitions of the stiffness from 0.05 s to 0.17")
     name, transition = changed_lines(CHANGING, fixed)
     assert name == 'name: "changing-fixed"'
@@ -235,7 +234,7 @@ def test_transitions_that_are_too_short_are_lengthened_alone(tmp_path, vsacli):
     def kept(length):
         (tmp_path / "tried.yaml").write_text(CHANGING.replace("transition: 0.05", f"transition: {length}"))
         trajectory = load_trajectory(tmp_path / "tried.yaml", arm)
-        block = compute_block(arm, trajectory.at(np.linspace(0, 2, 4001)))
+        block = compute_block(arm, trajectory.at(np.linspace(0, 2, 2001)))
         return not np.any(block.flags & int(LIMITS))
 
     assert kept(found)

@@ -13,6 +13,7 @@ from vsacli.cli.check_feasibility import check_feasibility
 WRITE = ("--write-fix", 1, "-o", "fixed.yaml")
 
 
+@pytest.mark.slow
 def test_fixes_follow_the_report(vsacli, too_soft):
     plain = vsacli("check-feasibility", ROBOT, too_soft)
     done = vsacli("check-feasibility", ROBOT, too_soft, "--fixes")

@@ -7,21 +7,22 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from samples.command_line import ROBOT, contents
+from samples.command_line import REPOSITORY, contents
 
+ROBOT = REPOSITORY / "robots" / "planar_2r.yaml"
 COMPUTED = ("motion", "motor-torque", "elastic-torque", "energy")
 
 
 @pytest.fixture
 def log(own_folder: Path) -> Path:
-    """A noisy recording of the 3R arm, `log.csv`."""
+    """A noisy recording of an arm with two joints, `log.csv`."""
     time = np.arange(401) / 100
     rng = np.random.default_rng(4)
     columns = {"time [s]": time}
-    for number, joint in enumerate(("base", "shoulder", "elbow")):
+    for number, joint in enumerate(("shoulder", "elbow")):
         motion = 0.4 * np.sin(2 * np.pi * 0.5 * time + number)
         columns[f"{joint}.q [rad]"] = motion + 1e-4 * rng.standard_normal(len(time))
-        columns[f"{joint}.stiffness [N m/rad]"] = np.full(len(time), 1300.0)
+        columns[f"{joint}.stiffness [N m/rad]"] = np.full(len(time), 2e4)
     path = own_folder / "log.csv"
     header = ",".join(columns)
     np.savetxt(path, np.array(list(columns.values())).T, delimiter=",", header=header, comments="")
@@ -37,15 +38,15 @@ def test_a_recording_is_drawn(vsacli, log, robot):
 
 @pytest.mark.slow
 def test_positions_alone_are_drawn_of_a_robot_that_takes_a_stiffness(vsacli, log):
-    rows = np.loadtxt(log, delimiter=",", skiprows=1)[:, [0, 1, 3, 5]]
-    np.savetxt("q.csv", rows, delimiter=",", header="time,q1,q2,q3", comments="")
+    rows = np.loadtxt(log, delimiter=",", skiprows=1)[:, [0, 1, 3]]
+    np.savetxt("q.csv", rows, delimiter=",", header="time,q1,q2", comments="")
     assert vsacli("plot", "q.csv", "--robot", ROBOT, "--joints", "elbow", "--format", "svg").code == 0
 
 
 @pytest.mark.slow
 def test_a_trajectory_with_recorded_signals_is_drawn(vsacli, log, own_folder):
     text = f"format: vsacli-trajectory/1\nname: half\nposition: {{type: csv, file: {log.name}}}\n"
-    (own_folder / "half.yaml").write_text(text + "stiffness: {type: constant, value: 1300}\n")
+    (own_folder / "half.yaml").write_text(text + "stiffness: {type: constant, value: 2e4}\n")
     done = vsacli("plot", "half.yaml", "--robot", ROBOT, "--format", "svg")
     assert (done.code, done.err) == (0, "wrote half-recording.svg\n")
 

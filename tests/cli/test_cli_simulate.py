@@ -146,6 +146,7 @@ def test_measured_positions_are_reported(vsacli, quick):
     assert base.split("  ")[-1].strip().startswith("0.01 / ")
 
 
+@pytest.mark.slow
 def test_sensors_that_the_controller_does_not_read_are_noted(vsacli, quick):
     unread = "--sensor-noise and --encoder-bits affect the stored measurements only"
     bits = ("--encoder-bits", "16", "--overwrite", "-o", "s.h5")

@@ -118,6 +118,7 @@ def test_several_simulations_are_compared(
     assert (done.code, done.err) == (0, "wrote both/s-t-compare.svg\n")
 
 
+@pytest.mark.slow
 def test_a_comparison_shows_the_position_errors(tmp_path: Path, simulated: Path) -> None:
     other = shutil.copy(simulated / "s.h5", tmp_path / "t.h5")
     with h5py.File(other, "r+") as file:
@@ -178,6 +179,7 @@ def test_the_simulated_motion_reads_back_as_a_trajectory(
     np.testing.assert_array_equal(stored(tmp_path / "again.h5", "q"), stored(simulated / "s.h5", "q"))
 
 
+@pytest.mark.slow
 def test_joints_of_every_kind_have_the_columns_they_have_in_a_result(
     vsacli: Callable[..., Any], tmp_path: Path
 ) -> None:
@@ -270,6 +272,7 @@ def test_info_of_measured_positions_shows_what_they_cost(vsacli: Callable[..., A
     assert vsacli("info", "s.h5").out.endswith(f"\n\n{printed}")
 
 
+@pytest.mark.slow
 def test_notes_are_no_warnings(vsacli: Callable[..., Any], tmp_path: Path) -> None:
     motion = edited(REST_TO_REST, tmp_path / "odd.yaml", ("rate: 1000 ", "rate: 25.1 "))
     sentence = "the rate is 25 Hz, not 25.1 Hz, for a whole number of intervals in 4 s"

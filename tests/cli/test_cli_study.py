@@ -48,6 +48,7 @@ def test_an_attribute_of_a_table_that_is_missing_is_named(
     assert (shown.code, shown.out, attribute in shown.err) == (2, "", True)
 
 
+@pytest.mark.slow
 def test_a_row_is_what_a_run_with_its_values_says(vsacli: Any, grid_study: str) -> None:
     """The report of `check-feasibility --set`, bit for bit; peaks beside infeasible steps are none."""
     done = vsacli("study", grid_study)
@@ -168,6 +169,7 @@ def test_a_file_that_a_value_names_counts_as_its_content(own_folder: Path) -> No
     assert len(set(keys)) == 2
 
 
+@pytest.mark.slow
 def test_the_table_from_python_is_that_of_the_command(own_folder: Path, grid_table: Path) -> None:
     study(own_folder)
     path, said = "study.yaml", list[str]()
@@ -204,6 +206,7 @@ def test_compiled_code_pays_by_the_runs_of_each_robot(own_folder: Path, vary: st
     assert (chosen.engine, bool(chosen.compiler)) == (engine, engine == "c")
 
 
+@pytest.mark.slow
 def test_implausible_values_are_reported_once(vsacli: Any, tmp_path: Path) -> None:
     path = study(tmp_path)
     edited(ROBOT, tmp_path / "arm.yaml", ("com: [0, 0, 0] ", "com: [0, 0, 150] "))
@@ -261,6 +264,7 @@ def test_a_table_from_before_limits_were_named_is_read(vsacli: Any, grid_table: 
     assert set(column("whole.h5", "first_limit")) == {""}
 
 
+@pytest.mark.slow
 def test_the_share_of_ok_runs_has_its_interval_for_random_draws(vsacli: Any, own_folder: Path) -> None:
     drawn = "method: random\nsamples: 8\nvary:\n  joints.*.actuator.spring.k: {normal: 8 %}\n"
     found = json.loads(vsacli("study", study(own_folder, drawn), "--json").out)

@@ -59,6 +59,7 @@ def kept(path: Path, study_file: str) -> bytes:
     return path.read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("where", [slow("checksum"), "row", slow("break")])
 def test_a_damaged_row_costs_no_other_one(vsacli: Any, grid_study: str, grid_table: Path, where: str) -> None:
     """A bit that is wrong in the third row, or in the break behind it."""
@@ -170,6 +171,7 @@ def test_a_journal_that_was_cut_off_in_its_first_line_is_begun_anew(
     assert not journal.exists()
 
 
+@pytest.mark.slow
 def test_a_full_disk_costs_no_finished_row(
     vsacli: Any, grid_study: str, grid_table: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -232,6 +234,7 @@ def test_a_file_that_changes_meanwhile_ends_the_study(
     assert vsacli("study", "study.yaml").err.startswith("1 of 3 runs are in ")
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_when_the_table_is_written_costs_no_row(
     vsacli: Any, grid_study: str, grid_table: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

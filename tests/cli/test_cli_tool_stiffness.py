@@ -54,6 +54,7 @@ def rod(own_folder):
     return "rod.yaml", "lean.yaml"
 
 
+@pytest.mark.slow
 def test_compliance_is_computed_when_asked_for(vsacli, torso):
     outcome = vsacli("invdyn", *torso, *ASKED, "-o", "swing.h5")
     assert outcome.code == 0
@@ -149,6 +150,7 @@ def test_other_results_do_not_have_it(vsacli, torso):
     assert (refused.code, "no tool of torso has a min_stiffness" in refused.err) == (2, True)
 
 
+@pytest.mark.slow
 def test_a_tool_below_its_limit_is_found_and_fixed(vsacli, torso):
     limits = {tool.name: tool.stiffness for tool in report_of(torso).tools}
     robot = yaml.safe_load(torso_text())
@@ -180,6 +182,7 @@ def test_a_tool_below_its_limit_is_found_and_fixed(vsacli, torso):
     assert bound <= fixed.tools[0].stiffness <= 1.001 * bound  # a factor of four digits
 
 
+@pytest.mark.slow
 def test_a_tool_that_no_stiffness_helps_is_left_out_of_fixes(vsacli, torso):
     limits = ("--set", "tools.left_hand.min_stiffness=1e7", "--set", "tools.lamp.min_stiffness=1.2e5")
     stiff = ("--set", "joints.left_elbow.limits.stiffness=1000")
@@ -249,6 +252,7 @@ BOTH_ARMS = (
 """The torso of the examples, with an elastic waist."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limited", ["left_hand", "right_hand", "*"])
 def test_the_arm_that_buckles_is_stiffened_whichever_tool_is_limited(vsacli, limited):
     """The stretched left arm is pushed along its length, towards the shoulder."""
@@ -267,6 +271,7 @@ def test_the_arm_that_buckles_is_stiffened_whichever_tool_is_limited(vsacli, lim
     assert f"\n1. multiply the stiffness of {joints} by " in outcome.out
 
 
+@pytest.mark.slow
 def test_a_tool_without_stiffness_to_choose_has_no_fix(vsacli):
     hand = "{joint: left_elbow}, right_hand: {joint: right_elbow}"
     chest = "{joint: waist, xyz: [0.1, 0, 0], min_stiffness: 1e6}"
@@ -279,6 +284,7 @@ def test_a_tool_without_stiffness_to_choose_has_no_fix(vsacli):
 SPRUNG_POLE = ("--set", "joints.pole.actuator={type: elastic, motor: {inertia: 0.1}, stiffness: 100}")
 
 
+@pytest.mark.slow
 def test_tools_of_rigid_joints_do_not_yield(vsacli, own_folder):
     rigid = torso_text().replace(ACTUATOR, "{type: rigid, motor: {inertia: 0.1}}")
     (own_folder / "rigid.yaml").write_text(rigid)
@@ -305,6 +311,7 @@ def report_of(files):
     return inverse(files).report
 
 
+@pytest.mark.slow
 def test_figures_show_stiffness_and_path_of_tools(vsacli, torso):
     names = ["motion", "motor-torque", "elastic-torque", "energy", "tool-stiffness", "tool-path"]
     outcome = vsacli("invdyn", *torso, *ASKED, "-o", "swing.h5", "--plot", "drawn")
@@ -352,6 +359,7 @@ def test_an_optimization_refuses_a_limit_that_it_does_not_keep(vsacli, torso):
     assert "check-feasibility --fixes" in found.err
 
 
+@pytest.mark.slow
 def test_simulations_judge_tools_on_simulated_values(vsacli):
     """Feedforward follows the motion, so that the tools are as stiff as along the command."""
     inputs = [REPOSITORY / folder / "hand_3x2r.yaml" for folder in ("robots", "trajectories")]
@@ -381,6 +389,7 @@ def test_a_study_names_the_tool_that_is_too_soft_first(vsacli, own_folder):
     assert column("tips.h5", "first_limit").tolist() == ["", "index_tip tool_stiffness_limit"]
 
 
+@pytest.mark.slow
 def test_analyses_that_do_not_judge_tools_say_so(vsacli, own_folder):
     limited = (REPOSITORY / "robots" / "hand_3x2r.yaml").read_text()
     limited = limited.replace("{joint: index_middle}", "{joint: index_middle, min_stiffness: 100}")

@@ -33,6 +33,7 @@ def noisy(tmp_path):
     return write
 
 
+@pytest.mark.slow
 def test_a_record_that_determines_the_torques(vsacli, tmp_path, noisy):
     done = vsacli("invdyn", ROBOT, noisy("lsq"), "-o", "r.h5")
     assert done.code == 0
@@ -51,6 +52,7 @@ def test_a_record_that_determines_the_torques(vsacli, tmp_path, noisy):
     assert [float(cell) for cell in first.split(",")[1:]] == deviations[0].ravel().tolist()
 
 
+@pytest.mark.slow
 def test_a_fit_that_follows_the_noise_is_used_and_unreliable(vsacli, tmp_path, noisy):
     done = vsacli("invdyn", ROBOT, noisy("interpolate"), "-o", "r.h5")
     assert done.code == 3
@@ -75,6 +77,7 @@ def test_what_is_asked_for_decides(vsacli, noisy):
     assert (feasible.code, share < 0.1) in {(0, True), (3, False)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["stiffness_std", "wrench_std"])
 def test_a_deviation_that_there_is_not_is_refused(vsacli, noisy, name):
     done = vsacli("invdyn", ROBOT, noisy("lsq"), "-o", "r.h5", "--variables", name)

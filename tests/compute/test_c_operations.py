@@ -97,6 +97,7 @@ def test_of_single_samples(tmp_path: Path) -> None:
     assert wrong(found["y"].T, x, y) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("processor", PROCESSORS)
 def test_of_lanes(compiler: str, processor: str, tmp_path: Path) -> None:

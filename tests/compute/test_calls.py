@@ -189,6 +189,7 @@ def test_code_of_calls_computes_the_same_bit_for_bit(joints: int, frame: str | N
     np.testing.assert_array_equal(np.signbit(found), np.signbit(expected))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kernel",
     [LinkTorques(mixed_chain(7)), InverseDynamics(shipped_robot("lwr_7r_vsa"))],

@@ -60,6 +60,7 @@ def one_joint(*laws: SpringLaw) -> Robot:
     return Robot(name="one-joint", joints=(joint_with(springs(*laws)),))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quickly")
 @pytest.mark.parametrize(
     "name", ["vsa_3r", "rp_2", "mixed_3r", "tendon_1r", slow("maccepa_1r"), slow("cam_1r")]
@@ -170,6 +171,7 @@ def joined(robot: Robot, motion: MotionArrays, starts: list[int]) -> np.ndarray:
     return np.concatenate(parts, axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names processors of that kind")
 @pytest.mark.parametrize("processor", ["x86-64", slow("haswell")])
 def test_shorter_vectors_agree(processor: str, monkeypatch: pytest.MonkeyPatch):
@@ -199,6 +201,7 @@ def test_results_depend_neither_on_blocks_nor_on_threads():
         np.testing.assert_array_equal(three.arrays()[name], array)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quickly")
 @pytest.mark.parametrize("stop", [False, True])
 def test_runs_depend_neither_on_blocks_nor_on_threads(stop: bool):
@@ -217,6 +220,7 @@ def test_runs_depend_neither_on_blocks_nor_on_threads(stop: bool):
         assert run.report().as_json() == runs[0].report().as_json()
 
 
+@pytest.mark.slow
 def test_link_torques_of_no_samples():
     empty = np.empty((0, 3))
     for torques in link_torques(vsa_3r(), *[empty] * 5, engine="c"):

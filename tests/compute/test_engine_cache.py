@@ -53,6 +53,7 @@ def files(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.rglob("*") if path.is_file())
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_library_is_kept_and_found(folder: Path):
     assert warnings() == ()
@@ -87,6 +88,7 @@ def test_damaged_library_is_never_loaded(folder: Path, damage: str):
     assert warnings() == ()
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_folder_that_cannot_be_made(tmp_path: Path):
     (tmp_path / "cache").write_text("a file")
@@ -250,10 +252,10 @@ def test_processes_at_once_do_not_meet_half_a_library(folder: Path):
     motion = Path(ROBOT).parents[1] / "trajectories" / "rest_to_rest.yaml"
     command = [sys.executable, "-W", "error", "-c", code, str(ROBOT), str(motion)]
     running = [
-        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(8)
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for _ in range(4)
     ]
     outputs = [process.communicate(timeout=120) for process in running]
-    assert [process.returncode for process in running] == [0] * 8
-    assert outputs == [(outputs[0][0], "")] * 8
+    assert [process.returncode for process in running] == [0] * 4
+    assert outputs == [(outputs[0][0], "")] * 4
     assert files(folder) == [CHECKSUM] * 2 + [LIBRARY] * 2  # of the recursion, and of the energy
     assert len(list(folder.iterdir())) == 2

@@ -62,6 +62,7 @@ def test_few_samples_are_left_to_numpy_and_nothing_is_compiled(name: str, own_ca
     assert not own_cache.exists()
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_auto_compiles_for_many_samples_and_remembers_it_for_fewer():
     rarely, often = LOOK_FROM, 10_000_000
@@ -73,6 +74,7 @@ def test_auto_compiles_for_many_samples_and_remembers_it_for_fewer():
     assert choose("auto", KERNEL, rarely, 1).reason == "C code computes, compiled before, in 1 thread"
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_threads_are_as_many_as_processors_unless_given(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(choice, "processors", lambda: 7)
@@ -151,6 +153,7 @@ def test_link_torques_refuse_an_unknown_engine():
         link_torques(vsa_3r(), *random_motion(vsa_3r(), 2, seed=1), engine="fortran")
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_link_torques_take_an_engine_that_was_chosen_before():
     motion = random_motion(vsa_3r(), 20, seed=1)
@@ -307,6 +310,7 @@ def test_a_cache_from_which_nothing_may_be_run(monkeypatch: pytest.MonkeyPatch, 
     assert sentence.endswith("failed to map segment from shared object; it is compiled anew")
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_what_takes_long_is_announced_and_what_takes_too_long_refused(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(libraries, "LONG_SECONDS", 0.1)

@@ -51,6 +51,7 @@ def faulty_compiler(tmp_path: Path, function: str, statement: str) -> str:
     return str(script)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", slow_but({"writes elsewhere"}, FAULTS))
 def test_faulty_code_is_neither_used_nor_kept(
     fault: str, tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
@@ -79,6 +80,7 @@ def test_a_simulation_does_not_use_faulty_code(
     assert not list(folder.rglob(LIBRARY))
 
 
+@pytest.mark.slow
 def test_the_key_names_the_compiler(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch):
     """A script has the version of the compiler that it calls, whatever it does to the code."""
     script = tmp_path / "wrapped"

@@ -144,6 +144,7 @@ def check_injected(code: Compiled, function: Function, clean: FloatArray, depend
         assert not invented.any(), (function.name, bad, np.argwhere(invented))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["mixed", slow("sinh")])
 def test_all_that_computes_agrees_on_what_is_not_finite(name: str, tmp_path: Path) -> None:
     """NumPy, the compiled engine, and the generated code."""

@@ -93,6 +93,7 @@ def test_inverse_dynamics_of_arms(name: str, tmp_path: Path) -> None:
     check_inverse_dynamics(shipped_robot(name), tmp_path)
 
 
+@pytest.mark.slow
 def test_inverse_dynamics_with_losses(tmp_path: Path) -> None:
     block = check_inverse_dynamics(lossy(), tmp_path)
     for flag in (Flag.CURRENT_LIMIT, Flag.VOLTAGE_LIMIT):

@@ -108,6 +108,7 @@ def test_a_project_under_a_wrench_says_so() -> None:
     assert "rp_2_inverse_dynamics(command, wrench, &drive)" in files["README.md"]
 
 
+@pytest.mark.slow
 def test_functions_under_wrenches_by_tool(tmp_path: Path) -> None:
     frame = ("base", "end_effector")
     robot, wrench = load_robot(two_hands(tmp_path)), drawn_wrench(frame)
@@ -129,6 +130,7 @@ def test_functions_under_wrenches_by_tool(tmp_path: Path) -> None:
         assert_close(found[name], getattr(block, name))
 
 
+@pytest.mark.slow
 def test_feedback_linearization_under_wrenches_by_tool(tmp_path: Path) -> None:
     robot, wrench = load_robot(two_hands(tmp_path)), drawn_wrench((None, "base"))
     wrench.wrench[:, :6] = wrench.dwrench[:, :6] = wrench.ddwrench[:, :6] = 0
@@ -150,6 +152,7 @@ def test_feedback_linearization_under_wrenches_by_tool(tmp_path: Path) -> None:
     assert_close(found["tau_motor"], expected, share=1e-11)  # another factorization of M
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["double", "float"])
 def test_a_project_under_wrenches_by_tool_passes_its_own_test(tmp_path: Path, precision: str) -> None:
     robot = load_robot(two_hands(tmp_path))

@@ -108,6 +108,7 @@ def _damping_of(robot):
     return np.array([joint.damping for joint in robot.joints])
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_code_of_robots_that_differ_in_numbers_is_one():
     """Equal numbers of two joints may make the exact robot's a special one, but not those of errors."""
@@ -158,6 +159,7 @@ def _run_text(**conditions):
         return _run("numpy", **conditions)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_controllers_that_hold_their_torques_are_recorded_too():
     conditions = {"gains": GAINS, "feedback": "positions"}
@@ -246,6 +248,7 @@ def test_runs_with_errors_of_the_model_are_those_of_one_by_one(processes):
         next(simulate_perturbed(robot, trajectory, 0.02, [4], processes=0))
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_code_that_serves_many_runs_is_compiled_sooner(monkeypatch):
     """Compiling takes as long as 4000 evaluations of this robot's program, more than a run has."""
@@ -277,6 +280,7 @@ def test_an_engine_that_there_is_not_is_refused():
         _run("C")
 
 
+@pytest.mark.slow
 def test_motors_that_stick_are_left_to_the_text():
     sharp = Rigid(motor=Motor(inertia=0.5, friction=Friction(coulomb=(2.0, 2.0))))
     robot, trajectory = single_joint(sharp), step_of(1.0)

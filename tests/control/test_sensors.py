@@ -105,6 +105,7 @@ def test_perfect_sensors_change_nothing():
     assert plain.q_measured is None
 
 
+@pytest.mark.slow
 def test_a_controller_that_measures_positions_knows_what_is_recorded():
     """Its torques follow from the recorded positions alone, by the filter and the law."""
     sensors = Sensors(1e-4, encoder_bits=16, seed=2)

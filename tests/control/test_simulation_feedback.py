@@ -108,6 +108,7 @@ def test_computed_torque_obeys_its_linear_dynamics():
     assert np.isnan(past.stiffness).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", [None, "base"])
 def test_accelerations_and_jerks_are_the_derivatives_of_the_simulated_motion(frame):
     robot, trajectory = with_tool(vsa_3r()), short_motion(3, rate=1000, duration=0.4, wrench=frame)

@@ -119,6 +119,7 @@ def test_a_joint_that_is_to_hold_still_may_be_a_milliradian_off(error, verdict):
     assert report.verdict == verdict
 
 
+@pytest.mark.slow
 def test_an_error_of_exactly_the_tolerance_has_arrived():
     error = InitialError([0, 0, 0.01])
     joints = simulate(vsa_3r(), short_motion(3), initial_error=error).report.joints

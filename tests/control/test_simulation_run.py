@@ -43,6 +43,7 @@ def with_torque_limit(robot, limit):
     return dataclasses.replace(robot, joints=(joint, *robot.joints[1:]))
 
 
+@pytest.mark.slow
 def test_motors_saturate():
     conditions = {"gains": GAINS, "initial_error": InitialError(0.02, 20)}
     free = simulate(vsa_3r(), short_motion(3), **conditions).report.joints[0].peak_tau_motor[0]

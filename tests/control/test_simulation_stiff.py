@@ -42,6 +42,7 @@ def go_on_implicitly(monkeypatch, after):
     monkeypatch.setattr(Budget, "too_slow", lambda _self, time: time > after)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [slow(1e9), 1e12])
 def test_a_joint_like_steel_under_drifted_feedforward_moves_as_in_closed_form(stiffness):
     """The center s = (M q + B theta)/(M + B) obeys (M + B) s'' = tau, and the spring stands still.
@@ -66,6 +67,7 @@ def test_a_joint_like_steel_under_drifted_feedforward_moves_as_in_closed_form(st
     assert simulation.report.verdict == "off_target"
 
 
+@pytest.mark.slow
 def test_poles_of_a_million_hold_a_rigid_joint_on_its_command():
     """An error at the start is gone before the first sample, as (1 + p t) exp(-p t) is."""
     gains = Gains.from_poles([-1e6] * 2)
@@ -76,6 +78,7 @@ def test_poles_of_a_million_hold_a_rigid_joint_on_its_command():
     assert np.abs(simulation.history.q_error[1:]).max() < 1e-7  # the method's order falls where it is stiff
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("gains", "frame"), [(None, None), slow(GAINS, "base")])
 def test_both_methods_find_the_same_motion(monkeypatch, gains, frame):
     conditions = {"gains": gains, "initial_error": InitialError(0.01)}
@@ -104,6 +107,7 @@ def test_controllers_with_encoders_can_be_stiff(monkeypatch):
     assert switched.history.q == pytest.approx(explicit.history.q, abs=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["slack", slow("singular")])
 def test_runs_end_at_the_same_boundary_with_both_methods(monkeypatch, what):
     conditions = {"gains": GAINS}
@@ -123,6 +127,7 @@ def test_runs_end_at_the_same_boundary_with_both_methods(monkeypatch, what):
     assert np.array_equal(implicit.history.flags[-1], explicit.history.flags[-1])
 
 
+@pytest.mark.slow
 def test_what_was_integrated_when_the_budget_is_used_up_is_kept():
     whole = simulate(vsa_3r(), short_motion(3))
     cut = simulate(vsa_3r(), short_motion(3), budget=300)
@@ -162,6 +167,7 @@ def test_a_run_that_ends_before_its_first_step_reports_no_error():
     assert "largest q error" in str(simulate(vsa_3r(), short_motion(3), budget=300).report)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_within_its_budget_does_not_depend_on_it():
     free = simulate(vsa_3r(), short_motion(3))
     enough = simulate(vsa_3r(), short_motion(3), budget=4 * free.report.evaluations)
@@ -212,6 +218,7 @@ def test_the_time_from_which_a_method_was_used_is_a_stamp(monkeypatch):
     assert 1e6 + 0.1 < implicit.start < 1e6 + 0.2
 
 
+@pytest.mark.slow
 def test_a_run_with_the_full_state_that_ends_early_is_told():
     trajectory = short_motion(3, rate=100, duration=0.3)
     report = simulate(vsa_3r(), trajectory, gains=GAINS, feedback="positions", budget=300).report

@@ -155,6 +155,7 @@ def test_what_python_prints_of_a_float_reads_back(value):
     assert evaluate(repr(value), "1") == value
 
 
+@pytest.mark.slow
 @given(st.text(alphabet="0123456789.eE+-*/()pi deg_:,xnaf", max_size=40) | st.text(max_size=40))
 def test_any_text_is_a_finite_number_or_refused(text):
     try:

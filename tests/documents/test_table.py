@@ -260,6 +260,7 @@ def test_large_binary_file_under_a_valid_header_is_refused_early(tmp_path, unit)
     assert peak < 5 * CHUNK
 
 
+@pytest.mark.slow
 def test_values_are_those_of_numpy(tmp_path):
     path = tmp_path / "long.csv"
     values = np.random.default_rng(1).normal(size=(3 * CHUNK // 60, 3))  # several chunks

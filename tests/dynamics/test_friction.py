@@ -80,7 +80,7 @@ def test_a_gear_turns_friction_with_the_velocity(ratio, friction):
         assert law(motor, velocity) == pytest.approx(ratio * law(friction, ratio * velocity), rel=1e-14)
 
 
-@pytest.mark.parametrize("engine", ["numpy", "c"])
+@pytest.mark.parametrize("engine", ["numpy", slow("c")])
 @pytest.mark.parametrize("friction", [SHARP, SMOOTH])
 def test_friction_adds_to_the_motor_torque(engine, friction):
     robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")

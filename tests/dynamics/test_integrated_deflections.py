@@ -87,6 +87,7 @@ def test_corridor_is_that_of_the_root():
         np.testing.assert_array_equal(getattr(crossing, name), getattr(root, name))
 
 
+@pytest.mark.slow
 def test_first_step_is_the_root_itself():
     trajectory = motion()
     start = integrate_deflections(ARM, trajectory).at(np.zeros(1))

@@ -55,6 +55,7 @@ def test_steps_after_the_end_are_infeasible(touching: Result):
     assert np.isfinite(touching.tau_e).all()
 
 
+@pytest.mark.slow
 def test_way_holds_no_number_at_its_very_end():
     deflections = softened()
     _, stop = deflections.stops

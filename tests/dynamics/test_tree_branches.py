@@ -15,7 +15,7 @@ from vsacli.base.variables import VARIABLES
 ROUNDING = 1e-12
 """Of the peak of each joint: forces of several branches are added in another order; 1e-14 is seen."""
 
-pytestmark = pytest.mark.cases(8)
+pytestmark = pytest.mark.cases(5)
 
 trees = pytest.mark.parametrize("case", tree_cases(50))
 

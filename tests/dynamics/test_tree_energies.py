@@ -15,7 +15,7 @@ from vsacli.dynamics.inverse import compute_block
 ROUNDING = 1e-12
 """Of the largest energy or power: sums of some thousand terms."""
 
-pytestmark = pytest.mark.cases(8)
+pytestmark = pytest.mark.cases(5)
 
 trees = pytest.mark.parametrize("case", tree_cases(50))
 

@@ -24,7 +24,7 @@ from vsacli.robot.model import Robot
 EXACT = 1e-12
 """Relative to the largest entry: two different sums of some thousand terms, each good to 1e-16."""
 
-pytestmark = pytest.mark.cases(8)
+pytestmark = pytest.mark.cases(4)
 
 trees = pytest.mark.parametrize("seed", slow_but(SMALL, range(50)))
 

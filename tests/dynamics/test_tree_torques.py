@@ -29,7 +29,7 @@ EQUAL = 1e-13
 
 SAMPLES = 10
 
-pytestmark = pytest.mark.cases(12)
+pytestmark = pytest.mark.cases(5)
 
 trees = pytest.mark.parametrize("seed", slow_but((1, *SMALL), range(100)))
 some_trees = pytest.mark.parametrize("seed", slow_but(SMALL, range(50)))

@@ -93,6 +93,7 @@ def test_the_list_can_be_limited(vsacli: Callable[..., Any]):
     assert outcome.err == ""
 
 
+@pytest.mark.slow
 def test_a_copy_has_the_tables_of_springs_with_it(vsacli: Callable[..., Any], tmp_path: Path):
     outcome = vsacli("examples", "measured_1r", "--copy", "mine/of these")
     assert outcome.code == 0

@@ -60,6 +60,7 @@ def test_the_spline_follows_motion_to_the_cutoff_and_no_noise_behind(noisy: Reco
     np.testing.assert_allclose(spectrum.fitted[motion], spectrum.recorded[motion], rtol=0.02)
 
 
+@pytest.mark.slow
 def test_motion_does_not_leak_over_noise_of_a_billionth() -> None:
     noise = 1e-9 * np.random.default_rng(2).standard_normal(5001)
     spectrum = curve_of(sines() + noise, fit="interpolate").spectrum

@@ -116,7 +116,7 @@ BOMB = "<!DOCTYPE r [<!ENTITY a0 'ha'>" + "".join(
         "<!DOCTYPE r [<!ENTITY f SYSTEM 'file:///etc/passwd'>]><robot name='&f;'/>",
         "<!DOCTYPE r SYSTEM 'http://localhost/evil.dtd'><robot name='r'/>",
         "<a>" * 100_000,
-        "<robot " + " ".join(f"a{i}='1'" for i in range(100_000)) + "/>",
+        slow("<robot " + " ".join(f"a{i}='1'" for i in range(100_000)) + "/>"),
         "<robot name='" + "x" * 1_000_000 + "'/>",
         slow("<robot>" + "<link name='a'/>" * 100_000 + "</robot>"),
     ],

@@ -88,6 +88,7 @@ def test_a_first_row_of_missing_numbers_is_no_row_of_units(vsacli: Command, tmp_
     assert "skip_rows" not in vsacli("info", "log.csv", "--robot", ROBOT).out
 
 
+@pytest.mark.slow
 def test_skipped_rows_are_skipped_by_compare(vsacli: Command, tmp_path: Path) -> None:
     lines = table()
     run_proposal(vsacli, lines, tmp_path)
@@ -199,6 +200,7 @@ def test_lists_in_cells_are_named(vsacli: Command, tmp_path: Path) -> None:
     assert "no complete trajectory file for this recording: no column is recognized as the position of" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stamps", "cause"),
     [
@@ -314,6 +316,7 @@ def test_variants_of_a_signal_are_one_joint_and_commands_no_measurements(tmp_pat
     )
 
 
+@pytest.mark.slow
 def test_numbered_columns_of_the_format_for_named_joints(vsacli: Command, tmp_path: Path) -> None:
     names = {"q1": MOTION["shoulder_position"], "q2": MOTION["elbow_position"], "dq1": TIME, "dq2": TIME}
     assert_motion(run_proposal(vsacli, table(**names), tmp_path))
@@ -326,6 +329,7 @@ def test_numbered_columns_of_the_format_for_named_joints(vsacli: Command, tmp_pa
     assert "dq" not in compared
 
 
+@pytest.mark.slow
 def test_columns_that_have_the_names_of_the_format_are_a_trajectory(vsacli: Command, tmp_path: Path) -> None:
     columns: dict[str, Any] = {
         f"{joint}.q": values for joint, values in zip(("shoulder", "elbow"), MOTION.values(), strict=True)
@@ -361,10 +365,12 @@ def test_columns_without_names_are_counted(vsacli: Command, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("first", [0, 100])  # the second half was not used to choose words
-def test_random_headers_and_layouts(tmp_path: Path, first: int) -> None:
+@pytest.mark.cases(2)  # which have every kind of header, layout and fault
+@pytest.mark.parametrize("part", range(5))
+@pytest.mark.parametrize("half", [0, 100])  # the second one was not used to choose words
+def test_random_headers_and_layouts(tmp_path: Path, half: int, part: int) -> None:
     robot = load_robot(ROBOT)
-    for seed in range(first, first + 100):
+    for seed in range(half + part, half + 100, 5):
         log = random_log(seed)
         (tmp_path / "log.csv").write_text(log.content)
         found = describe_recording(tmp_path / "log.csv", robot)

@@ -161,6 +161,7 @@ def test_columns_that_are_called_as_the_joints(tmp_path: Path) -> None:
     assert taken(found) == {"time": "t", "elbow.q": "elbow_position"}
 
 
+@pytest.mark.slow
 def test_a_quantity_that_is_not_known_is_no_position(tmp_path: Path) -> None:
     """Whatever numbers and joints its columns are called after."""
     names = [
@@ -306,6 +307,7 @@ def test_a_log_without_times_has_a_rate(vsacli: Command, tmp_path: Path) -> None
     np.testing.assert_array_equal(unstamped.block(0, ROWS).time, TIME)
 
 
+@pytest.mark.slow
 def test_the_rate_is_an_option_of_invdyn(vsacli: Command, tmp_path: Path) -> None:
     """What is computed once more from the result alone is the same."""
     columns = {"shoulder__q": POSITION, "elbow__q": POSITION / 2}

@@ -41,7 +41,7 @@ def elsewhere(vsacli: Any, tmp_path: Path) -> Path:
     return tmp_path
 
 
-MARKS = {"integrated": pytest.mark.slow, "compiled": needs_compiler}
+MARKS = {"integrated": pytest.mark.slow, "compiled": [needs_compiler, pytest.mark.slow]}
 
 
 @pytest.mark.parametrize(

@@ -81,6 +81,7 @@ def test_representations_say_what_carries_and_is_carried(own_folder):
     assert "<td>left_hand</td>" in robot._repr_html_()
 
 
+@pytest.mark.slow
 def test_columns_of_wrenches_by_tool_need_no_robot(vsacli, own_folder):
     """Tools are those that the columns name; a proposed trajectory has their wrenches as a comment."""
     inputs = [REPOSITORY / folder / "hand_3x2r.yaml" for folder in ("robots", "trajectories")]

@@ -47,7 +47,7 @@ def test_everything_that_comes_along_is_valid(vsacli: Any, stems: tuple[str, ...
     assert (done.code, done.err) == (0, "")
     assert done.out.count(": ok, robot ") == len(robots) >= 3
     assert done.out.count(": ok, trajectory ") == len(trajectories) >= 3
-    assert vsacli("validate", *robots, "-q").out == ""
+    assert vsacli("validate", *robots[:3], "-q").out == ""
 
 
 @pytest.mark.parametrize("path", TRAJECTORIES, ids=lambda path: path.stem)

@@ -250,6 +250,7 @@ except StorageError as error:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but(["parquet"], FORMATS))
 def test_a_full_disk_leaves_no_file(tmp_path, name):
     write_result(tmp_path / "r.h5", random_block(SAMPLES, 2))

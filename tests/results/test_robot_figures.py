@@ -214,6 +214,7 @@ def test_views_have_gravity_downward_and_are_right_handed(file: Path) -> None:
         assert view.right @ view.up == pytest.approx(0)
 
 
+@pytest.mark.slow
 def test_a_tree_is_drawn_with_every_branch_and_tool(tmp_path: Path) -> None:
     robot = load_robot(written(tmp_path, torso_text()))
     arm = arm_chart(robot)

@@ -195,6 +195,7 @@ def test_xarray_opens_it_with_named_coordinates_and_no_warning(path, block):
     assert one.joint_type == "prismatic"
 
 
+@pytest.mark.slow
 def test_xarray_opens_single_precision(tmp_path, block):
     path = write_result(tmp_path / "r.h5", block, precision="single")
     with xarray.open_dataset(path, engine="h5netcdf") as data:
@@ -211,6 +212,7 @@ def test_xarray_opens_the_groups_too(path):
     assert joints.link_com.sel(joint="j1", axis="z") == 1.3
 
 
+@pytest.mark.slow
 def test_blocks_of_any_size_give_the_same_file(tmp_path, block, monkeypatch):
     monkeypatch.setattr("vsacli.results.store.new_file.CHUNK_BYTES", 2**11)  # several chunks in 250 samples
 
@@ -225,6 +227,7 @@ def test_blocks_of_any_size_give_the_same_file(tmp_path, block, monkeypatch):
     assert contents(SAMPLES) == contents(7) == contents(64)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_early_keeps_the_steps_so_far(tmp_path, block):
     path = tmp_path / "r.h5"
     with writing(path, robot(), PlannedTrajectory(10_000)) as writer:

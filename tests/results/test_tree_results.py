@@ -45,6 +45,7 @@ def path(tmp_path_factory: pytest.TempPathFactory, result: Result) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_wrench_has_a_dimension_of_tools(result, path):
     assert result.wrench.shape == (41, 3, 6)
     assert np.array_equal(result.wrench[0].ravel(), PUSHES)

@@ -132,6 +132,7 @@ def test_profiles(rig: Callable[..., None], vsacli, tmp_path: Path, table: str, 
     assert message in line
 
 
+@pytest.mark.slow
 def test_the_profile_is_among_the_inputs_and_its_misfit_is_told(
     rig: Callable[..., None], vsacli, tmp_path: Path
 ):

@@ -148,6 +148,7 @@ def test_a_tendon_that_is_slack_does_not_push(name):
         assert data.qfrc_passive[1] < 0 == data.qfrc_passive[2]
 
 
+@pytest.mark.cases(20)  # of every mechanism, with rotors coupled in either way or not
 @pytest.mark.parametrize("coupled", [0, 0.06, -0.07])
 @pytest.mark.parametrize("name", DEVICES)
 def test_every_mechanism_with_coupled_rotors(name, coupled):

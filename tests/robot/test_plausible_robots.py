@@ -112,6 +112,7 @@ def test_random_robots_of_other_tests(seed):
     assert Robot(name="random", joints=joints).warnings == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("column", "factor", "rule"), [(0, 57.3, "half a turn"), (1, 1000, "N mm/rad")])
 def test_a_table_of_a_spring_in_other_units(column, factor, rule, tmp_path):
     text = (REPOSITORY / "robots" / "measured_spring.csv").read_text()

@@ -252,6 +252,7 @@ ROUGH = f"{DEFLECTIONS[3]:g},{1.001 * TORQUES[3]:.12g}"
 """A row that the curve misses."""
 
 
+@pytest.mark.slow
 def test_misfit_is_a_warning_that_names_the_joint(vsacli, rig: Path):
     (rig.parent / "spring.csv").write_text(rows(row_3=ROUGH))
     (warning,) = load_robot(rig).warnings
@@ -271,6 +272,7 @@ def test_misfit_of_either_side_is_told(rig: Path):
     assert len(load_robot(rig).sources) == 3
 
 
+@pytest.mark.slow
 def test_shared_table_is_one_source(rig: Path):
     joint = ROBOT.split("joints:\n")[1]
     rig.write_text((ROBOT + joint.replace("swing", "turn")).replace("SPRING", TABLE))

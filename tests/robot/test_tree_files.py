@@ -160,6 +160,7 @@ def test_wrong_changes_are_refused(change: str, message: str, own_folder: Path, 
     assert outcome.err.splitlines() == [f"--set {change}: {message}"]
 
 
+@pytest.mark.cases(5)
 @pytest.mark.parametrize("seed", slow_but(SMALL[:1], range(30)))
 def test_the_schema_accepts_what_the_reader_does(seed: int, vsacli: Run) -> None:
     schema = Draft202012Validator(json.loads(vsacli("schema", "robot").out))

@@ -20,7 +20,7 @@ ROUNDING = 1e-12
 
 SAMPLES = 10
 
-pytestmark = pytest.mark.cases(8)
+pytestmark = pytest.mark.cases(4)
 
 trees = pytest.mark.parametrize("seed", slow_but(SMALL, range(50)))
 

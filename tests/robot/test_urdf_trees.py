@@ -140,6 +140,7 @@ def by_name(names, values):
     return {name: values[..., index] for index, name in enumerate(names)}
 
 
+@pytest.mark.cases(8)  # two of each tree
 @pytest.mark.parametrize(("letters", "shape", "seed"), [c if c in QUICK else slow(*c) for c in CASES])
 def test_random_trees_in_any_order(urdf, letters, shape, seed):
     limits = STROKE.replace("-0.2", "-1")
@@ -165,6 +166,7 @@ def test_random_trees_in_any_order(urdf, letters, shape, seed):
     np.testing.assert_allclose(again, torques[:, order], rtol=0, atol=1e-10 * np.abs(torques).max())
 
 
+@pytest.mark.cases(8)  # two of each tree
 @pytest.mark.parametrize(("letters", "shape", "seed"), [c if c in QUICK else slow(*c) for c in CASES])
 def test_no_pose_loads_a_joint_of_a_tree_more_than_it_is_sized_for(urdf, letters, shape, seed):
     text = random_tree(letters, PARENTS[shape], seed).replace("</joint>", f"{STROKE}</joint>")

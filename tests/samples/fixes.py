@@ -42,7 +42,7 @@ def rest_to_rest(
     *,
     start: tuple[float, ...] = (0.0, 0.0, 0.0),
     end: tuple[float, ...] = PAPER_END,
-    rate: float = 1000.0,
+    rate: float = 250.0,
 ) -> Trajectory:
     """A polynomial of degree 7 at constant stiffness."""
     times = UniformTimes(duration, rate)

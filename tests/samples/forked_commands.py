@@ -36,6 +36,8 @@ if code < 0:
 sys.exit(code)
 """
 
+ONE_PROCESS = "--one-process"
+
 FROM_ELSEWHERE = (
     "bokeh.plotting",
     "h5py",
@@ -47,14 +49,18 @@ FROM_ELSEWHERE = (
 
 
 @contextlib.contextmanager
-def command_server(folder: Path) -> Iterator[Path]:
-    """Serve commands, and yield a folder for the search path, in which a client stands as `vsacli`."""
+def command_server(folder: Path, *options: str) -> Iterator[Path]:
+    """Serve commands, and yield a folder for the search path, in which a client stands as `vsacli`.
+
+    With the option `ONE_PROCESS` studies start no others, each of which would import everything again,
+    unless they are told how many; tests that run at the same time keep the machine busy anyway.
+    """
     command = folder / "bin" / "vsacli"
     command.parent.mkdir()
     command.write_text(CLIENT.format(python=sys.executable, folder=str(folder)))
     command.chmod(0o755)
     server = subprocess.Popen(
-        [sys.executable, "-P", __file__],
+        [sys.executable, "-P", __file__, *options],
         cwd=folder,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -72,9 +78,11 @@ def command_server(folder: Path) -> Iterator[Path]:
         server.wait()
 
 
-def serve() -> None:
+def serve(*options: str) -> None:
     """Run commands of clients until standard input is closed."""
     import_everything()
+    if ONE_PROCESS in options:
+        importlib.import_module("vsacli.studies.sweeps.executors").processors = lambda: 1
     with socket.socket(socket.AF_UNIX) as server:
         server.bind("socket")
         server.listen()
@@ -138,4 +146,4 @@ def execute(streams: list[int], arguments: list[str], folder: str, environment: 
 
 
 if __name__ == "__main__":
-    serve()
+    serve(*sys.argv[1:])

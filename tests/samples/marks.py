@@ -16,6 +16,11 @@ def slow(*values: Any) -> Any:
     return pytest.param(*values, marks=pytest.mark.slow)
 
 
+def exhaustive(*values: Any) -> Any:
+    """One case of a test, of which other cases cover the kind, that only runs before a release."""
+    return pytest.param(*values, marks=[pytest.mark.slow, pytest.mark.exhaustive])
+
+
 def slow_but(quick: Collection[Any], cases: Iterable[Any]) -> list[Any]:
     """All cases, of which only some are quick."""
     whole = list(cases)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -32,9 +33,8 @@ def shown_texts(figure: Figure) -> list[tuple[Text, Bbox]]:
     return [(text, text.get_window_extent()) for text in texts if text not in hidden]
 
 
-def collisions(figure: Figure) -> list[tuple[str, str]]:
-    """Pairs of texts that overlap, and texts with the edge of the figure that cuts them off."""
-    boxes = shown_texts(figure)
+def collisions(figure: Figure, boxes: Sequence[tuple[Text, Bbox]]) -> list[tuple[str, str]]:
+    """Pairs of shown texts that overlap, and texts with the edge of the figure that cuts them off."""
     pairs = [
         (one.get_text(), other.get_text())
         for (one, box), (other, beside) in combinations(boxes, 2)

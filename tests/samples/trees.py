@@ -56,10 +56,15 @@ def random_tree(seed: int, joints: int | None = None) -> Robot:
     return replace(robot, tools=_random_tools(rng, robot))
 
 
-def tree_cases(count: int) -> list[Any]:
-    """Seeds and numbers of joints, None for any: a small tree of two fingers, and slow cases of all sizes."""
+def tree_cases(count: int, joints: int | None = None) -> list[Any]:
+    """Seeds and numbers of joints, None for any: a small tree of two fingers, and slow cases of all sizes.
+
+    With a number of joints, every tenth slow case but the first has so many. Without, five at equal distances
+    of fifty have every kind of actuator, joint and seat, and one to three tools.
+    """
     quick = (0, 4)
-    return slow_but([quick], [quick, *((seed, None) for seed in range(count))])
+    drawn = ((seed, joints if seed and seed % 10 == 0 else None) for seed in range(count))
+    return slow_but([quick], [quick, *drawn])
 
 
 def without_resistance(robot: Robot) -> Robot:

@@ -107,5 +107,8 @@ stiffness: {type: constant, value: [1500, 790, 1500]}
 
 
 @pytest.mark.slow
-def test_every_advised_constant_of_random_tasks_fixes_the_motion() -> None:
-    assert sum(map(check, range(20))) >= 20
+@pytest.mark.cases(1)
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_every_advised_constant_of_random_tasks_fixes_the_motion(first: int) -> None:
+    seeds = range(first, 20, 3)
+    assert sum(map(check, seeds)) >= len(seeds)

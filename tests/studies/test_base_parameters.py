@@ -46,6 +46,7 @@ def test_the_regressor_is_lagranges(types: str) -> None:
         assert found == pytest.approx(expected, abs=1e-11 * np.abs(expected).max())  # rounding
 
 
+@pytest.mark.slow
 def test_base_and_tool_of_a_robot() -> None:
     """The base turns gravity; the tool has no mass."""
     robot = dataclasses.replace(

@@ -72,7 +72,7 @@ def test_pointwise_change_is_smaller_than_a_constant():
 
 def test_fastest_is_as_fast_as_a_limit_of_the_motion_lets_it():
     robot = changed(BASE, limits=Limits(velocity=(-2.0, 2.0)))
-    trajectory = rest_to_rest(1.0, 810.0)
+    trajectory = rest_to_rest(1.0, 810.0, rate=1000.0)
     peak = math.pi / 2 * math.factorial(7) / math.factorial(3) ** 2 / 4**3  # of the degree 7, in 1 s
     found = search(robot, trajectory).fastest()
     assert 0 <= found.factor - peak / 2.0 <= 1.01e-3  # whole periods of 1 kHz
@@ -82,7 +82,7 @@ def test_fastest_is_as_fast_as_a_limit_of_the_motion_lets_it():
 @pytest.mark.slow
 def test_too_fast_and_slightly_too_soft_takes_both():
     robot = changed(BASE, limits=Limits(velocity=(-2.0, 2.0)))
-    found = fixes(robot, rest_to_rest(1.0, 810.0))
+    found = fixes(robot, rest_to_rest(1.0, 810.0, rate=1000.0))
     assert not any(
         each.possible for each in (found.slow_down, found.stiffness_offset, found.stiffness_profile)
     )

@@ -99,6 +99,7 @@ def test_a_signal_that_lags_behind_the_others_is_told(computed, tmp_path):
     assert not abs(lags["base.tau_motor_1"]) >= 5e-4  # NaN says that there is none
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cut", [(0.0, 1.2), (1.0, 2.2), (2.0, 3.6)])
 def test_a_piece_cut_out_of_the_motion_is_found(computed, tmp_path, cut):
     columns = recorded(computed)
@@ -213,6 +214,7 @@ def test_one_wild_cell_is_said_and_nothing_fails(vsacli, computed, tmp_path, arg
     assert "base.q has 1 sample far from all others" in done.out
 
 
+@pytest.mark.slow
 def test_joints_that_hold_still_judge_nothing(vsacli, tmp_path):
     (tmp_path / "wave.yaml").write_text(MOTION.replace("end: [0.9, 0.5, -0.7]", "end: [0, 0.5, 0]"))
     assert vsacli("invdyn", ROBOT, "wave.yaml", "-o", "r.h5").code == 0
@@ -441,6 +443,7 @@ def test_a_short_overlap_is_reported_first(vsacli, computed, tmp_path):
     assert "\nwarning: only 0.0983 s (50 rows) of 3 s overlap\n" in done.out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("computed")
 def test_an_infeasible_result_is_reported_first(vsacli):
     soft = vsacli("invdyn", "robot.yaml", "wave.yaml", "--set", "stiffness.start=750", "-o", "bad.h5")

@@ -50,6 +50,7 @@ def test_links_have_what_was_found_of_other_bodies(types: str, seed: int) -> Non
     assert again == pytest.approx(found.values, abs=3e-3 * np.abs(found.values).max())  # three errors
 
 
+@pytest.mark.slow
 def test_links_that_have_it_already_stay() -> None:
     robot = random_robot("RRP", seed=3)
     bodies = consistent_links(robot, told(robot, robot))

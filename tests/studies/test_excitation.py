@@ -77,6 +77,7 @@ def test_limits_of_motors_make_it_smaller() -> None:
                 assert np.abs(values[:, index, number]).max() < (1 - MARGIN + BETWEEN) * bound
 
 
+@pytest.mark.slow
 def test_joints_and_motors_begin_and_end_at_rest(planned: Excitation) -> None:
     run = inverse_dynamics(planned.robot, planned.trajectory)
     for rate in (run.dq, run.ddq, run.d3q, run.d4q, run.dstiffness, run.ddstiffness):
@@ -163,6 +164,7 @@ def test_what_a_robot_has_no_limit_of_is_said_with_what_was_assumed() -> None:
     assert np.abs(motion.dq).max() < 1
 
 
+@pytest.mark.slow
 def test_a_robot_that_cannot_do_anything_is_told_why() -> None:
     robot = shipped_robot("coupled_1r")
     (joint,) = robot.joints

@@ -109,12 +109,14 @@ def test_branch_of_a_mechanism_is_changed_where_it_stands(tmp_path: Path) -> Non
     assert load_robot(path).joints == changed.joints
 
 
+@pytest.mark.slow
 def test_files_that_the_robot_names_are_found_from_elsewhere(tmp_path: Path) -> None:
     fix = fix_with(REPOSITORY / "robots" / "measured_1r.yaml", "elbow", "negative")
     *_, path = written(fix, tmp_path / "fixed.yaml")
     assert load_robot(path).joints[0].actuator.branch == "negative"
 
 
+@pytest.mark.slow
 def test_robot_that_has_no_file_cannot_be_written(tmp_path: Path) -> None:
     fix = fix_with(REPOSITORY / "robots" / "measured_1r.yaml", "elbow", "negative")
     fix = dataclasses.replace(fix, robot=dataclasses.replace(fix.robot, sources=()))

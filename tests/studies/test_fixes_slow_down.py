@@ -135,9 +135,9 @@ def test_motion_that_passes_the_horizontal_while_braking_must_be_neither_fast_no
 
 @pytest.mark.slow
 def test_steps_between_the_watched_ones_count():
-    """A dip of the stiffness three steps wide, in 10 001 steps of which a thousand are watched at first."""
-    duration, at = 0.5, 4063
-    smooth = rest_to_rest(duration, 880.0, rate=20_000)
+    """A dip of the stiffness three steps wide, in 5001 steps of which a thousand are watched at first."""
+    duration, at = 0.5, 2031
+    smooth = rest_to_rest(duration, 880.0, rate=10_000)
     motion = smooth.block(0, smooth.samples)
     dip = np.zeros_like(motion.commanded["stiffness"])
     dip[at - 1 : at + 2, BASE] = -60.0
@@ -173,13 +173,13 @@ def test_wrench_counts_and_is_stretched_too():
 
 @pytest.mark.slow
 def test_wrench_between_the_watched_steps_counts():
-    """A push one step long, in 4001 steps of which a thousand are watched at first."""
-    motion = rest_to_rest(0.5, 870.0, rate=8_000).block(0, 4001)
+    """A push one step long, in 2001 steps of which a thousand are watched at first."""
+    motion = rest_to_rest(0.5, 870.0, rate=4_000).block(0, 2001)
     columns = {
         name: motion.of_joints[name] for name in ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")
     }
-    wrench, none = np.zeros((4001, 6)), np.zeros((4001, 6))
-    wrench[1103, 3:] = -20.0
+    wrench, none = np.zeros((2001, 6)), np.zeros((2001, 6))
+    wrench[551, 3:] = -20.0
     trajectory = Trajectory.from_samples(
         motion.time,
         motion.q,
@@ -190,5 +190,5 @@ def test_wrench_between_the_watched_steps_counts():
         ddwrench=none,
     )
     factor = slow_down(vsa_3r(), trajectory)
-    assert factor > slow_down(vsa_3r(), rest_to_rest(0.5, 870.0, rate=8_000))
+    assert factor > slow_down(vsa_3r(), rest_to_rest(0.5, 870.0, rate=4_000))
     check_smallest(vsa_3r(), trajectory, factor)

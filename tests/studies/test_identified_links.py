@@ -137,6 +137,7 @@ def test_base_parameters_are_within_two_standard_errors(case: str, tmp_path: Pat
     assert np.std(off) > 0.6, "errors that are too large cover all"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", slow_but(("RP",), CASES))
 def test_torques_by_what_was_found_are_those_that_were(case: str, tmp_path: Path) -> None:
     """Of the same motion, by the links as bodies, without the noise: within 1 % of their root mean square."""

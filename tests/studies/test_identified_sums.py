@@ -67,6 +67,7 @@ def _record(arm: Robot, moved: Recorded, tmp_path: Path) -> Path:
     return moved.noisy(seed=1, torque=0.05).write(tmp_path / "record.csv", arm)
 
 
+@pytest.mark.slow
 def test_dampings_of_a_rigid_joint_are_found_as_their_sum(
     vsacli: Command, record: Path, moved: Recorded
 ) -> None:
@@ -143,6 +144,7 @@ def test_missing_positions_are_the_reason_why_rigid_joints_are_not_identified(
         identify(arm, path, fit=["motors"])
 
 
+@pytest.mark.slow
 def test_damping_that_is_zero_stays_zero_unless_its_path_is_given(arm: Robot, record: Path) -> None:
     start = arm.replace("joints.upper.actuator.motor.damping", 0)
     paths = {number.path for number in identify(arm, record).numbers}
@@ -155,6 +157,7 @@ def test_damping_that_is_zero_stays_zero_unless_its_path_is_given(arm: Robot, re
     assert abs(number.value - 0.4) < 4 * number.standard_error
 
 
+@pytest.mark.slow
 def test_friction_of_two_directions_and_its_offset_are_sums(tmp_path: Path) -> None:
     """Of three, any motion determines two: the offset adds to one direction and takes from the other."""
     arm = shipped_robot("vsa_3r")

@@ -111,6 +111,7 @@ def test_standard_errors_say_how_far_off_numbers_are(name: str) -> None:
     assert len(errors) > 5 * SEEDS
 
 
+@pytest.mark.slow
 def test_identify_reports_what_a_record_tells(tmp_path: Path) -> None:
     lab = arm({"joints.*.actuator.spring.k": 380, "joints.elbow.actuator.motor.inertia": 2.2})
     record = excited(lab, ARM).noisy(seed=2).write(tmp_path / "record.csv", lab)

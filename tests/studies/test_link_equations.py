@@ -50,6 +50,7 @@ def test_a_periodic_excitation_tells_all_base_parameters_of_the_papers_arm() -> 
     assert fit.values == pytest.approx(system.before, abs=1e-9)  # condition 33
 
 
+@pytest.mark.slow
 def test_what_springs_carry_changes_with_their_numbers() -> None:
     robot, signals = computed_signals("vsa_3r", "vsa_3r_excitation")
     base = base_parameters(robot)

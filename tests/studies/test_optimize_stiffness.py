@@ -233,6 +233,7 @@ def test_no_constant_of_a_dense_grid_is_better(arm, load, criterion):
     assert np.ptp(found.rows[0]) < 1e-9 * found.rows[0, 0]
 
 
+@pytest.mark.slow
 def test_sharp_friction_leaves_an_optimum(arm, load):
     """Unsmoothed, sums over instants jump wherever a motor stops at another one, and a search gets stuck."""
     shoulder = arm.joints[SHOULDER]

@@ -94,7 +94,7 @@ def test_what_nothing_holds_back_is_no_optimum():
 @pytest.mark.slow
 def test_a_motion_rests_on_its_way_as_long_as_commanded(arm):
     """No motor has a limit: what holds the motion back between its dwells are the ends of the corridors."""
-    motion = load_trajectory(REPOSITORY / "trajectories" / "vsa_3r_pick_and_place.yaml", arm, {"rate": 250})
+    motion = load_trajectory(REPOSITORY / "trajectories" / "vsa_3r_pick_and_place.yaml", arm, {"rate": 100})
     found = optimize(arm, motion, "time", "timing")
 
     def resting(trajectory):

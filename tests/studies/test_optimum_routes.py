@@ -145,7 +145,7 @@ def test_limits_hold_between_samples_of_random_motions() -> None:
 def test_what_has_no_stiffness_as_commanded_has_one_at_another_pace(shorter: float, slow_down: float) -> None:
     """Beyond the largest velocity at half the duration; at a third of it no pace keeps to that."""
     robot = load_robot(TENDON)
-    motion = load_trajectory(PULL, robot, {"rate": 100}).stretched(shorter)
+    motion = load_trajectory(PULL, robot, {"rate": 40}).stretched(shorter)
     assert not optimize(robot, motion, "torque").possible
     found = optimize(robot, motion, "torque", "both", min_margin=MARGIN)
     assert found.slow_down == pytest.approx(slow_down, rel=0.01)
@@ -162,7 +162,7 @@ def test_what_has_no_stiffness_as_commanded_has_one_at_another_pace(shorter: flo
 def test_a_stiffness_that_is_out_of_reach_at_any_pace_is_where_a_search_begins_elsewhere() -> None:
     """What the motors cost as commanded is not known then, and the fastest motion is the same."""
     robot = load_robot(TENDON)
-    motion = load_trajectory(PULL, robot, {"rate": 100, "stiffness.start": 8, "stiffness.end": 38})
+    motion = load_trajectory(PULL, robot, {"rate": 40, "stiffness.start": 8, "stiffness.end": 38})
     found = optimize(robot, motion, "time", "both", min_margin=MARGIN)
     assert found.timing is not None
     assert np.isnan(found.timing.uniform)

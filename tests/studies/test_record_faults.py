@@ -284,6 +284,7 @@ def read_by_encoders(positions: FloatArray) -> FloatArray:
     return np.asarray(step * np.round(positions / step))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("own_folder")
 def test_motors_of_joints_that_move_alike_follow_their_own(vsacli: Any) -> None:
     """Fingers close together, one less far: a share of its own joint is as near to a motor as the other."""

@@ -83,6 +83,7 @@ def test_what_a_choice_does_is_what_a_run_with_that_motor_computes(name, generic
         assert points.power == pytest.approx(np.max(result.motor_power[:, joint, side], initial=0), **close)
 
 
+@pytest.mark.slow
 def test_the_robots_own_motors_are_what_the_run_says():
     robot, trajectory = shipped("ur5_6r")
     sizing, result = size_drives(robot, [trajectory]), inverse_dynamics(robot, trajectory)

@@ -19,7 +19,7 @@ from samples.studies import DRAWN, GRID, content, study
 from vsacli.studies.sweeps.rows import Computer, Job, answer
 from vsacli.studies.sweeps.study import load_study
 
-MANY = DRAWN.replace("samples: 6", "samples: 60")
+MANY = DRAWN.replace("samples: 6", "samples: 30")
 PATIENCE = 60.0
 """Seconds that a scheduler or a worker may take to begin on a machine that is busy."""
 
@@ -123,7 +123,7 @@ def test_what_ends_it_costs_no_finished_row(tmp_path: Path, ending: str) -> None
     assert (code, said.splitlines()[-1]) == ({"interrupt": 130, "scheduler": 2}[ending], sentence)
     kept = journal.read_bytes().count(b"\n") - 1  # the first line is no row
     assert f"{kept} finished runs are kept in {journal.name}" in said
-    assert f"{kept} of 60 runs are in {journal.name} already" in ended(started(tmp_path))[1]
+    assert f"{kept} of 30 runs are in {journal.name} already" in ended(started(tmp_path))[1]
 
 
 LACKING = """

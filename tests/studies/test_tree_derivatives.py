@@ -28,9 +28,9 @@ SAMPLES = 6
 SPEED = 0.2
 """Of the motions, against random ones, of which each derivative is ten times the one before."""
 
-pytestmark = pytest.mark.cases(6)
+pytestmark = pytest.mark.cases(5)
 
-trees = pytest.mark.parametrize("case", tree_cases(50))
+trees = pytest.mark.parametrize("case", tree_cases(50, joints=8))
 
 
 @trees

@@ -89,6 +89,7 @@ def test_a_robot_without_dampers_takes_no_damping(tmp_path: Path, vsacli: Callab
     assert done.err == f"m.yaml:{LINES + 1}: damping: no joint of the robot has a damper; leave it out\n"
 
 
+@pytest.mark.slow
 def test_a_table_may_have_it(robot: Path, tmp_path: Path, vsacli: Callable[..., Any]) -> None:
     (tmp_path / "m.yaml").write_text(MOTION + "damping: {type: polynomial, degree: 3, start: 2, end: 4}\n")
     names = "q,dq,ddq,d3q,d4q,stiffness,dstiffness,ddstiffness"

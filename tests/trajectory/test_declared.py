@@ -218,6 +218,7 @@ def test_the_recorded_motion_sets_the_duration_of_the_others():
     ]
 
 
+@pytest.mark.slow
 def test_polynomials_and_dwells_do_without_scipy():
     """Its parts take longer to import than such a trajectory to compute; it imports each at first use."""
     Path("move.yaml").write_text(

@@ -100,6 +100,7 @@ def test_a_slower_course_is_as_uncertain(method):
     np.testing.assert_allclose(slower * powers[:, :, None], fit.covariance(probes), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_what_no_two_resolutions_agree_on_has_no_deviation():
     time = np.arange(1001) / 100
     rough = np.cumsum(np.random.default_rng(0).standard_normal(1001))

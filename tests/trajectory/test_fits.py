@@ -40,6 +40,7 @@ def relative_error(fit, time, order=4):
     return np.sqrt(np.mean(error**2) / np.mean(motion(inside, order) ** 2))
 
 
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", slow_but([0], range(5)))
 def test_noisy_record_gives_the_fourth_derivative_within_two_percent(seed):
     time = np.arange(10001) / 1000

@@ -47,6 +47,7 @@ def test_the_default_fit_follows_a_fast_motion_up_to_its_rounding(pendulum):
     assert 0.3 < stated / error < 3
 
 
+@pytest.mark.slow
 def test_least_squares_do_not_advise_a_smoothing_spline_that_is_no_better(pendulum):
     values, _ = pendulum
     noisy = values + 0.03 * np.random.default_rng(0).standard_normal(len(TIME))
@@ -55,6 +56,8 @@ def test_least_squares_do_not_advise_a_smoothing_spline_that_is_no_better(pendul
     assert "fit: smooth" not in " ".join(trajectory.warnings)
 
 
+@pytest.mark.slow
+@pytest.mark.slow
 def test_a_bandwidth_below_the_motion_makes_its_torques_unreliable():
     rng, time = np.random.default_rng(1), np.arange(1901) / 94
     frequency = np.fft.rfftfreq(len(time), 1 / 94)
@@ -106,6 +109,7 @@ def test_ends_at_which_a_filter_rings_are_left_out(seed, rings):
 
 
 @pytest.mark.slow
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("seed", [134, 262, 278, 302, 398, 1270, 2214])
 def test_noise_between_ends_that_ring_counts(seed):
     """Torques were wrong by 1.3 to 32 %, and by 9 deviations and more."""
@@ -115,6 +119,7 @@ def test_noise_between_ends_that_ring_counts(seed):
 
 
 @pytest.mark.slow
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", [1378, 1386, 1410])
 def test_a_motion_that_two_coarse_resolutions_leave_out_is_found_by_the_noise(seed):
     """Torques were wrong by 15 to 82 %, and by up to 18 deviations."""
@@ -124,6 +129,7 @@ def test_a_motion_that_two_coarse_resolutions_leave_out_is_found_by_the_noise(se
 
 
 @pytest.mark.slow
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", [20008, 20018, 20020])
 def test_noise_counts_up_to_a_sharp_edge_at_which_the_filter_rings_like_a_sine(seed):
     """Fourth derivatives were off by 48 to 187 deviations, accelerations by 467 to 2715."""
@@ -159,6 +165,7 @@ def test_motions_that_begin_and_end_at_once_do_not_ring():
         assert ringing_ends(spline, (0.05, 3.95), 4) == (0, 0)
 
 
+@pytest.mark.slow
 def test_a_rigid_robot_is_not_warned_about_derivatives_that_it_does_not_use():
     rng = np.random.default_rng(4)
     q = (np.sin(3 * TIME) + 3e-3 * rng.standard_normal(len(TIME)))[:, None]

@@ -49,6 +49,7 @@ MOTIONS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", slow_but({"white", "flickering encoder"}, NOISES))
 def test_noise_alone_needs_no_fine_resolution(name: str, monkeypatch: pytest.MonkeyPatch):
     tried = []
@@ -83,7 +84,7 @@ def test_what_is_resolved_is_the_same_without_an_early_end(
 
 
 @pytest.mark.slow
-@pytest.mark.cases(5)
+@pytest.mark.cases(2)
 @pytest.mark.parametrize("seed", range(0, 120, 3))
 def test_drawn_recordings_are_fitted_the_same_without_an_early_end(
     seed: int, monkeypatch: pytest.MonkeyPatch

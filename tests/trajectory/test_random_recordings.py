@@ -36,6 +36,7 @@ def test_a_seed_determines_the_recording_and_others_differ():
     assert first.facts == again.facts != other.facts
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_design_half_has_every_filter_noise_and_motion():
     drawn = [draw(seed) for seed in range(0, 240, 2)]

@@ -149,6 +149,7 @@ def test_round_trip_of_an_analytic_motion(derivatives):
     assert trajectory.warnings == () if derivatives else len(trajectory.warnings) == 2
 
 
+@pytest.mark.slow
 def test_noisy_record_runs_and_reports_its_fit(robot):
     noisy = motion() + 1e-5 * np.random.default_rng(0).standard_normal((2001, 2))
     names = ["q1", "q2", "stiffness1", "stiffness2"]
@@ -180,6 +181,7 @@ def test_fast_and_rounded_records_have_a_meaningful_fourth_derivative():
     assert np.abs(plain.block(0, 20001).d4q[inside]).max() > 1e6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [250, 4000, 333.3])
 def test_rate_resamples_the_fit(robot, rate):
     names = [f"{name}{i}" for name in POSITION.names for i in (1, 2)] + ["stiffness1", "stiffness2"]
@@ -214,6 +216,7 @@ def test_rate_that_is_not_possible(robot):
         load_trajectory("m.yaml", robot)
 
 
+@pytest.mark.slow
 def test_fit_that_is_asked_for():
     write("m.csv", ["time", "q1", "q2"], TIME, motion())
     for method, exact in (("lsq", False), ("interpolate", True), (None, True)):
@@ -223,6 +226,7 @@ def test_fit_that_is_asked_for():
         Trajectory.from_samples(TIME, motion(), fit="spline")
 
 
+@pytest.mark.slow
 def test_fit_in_the_file(robot):
     write("m.csv", ["time", "q1", "q2", "stiffness1", "stiffness2"], TIME, motion(), stiffness())
     courses = "position: {type: csv, file: m.csv, fit: lsq}\nstiffness: {type: csv, file: m.csv, fit: FIT}\n"
@@ -236,6 +240,7 @@ def test_fit_in_the_file(robot):
         load_trajectory("m.yaml", robot)
 
 
+@pytest.mark.slow
 def test_what_is_known_of_noise_in_the_file(robot):
     rng = np.random.default_rng(0)
     time = np.arange(2001) / 200

@@ -34,6 +34,7 @@ def test_images_of_the_motion_are_left_out(name, kind, rate):
         assert error < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("swing", [0.5, 2, 5])
 def test_side_bands_of_hum_are_hum(swing):
     truth = MOTIONS["sines"](TIME, 0)

@@ -212,7 +212,9 @@ scales = st.floats(-29, 28).map(lambda power: 10.0**power)
 
 
 @pytest.mark.slow
-@settings(deadline=None)  # the first imports SciPy
+@pytest.mark.cases(1)
+@pytest.mark.parametrize("_repetition", range(3))
+@settings(deadline=None, max_examples=35)  # the first imports SciPy
 @given(
     seed=st.integers(0, 1000),
     count=st.integers(8, 40),
@@ -222,7 +224,7 @@ scales = st.floats(-29, 28).map(lambda power: 10.0**power)
     decimals=st.integers(0, 20),
     method=st.sampled_from([None, LEAST_SQUARES, INTERPOLATE]),
 )
-def test_no_record_breaks_a_fit(seed, count, size, scale, spread, decimals, method):
+def test_no_record_breaks_a_fit(_repetition, seed, count, size, scale, spread, decimals, method):
     rng = np.random.default_rng(seed)
     time = scale * np.cumsum(10.0 ** (spread * rng.uniform(-1, 0, count)))
     values = size * np.round(rng.normal(size=(count, 2)), decimals)

@@ -48,6 +48,7 @@ def alarmed(fit):
     return known is not None and bool(not known.determined or known.lines.others)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "color",
     slow_but(
@@ -86,6 +87,7 @@ def test_filtered_noise_is_found(color, motion):
         assert filtered_noise(of.time, of.values[None], 8).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("motion", "color"),
     [
@@ -101,6 +103,7 @@ def test_what_a_record_does_not_determine_is_said(motion, color):
     assert alarmed(fit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "color"), [(INTERPOLATE, "zero-phase low-pass, 20 Hz"), (LEAST_SQUARES, "first order 0.9")]
 )
@@ -112,6 +115,7 @@ def test_a_fit_that_was_asked_for_is_judged_all_the_same(method, color):
     assert any(undetermined in each for each in trajectory.warnings)
 
 
+@pytest.mark.slow
 def test_least_squares_are_as_uncertain_as_their_difference_from_a_smoothing_spline():
     of = record(sines, "white, 1e-5 rad", 3)
     fit = fitted(of, LEAST_SQUARES)
@@ -122,6 +126,7 @@ def test_least_squares_are_as_uncertain_as_their_difference_from_a_smoothing_spl
     assert 0.5 * error(fit, of) < np.sqrt(np.mean(deviation**2)) / size < 0.02
 
 
+@pytest.mark.slow
 def test_joints_with_different_noise_and_uneven_stamps():
     rng = np.random.default_rng(0)
     time = np.cumsum(rng.uniform(0.5e-3, 1.5e-3, 8000))
@@ -139,6 +144,7 @@ def test_joints_with_different_noise_and_uneven_stamps():
     assert all(part.smoothing.determined for part in fit.parts)
 
 
+@pytest.mark.slow
 def test_spline_is_six_times_continuously_differentiable_and_stretches():
     of = record(sines, "zero-phase low-pass, 20 Hz", 0)
     fit = fit_samples(3 + of.time, of.values[None], 7, 4, SMOOTH)
@@ -276,6 +282,7 @@ def test_a_bandwidth_says_what_is_motion():
     assert error(wide, shaking) < 0.5 < error(narrow, shaking)
 
 
+@pytest.mark.slow
 def test_noise_that_is_known_is_not_estimated():
     """A motion of 2 Hz too small for the noise: one that is said to be small makes it motion."""
     time = np.arange(10001) / 1000
@@ -290,6 +297,7 @@ def test_noise_that_is_known_is_not_estimated():
         assert known.noise[0] == 1e-3
 
 
+@pytest.mark.slow
 def test_a_stiffness_with_filtered_noise():
     time = np.arange(10001) / 1000
     values = 1000 + 100 * np.sin(2 * time)
@@ -355,6 +363,7 @@ def test_long_records_start_from_stretches(monkeypatch):
         assert stated[1] == pytest.approx(stated[0], rel=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", [sines, random_motion])
 def test_the_bias_is_that_of_the_motion(motion):
     """Sines have none at the cut-off; a spectrum that falls slowly has more than the prior expects."""
@@ -377,6 +386,7 @@ def test_filtered_noise_is_said_where_no_resolution_is_accepted():
     assert alarmed(fit)
 
 
+@pytest.mark.slow
 def test_a_bandwidth_says_which_lines_are_noise():
     of = record(sines, "17-bit encoder", 4)
     shaken = of.values + 3e-4 * np.sin(2 * np.pi * 15 * of.time)
@@ -397,6 +407,7 @@ def test_hum_of_mains_is_not_followed_where_knots_are_close_enough(samples):
     assert error(fit, of) < 0.5  # a thousand where it was followed
 
 
+@pytest.mark.slow
 def test_the_bias_is_measured_over_a_wide_band():
     """Of this record that at the very cut-off is too small by chance: 65 % of the samples were right then."""
     of = record(MOTIONS["random"], "zero-phase low-pass, 20 Hz", 60, 250)

@@ -160,6 +160,7 @@ def test_check_points_of_polynomials_are_spread_evenly():
     np.testing.assert_array_equal(reach, [0.25, 0.75, 0.75, 0.25])
 
 
+@pytest.mark.slow
 def test_check_points_of_many_knots_are_the_middles_of_their_spans():
     trajectory = random_samples(1000)
     time, reach = trajectory.check_points(50)
@@ -205,6 +206,7 @@ def test_check_points_pass_over_pieces_as_narrow_as_rounding():
     assert (time.item(), reach.item()) == (0.5, 0.5)
 
 
+@pytest.mark.slow
 def test_stamps_since_1970_give_the_motion_from_zero():
     time = np.arange(1001) / 1000
     q, stiffness = np.sin(3 * time)[:, None], 900 + 10 * np.cos(2 * time)[:, None]
@@ -220,6 +222,7 @@ def test_stamps_since_1970_give_the_motion_from_zero():
     assert late.from_zero().times.span == (0.0, pytest.approx(1.0, abs=2.4e-7))
 
 
+@pytest.mark.slow
 def test_differences_within_reach_confirm_the_derivatives():
     trajectory = random_samples(200, joints=2)
     time, reach = trajectory.check_points(40)

@@ -208,6 +208,7 @@ def computed(tmp_path):
     return inverse_dynamics(robot, load_trajectory(tmp_path / "push.yaml", robot))
 
 
+@pytest.mark.slow
 def test_the_file_holds_the_wrench_by_axis(result, tmp_path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -229,9 +229,10 @@ for (let at = 0; at < data.length; at += 4) if (data[at + 3] > 250) darkest = Ma
 return darkest"""
 """Smallest red component of an opaque pixel in the corner of the arrow; the ground's lines are light."""
 
-GRAVITIES = [[0, -9.81, 0], [9.81, 0, 0], [0, 0, 9.81], [3, -8, 2]]
+GRAVITIES = [[9.81, 0, 0], [0, -9.81, 0], [3, -8, 2], [0, 0, 9.81]]
 
 
+@pytest.mark.cases(2)  # one along an axis in the plane of the arm, one along none
 @pytest.mark.parametrize("gravity", GRAVITIES)
 def test_up_is_against_gravity_with_its_arrow(browser: Browser, pages: Pages, gravity: list[float]) -> None:
     browser.media(prefers_color_scheme="light")
@@ -331,10 +332,10 @@ return brightest"""
 """Largest green component of an opaque pixel of the robot."""
 
 
-@pytest.mark.parametrize("name", ["result", "failing", "compared", "simulated", "studied"])
+@pytest.mark.cases(2)  # of a robot's motion, and of a table
+@pytest.mark.parametrize("name", ["result", "failing", "studied", "compared", "simulated"])
 def test_paper_has_the_colors_of_paper_in_the_dark(browser: Browser, pages: Pages, name: str) -> None:
     """As a browser prints: every plot of an open section is copied in the same colors as in the light."""
-    browser.open(pages[name])
     inks = {}
     for scheme in ("light", "dark"):
         browser.media(prefers_color_scheme=scheme)
@@ -362,7 +363,8 @@ def test_the_robot_is_dark_on_paper(browser: Browser, pages: Pages) -> None:
     assert paper < dark
 
 
-@pytest.mark.parametrize("name", ["result", "failing", "compared", "simulated", "studied"])
+@pytest.mark.cases(3)  # with tables of failures, of several results, and of runs
+@pytest.mark.parametrize("name", ["failing", "compared", "result", "studied", "simulated"])
 def test_no_page_is_wider_than_a_phone(browser: Browser, pages: Pages, name: str) -> None:
     size = {"width": 420, "height": 900, "deviceScaleFactor": 1, "mobile": True}
     browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
