@@ -24,7 +24,7 @@ vary:
   joints.base.actuator.motor.max_torque: [90, 300]
   stiffness.end: [700, 1275]
 """
-"""Numbers that are rows, others with a batch for each value, and motions that are infeasible with some springs."""
+"""Numbers that are rows, others with a batch for each value, and motions too soft for some of the springs."""
 
 
 def report_of(read: Study, run: int) -> Report:
