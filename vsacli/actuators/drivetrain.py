@@ -132,13 +132,17 @@ class Drivetrain:
         members = [actuators[joint] for joint in indices]
         return _SpringGroup(type(members[0]).elasticity(members), np.array(indices), springs)
 
+    def limited(self, torque: FloatArray) -> FloatArray:
+        """Return the torques that the motors exert, (..., motors): commanded ones, at most the largest."""
+        return np.clip(torque, -self.max_torque, self.max_torque)
+
     def of_motors(self, values: FloatArray) -> FloatArray:
         """Return (..., motors) from (..., joints, 2), whose entries without a motor are ignored."""
         return values[..., self.present]
 
     def of_joints(self, values: FloatArray) -> FloatArray:
         """Return (..., joints, 2) from (..., motors), NaN where there is no motor."""
-        result = np.full((*values.shape[:-1], *self.present.shape), np.nan)
+        result = np.full_like(values, np.nan, shape=(*values.shape[:-1], *self.present.shape))
         result[..., self.present] = values
         return result
 

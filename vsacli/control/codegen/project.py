@@ -19,6 +19,7 @@ from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.parameters import Maker, check_parameters, with_parameters
+from vsacli.control.codegen.plant_functions import state_derivative_function, step_function
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import ReferenceResults, check_single_precision
 from vsacli.control.codegen.texts import (
@@ -138,6 +139,12 @@ def _functions(
     except NotImplementedError as error:
         short = not isinstance(error.__cause__, TooLongError)
         omitted.append(f"no {WITHOUT_PARAMETERS if chosen and short else error}")
+    try:
+        derivative = made(state_derivative_function)
+        functions += [derivative, step_function(robot, derivative)]
+    except (InputError, NotImplementedError) as error:
+        reason = str(error).removeprefix("state_derivative: ")
+        omitted.append(f"no state_derivative and no step: {reason}")
     return functions, omitted
 
 
