@@ -175,15 +175,15 @@ def _with_number(content: Any, path: NumberPath, scalar: Scalar) -> Any:
     if not path:
         return scalar
     word = str(path[0])
-    return _replace_unchecked(content, {word: _with_number(getattr(content, word), path[1:], scalar)})
+    return replace_unchecked(content, {word: _with_number(getattr(content, word), path[1:], scalar)})
 
 
 def with_copied_actuator(joint: Joint) -> Joint:
     """Return the joint with its own copy of the actuator, which several robots may share."""
-    return _replace_unchecked(joint, {"actuator": _replace_unchecked(joint.actuator, {})})
+    return replace_unchecked(joint, {"actuator": replace_unchecked(joint.actuator, {})})
 
 
-def _replace_unchecked(record: _Record, contents: Mapping[str, Any]) -> _Record:
+def replace_unchecked(record: _Record, contents: Mapping[str, Any]) -> _Record:
     """Return a record with other values in some fields, without its checks and cached values."""
     fields = dataclasses.fields(record)  # type: ignore[arg-type]  # records are dataclasses
     same = {field.name: getattr(record, field.name) for field in fields}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import partial, reduce
 from operator import and_
@@ -15,6 +16,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, finite, marked, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.wrench import WrenchFrame
+from vsacli.compute.tracing import cells_of
 from vsacli.control.codegen.interface import (
     Array,
     Evaluate,
@@ -86,9 +88,9 @@ def state_derivative_function(robot: Robot, frame: WrenchFrame | None = None) ->
 def _check_friction(robot: Robot, drivetrain: Drivetrain) -> None:
     """Raise an error if motors have sharp friction; names their joints."""
     laws = drivetrain.friction
-    sharp = [] if laws is None else drivetrain.joint[laws.sharp]
-    names = ", ".join(dict.fromkeys(robot.joint_names[joint] for joint in sharp))
-    if names:
+    if laws is not None and laws.sticks:
+        joints = dict.fromkeys(drivetrain.joint[laws.sharp])
+        names = ", ".join(robot.joint_names[joint] for joint in joints)
         raise InputError.one(
             f"the motors of {names} have friction without a width, so they stick and slide, which a step of "
             "constant duration cannot follow; give the friction a width"
@@ -143,17 +145,16 @@ def _flags(drivetrain: Drivetrain, ddq: Any, ddtheta: Any) -> Any:
 
 def _range_flags(drivetrain: Drivetrain, q: Any, theta: Any) -> Any:
     """Return the flags of springs beyond the range of their law, where a simulation ends, (joints,)."""
-    bounded = np.isfinite(drivetrain.domain).any(axis=0)
+    ends = cells_of(drivetrain.domain)
+    bounded = np.array([not math.isinf(end) if isinstance(end, float) else True for end in ends.flat])
     if not bounded.any():
         return np.zeros(len(q), dtype=FLAG_TYPE)
-    position, (low, high) = drivetrain.ranged(q, theta), drivetrain.domain
-    inside = (low <= position) & (position <= high)
-    return np.stack(
-        [
-            marked(Flag.INFEASIBLE, ~reduce(and_, inside[bounded & (drivetrain.spring_joint == joint)], True))
-            for joint in range(len(q))
-        ]
-    )
+    (has_lowest, has_highest), (lowest, highest) = bounded.reshape(ends.shape), drivetrain.domain
+    position = drivetrain.ranged(q, theta)
+    above = np.where(has_lowest, lowest <= position, True)
+    inside = above & np.where(has_highest, position <= highest, True)
+    of_joints = [inside[drivetrain.spring_joint == joint] for joint in range(len(q))]
+    return np.stack([marked(Flag.INFEASIBLE, ~reduce(and_, each, np.True_)) for each in of_joints])
 
 
 def step_function(robot: Robot, derivative: Function) -> Step:
