@@ -20,7 +20,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.variables import Block
 from vsacli.control.codegen.parameters import PARAMETERS, check_parameters, with_parameters
-from vsacli.control.codegen.project import WITHOUT_PARAMETERS, generate
+from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import CASES, ReferenceResults
 from vsacli.dynamics.inverse import compute_block
@@ -150,9 +150,3 @@ def test_a_path_that_fits_nothing() -> None:
         generate(ROBOTS["3R"], patterns=["joints.2.link.mas"])
     message = "no parameter of the robot matches 'joints.2.link.mas'; did you mean 'joints.*.link.mass'?"
     assert str(caught.value) == message
-
-
-def test_feedback_linearization_is_left_out_with_the_reason() -> None:
-    made = generate(ROBOTS["prismatic"], patterns=["joints.*.link.mass"])
-    assert made.omitted == [f"no {WITHOUT_PARAMETERS}"]
-    assert "There is no feedback" in made.files["README.md"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
-from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from samples.codegen import with_springs
 from samples.command_line import REPOSITORY, Outcome
-from samples.driven_arm import LINK, robot_of
 from samples.generated_code import STRICT, Compiled, compile_c, compiled_robot, write_files
 from samples.long_chains import random_chain
 from samples.marks import needs_compiler, slow_but
@@ -27,26 +26,20 @@ from vsacli import (
     Wrench,
     inverse_dynamics,
     link_torques,
-    load_robot,
     mass_matrix,
     simulate,
     state_derivative,
 )
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.damper import Damper
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
 from vsacli.actuators.rigid import Rigid
 from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.wrench import WRENCH_NAMES, WrenchFrame
 from vsacli.control.codegen import interface
-from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.parameters import with_parameters
 from vsacli.control.codegen.plant_functions import state_derivative_function, step_function
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.self_test import ReferenceResults
+from vsacli.control.simulation import InitialError
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import parameters
 
@@ -196,7 +189,7 @@ RUNS = {
 
 
 def pushed(name: str) -> tuple[Robot, Arrays, FloatArray]:
-    """A robot in the equilibrium at the start of its trajectory, with a push to the joints, and its torques."""
+    """A robot in the equilibrium at the start of its trajectory, its joints pushed, and its torques."""
     robot, trajectory = shipped_run(name, RUNS[name])
     first = inverse_dynamics(robot, trajectory)
     start = {part: np.nan_to_num(getattr(first, part)[0]) for part in PARTS}
@@ -250,7 +243,7 @@ def test_the_error_of_a_step_falls_with_the_fourth_power_of_its_duration(name: s
     expected = exact_end(robot, start, torque, duration)
     ends = [vector_of(plant.steps(plant.state(start), duration, 96 * 2**halving)) for halving in range(4)]
     errors = [np.nanmax(np.abs(end - expected)) for end in ends]
-    ratios = [coarse / fine for coarse, fine in zip(errors[:-1], errors[1:], strict=True)]
+    ratios = [coarse / fine for coarse, fine in pairwise(errors)]
     assert min(ratios) > 14, errors
     assert max(ratios) < 18, errors
 
@@ -283,11 +276,12 @@ def test_a_step_may_write_over_its_state(tmp_path: Path) -> None:
         "    vsa_3r_state state = {.q = {0.1, 0.2, 0.3}, .dtheta = {{1, 2}, {3, 4}, {5, 6}}}, next;\n"
         "    const vsa_3r_input input = {.tau_motor = {{9, -8}, {7, -6}, {5, -4}}};\n"
         "    const unsigned flags = vsa_3r_step(&state, &input, 1e-3, &next);\n"
-        "    return vsa_3r_step(&state, &input, 1e-3, &state) != flags || memcmp(&state, &next, sizeof next);\n"
+        "    const unsigned again = vsa_3r_step(&state, &input, 1e-3, &state);\n"
+        "    return flags || again || memcmp(&state, &next, sizeof next);\n"
         "}\n"
     )
     write_files(generate(shipped_robot("vsa_3r")), tmp_path)
-    compile_c(tmp_path, *STRICT, "-O2", "main.c", "vsa_3r.c", "-o", "main", "-lm")
+    compile_c(tmp_path, *STRICT, "main.c", "vsa_3r.c", "-o", "main", "-lm")
     assert subprocess.run(["./main"], cwd=tmp_path, check=False).returncode == 0
 
 
@@ -324,11 +318,11 @@ def test_the_energy_of_an_undamped_arm_drifts_with_the_fourth_power_of_a_step(tm
     start = plant.state({"q": q, "dq": 0 * q, "theta": theta, "dtheta": 0 * theta})
     begin = energy(robot, start)
     drifts = [abs(energy(robot, plant.steps(start, 0.4, count)) - begin) for count in (200, 400, 800)]
-    assert min(coarse / fine for coarse, fine in zip(drifts[:-1], drifts[1:], strict=True)) > 14, drifts
+    assert min(coarse / fine for coarse, fine in pairwise(drifts)) > 14, drifts
 
 
 def test_a_plant_of_ones_own(tmp_path: Path) -> None:
-    """M by differences of link torques, springs and motors of Table I written down, and steps of one's own."""
+    """M by differences of link torques, springs and motors of Table I, and one's own steps."""
     robot = shipped_robot("vsa_3r")
     inertia = np.array([[3.20] * 2, [3.05] * 2, [1.98] * 2])
     torque = np.random.default_rng(4).uniform(-50, 50, (3, 2))
@@ -363,3 +357,130 @@ def test_a_plant_of_ones_own(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         vector_of(plant.steps(record, 0.1, 100)), x, rtol=0, atol=1e-9 * np.abs(x).max()
     )
+
+
+@pytest.mark.slow
+def test_the_closed_loop_is_that_of_a_simulation(tmp_path: Path) -> None:
+    """Law and plant, both generated, under an integrator of SciPy; `simulate` has one of its own."""
+    robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
+    gains, error = Gains.from_poles([-20] * 4, [-20] * 2), 0.01
+    write_files(generate(robot), tmp_path)
+    module = Compiled(tmp_path, "vsa_3r").module
+    of_gains = np.zeros((), module.Gains)
+    for name in ("position", "stiffness"):
+        of_gains[name] = getattr(gains, name)
+    command, acting = np.zeros((), module.Command), np.zeros((), module.Input)
+    state, still = np.zeros((), module.State), np.zeros((), module.Integral)
+
+    def derivative(time: float, vector: FloatArray) -> FloatArray:
+        for name, part in zip(PARTS, np.split(vector, [3, 6, 12]), strict=True):
+            state[name] = part.reshape(state[name].shape)
+        reference = trajectory.at(np.array([time]))
+        for name in command.dtype.names:
+            command[name] = reference.variables()[name][0]
+        control, _ = module.feedback_linearization(state, command, of_gains, still)
+        acting["tau_motor"] = control["tau_motor"]
+        return np.concatenate([np.ravel(module.state_derivative(state, acting)[0][name]) for name in RATES])
+
+    found = simulate(robot, trajectory, gains=gains, initial_error=InitialError(q=error)).history
+    times = found.time[:: len(found.time) // 8]
+    begin = np.concatenate([np.ravel(getattr(found, name)[0]) for name in PARTS])
+    run = solve_ivp(derivative, (times[0], times[-1]), begin, "DOP853", times, rtol=1e-10, atol=1e-12)
+    expected = found.q[:: len(found.time) // 8]
+    # simulate's tolerance is 1e-9 of the state, which the law contracts
+    np.testing.assert_allclose(run.y[:3].T, expected, rtol=0, atol=1e-8)
+    assert np.abs(expected[0] - trajectory.at(times[:1]).q[0]).max() == pytest.approx(error)
+
+
+@pytest.mark.parametrize("name", ["3R", "mixed"])
+def test_parameters_are_those_of_another_robot(name: str, tmp_path: Path) -> None:
+    robot, rng = ROBOTS[name], np.random.default_rng(4)
+    patterns = ["joints.*.link.mass", "joints.*motor*inertia", "joints.*spring*k"]
+    chosen = parameters(robot, patterns)
+    derivative = with_parameters(state_derivative_function, robot, None, chosen)
+    functions = [derivative, step_function(robot, derivative)]
+    code = compiled_robot(tmp_path / "c", robot, functions, "double")
+    state, acting = ReferenceResults(robot).inputs(state_derivative_function(robot))
+    changed = {str(each): each.value * rng.uniform(1, 1.2) for each in chosen}
+    samples = len(state["q"])
+    given = {"_".join(each.by_index): np.full(samples, changed[str(each)]) for each in chosen}
+    found, _ = code(derivative, state, acting, given)
+    assert peak_error(found, rates_in_numpy(robot.replace(changed), state, acting)) < ROUNDING
+    later, _ = code(functions[1], state, acting, 1e-7, given)
+    # to first order in dt: the next term is 1e-7^2 times the rates of the rates
+    assert peak_error({"q": (later["q"] - state["q"]) / 1e-7}, {"q": found["dq"]}) < 1e-3
+
+
+@pytest.mark.slow
+def test_feedback_linearization_takes_parameters(tmp_path: Path) -> None:
+    project = generate(shipped_robot("vsa_3r"), patterns=["joints.elbow.link.mass", "joints.*.spring.k"])
+    assert project.omitted == []
+    write_files(project, tmp_path)
+    compile_c(tmp_path, *STRICT, "vsa_3r.c", "vsa_3r_test.c", "-o", "test", "-lm")
+    done = subprocess.run(["./test"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout == "all values agree\n"
+    header = " ".join(project.files["vsa_3r.h"].split())
+    assert "vsa_3r_integral *integral, const vsa_3r_parameters *parameters, vsa_3r_control *c" in header
+    assert "vsa_3r_input *input, double dt, const vsa_3r_parameters *parameters, vsa_3r_state *n" in header
+
+
+def test_numbers_that_are_none_and_springs_beyond_their_law_are_flagged(tmp_path: Path) -> None:
+    robot = shipped_robot("tendon_1r")
+    plant = PlantInC.of(robot, tmp_path, np.zeros((1, 2)))
+    pulled = plant.state({"q": [0.0], "dq": [0.0], "theta": [[0.3, -0.3]], "dtheta": [[0.0, 0.0]]})
+    rates, flags = plant.module.state_derivative(pulled, plant.acting)
+    assert flags == rates["flags"][0] == 0
+    slack = pulled.copy()
+    slack["theta"][0, 0] = -0.3
+    rates, flags = plant.module.state_derivative(slack, plant.acting)
+    assert flags == rates["flags"][0] == Flag.INFEASIBLE
+    lost = pulled.copy()
+    lost["dtheta"][0, 1] = np.nan
+    for function, further in ((plant.module.state_derivative, ()), (plant.module.step, (1e-3,))):
+        _, flags = function(lost, plant.acting, *further)
+        assert flags & Flag.NOT_FINITE
+        assert flags & Flag.INFEASIBLE
+
+
+def test_a_motor_exerts_at_most_its_largest_torque(tmp_path: Path) -> None:
+    robot = shipped_robot("vsa_3r").replace({"joints.*.actuator.motor.max_torque": 10.0})
+    function = state_derivative_function(robot)
+    state, acting = ReferenceResults(robot).inputs(function)
+    code = compiled_robot(tmp_path / "c", robot, [function], "double")
+    at_most, _ = code(function, state, {"tau_motor": np.clip(acting["tau_motor"], -10, 10)})
+    found, _ = code(function, state, acting)
+    assert np.abs(acting["tau_motor"]).max() > 10
+    np.testing.assert_array_equal(found["ddtheta"], at_most["ddtheta"])
+
+
+def test_sharp_friction_leaves_the_plant_out(vsacli: Callable[..., Outcome]) -> None:
+    joints = "waist, shoulder, elbow, forearm, wrist, flange"
+    done = vsacli("codegen", REPOSITORY / "robots" / "puma_560.yaml", "-o", "c")
+    assert done.code == 0
+    reason = f"no state_derivative and no step: the motors of {joints} have friction without a width"
+    assert reason in done.err
+    readme = Path("c/README.md").read_text().replace("\\", "")
+    assert f"There is {reason}" in readme
+    assert "_step(" not in Path("c/puma_560.c").read_text()
+
+
+def test_the_documents_count_operations() -> None:
+    readme = generate(shipped_robot("vsa_3r")).files["README.md"]
+    assert "| `state_derivative` | 377 | 13 | 0 |" in readme
+    assert "| `step` | 1,726 | 52 | 0 |" in readme
+
+
+@pytest.mark.slow
+def test_a_long_arm_of_calls_steps_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = random_chain(6)
+    derivative = state_derivative_function(robot)
+    inputs = ReferenceResults(robot).inputs(derivative)
+    found = []
+    for folder, most in (("written_out", interface.MOST_WRITTEN_OUT), ("calls", 500)):
+        monkeypatch.setattr(interface, "MOST_WRITTEN_OUT", most)
+        derivative = state_derivative_function(robot)
+        step = step_function(robot, derivative)
+        code = compiled_robot(tmp_path / folder, robot, [derivative, step], "double")
+        found.append(code(step, *inputs, 1e-3)[0])
+    for part in PARTS:
+        np.testing.assert_array_equal(found[0][part], found[1][part])

@@ -33,6 +33,7 @@ from vsacli.control.codegen.texts import (
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
 
+
 class Project(NamedTuple):
     """Generated code.
 
@@ -55,7 +56,7 @@ def generate(
     *,
     loops: bool = True,
 ) -> Project:
-    """Generate C99 code for a robot: link torques, inverse dynamics, feedback linearization.
+    """Generate C99 code for a robot: link torques, inverse dynamics, feedback linearization, plant.
 
     Args:
         robot: robot.
