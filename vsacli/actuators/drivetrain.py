@@ -123,8 +123,9 @@ class Drivetrain:
         groups = indices_of_equals([each.spring_group if each.sprung else None for each in actuators])
         self._groups = [self._make_group(joints, actuators) for group, joints in groups if group is not None]
         self._is_one_group = len(self._groups) == 1 and not self.rigid.any()
-        ranges = [each for actuator in actuators if actuator.sprung for each in actuator.phi_ranges]
-        self.domain = np.stack([np.stack(ends) for ends in ranges]).T if ranges else np.zeros((2, 0))
+        sprung = [actuator for actuator in actuators if actuator.sprung]
+        ends = [np.stack(each) for actuator in sprung for each in actuator.phi_ranges]
+        self.domain: FloatArray = np.stack(ends).T if ends else np.zeros((2, 0))
 
     def _make_group(self, joints: Sequence[int], actuators: Sequence[Actuator]) -> _SpringGroup:
         springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in joints])

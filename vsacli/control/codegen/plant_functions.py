@@ -153,8 +153,10 @@ def _range_flags(drivetrain: Drivetrain, q: Any, theta: Any) -> Any:
     position = drivetrain.ranged(q, theta)
     above = np.where(has_lowest, lowest <= position, True)
     inside = above & np.where(has_highest, position <= highest, True)
-    of_joints = [inside[drivetrain.spring_joint == joint] for joint in range(len(q))]
-    return np.stack([marked(Flag.INFEASIBLE, ~reduce(and_, each, np.True_)) for each in of_joints])
+    outside: list[Any] = [
+        ~reduce(and_, inside[drivetrain.spring_joint == joint], np.True_) for joint in range(len(q))
+    ]
+    return np.stack([marked(Flag.INFEASIBLE, each) for each in outside])
 
 
 def step_function(robot: Robot, derivative: Function) -> Step:

@@ -139,9 +139,7 @@ def definitions(prefix: str, functions: Sequence[Function], precision: str) -> I
     subroutines = Subroutines(programs)
     writer = Writer(dialect, tables, subroutines.name)
     bodies = ["\n".join(indented(text)) for text in subroutines.functions(writer)]
-    for function in functions:
-        define = _step_definition if isinstance(function, Step) else _definition
-        bodies.append("\n".join(define(prefix, function, writer)))
+    bodies += ["\n".join(_definition(prefix, function, writer)) for function in functions]
     used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
     yield from (_constant(prefix, each, dialect) for each in structures(functions) if each.nominal)
     if declarations := list(table_declarations(tables, dialect)):
@@ -186,6 +184,9 @@ def indented(lines: Iterable[str], depth: int = 0) -> Iterator[str]:
 
 
 def _definition(prefix: str, function: Function, writer: Writer) -> Iterator[str]:
+    if isinstance(function, Step):
+        yield from _step_definition(prefix, function, writer)
+        return
     program, entries = function.program, function.inputs
     head = f"{signature(prefix, function, writer.dialect.types[Kind.REAL])}\n{{"
     if is_of_calls(program):
@@ -208,7 +209,7 @@ def _step_definition(prefix: str, step: Step, writer: Writer) -> Iterator[str]:
     """Yield the definition of a step, which calls the function of the derivative at each stage."""
     program, derivative = step.program, step.derivative
     names = {symbol.index: entry for symbol, entry in zip(program.inputs, step.inputs, strict=True)}
-    rates, flags = list(derivative.result.entries), []
+    rates, flags = list(derivative.result.entries), list[str]()
     (_, state), *held = derivative.arguments
     yield f"{signature(prefix, step, writer.dialect.types[Kind.REAL])}\n{{"
     for symbol in program.operations:
