@@ -54,7 +54,7 @@ def state_derivative_function(robot: Robot, frame: WrenchFrame | None = None) ->
     """
     plant = Plant(robot, frame)
     drivetrain = plant.drivetrain
-    _check_friction(robot, drivetrain)
+    _refuse_sticking_motors(robot, drivetrain)
     arguments = (
         ("state", state_structure(robot)),
         ("input", _input_structure(robot)),
@@ -69,7 +69,7 @@ def state_derivative_function(robot: Robot, frame: WrenchFrame | None = None) ->
         wrench = None if frame is None else wrench_on_tools(robot, frame, arrays["wrench"])
         ddq, ddtheta, _ = plant.accelerations(q, dq, theta, dtheta, torque, wrench, commanded)
         rates = _with_followers(drivetrain, dq, ddq, dtheta, ddtheta)
-        flags = _flags(drivetrain, ddq, ddtheta) | _range_flags(drivetrain, q, theta)
+        flags = _acceleration_flags(drivetrain, ddq, ddtheta) | _range_flags(drivetrain, q, theta)
         return [entry for array in (*rates, flags) for entry in array.ravel()]
 
     return Function(
@@ -85,7 +85,7 @@ def state_derivative_function(robot: Robot, frame: WrenchFrame | None = None) ->
     )
 
 
-def _check_friction(robot: Robot, drivetrain: Drivetrain) -> None:
+def _refuse_sticking_motors(robot: Robot, drivetrain: Drivetrain) -> None:
     """Raise an error if motors have sharp friction; names their joints."""
     laws = drivetrain.friction
     if laws is not None and laws.sticks:
@@ -133,7 +133,7 @@ def _with_followers(drivetrain: Drivetrain, q: Any, dq: Any, theta: Any, dtheta:
     return [q, dq, drivetrain.of_motors_by_joint(theta, q), drivetrain.of_motors_by_joint(dtheta, dq)]
 
 
-def _flags(drivetrain: Drivetrain, ddq: Any, ddtheta: Any) -> Any:
+def _acceleration_flags(drivetrain: Drivetrain, ddq: Any, ddtheta: Any) -> Any:
     """Return the flags of accelerations that are not finite, (joints,)."""
     return np.stack(
         [
