@@ -35,7 +35,7 @@ MISSED = {"q": 0.01, "dq": 0.1, "theta": 0.01, "dtheta": 0.1}
 
 POLE = -20.0
 
-DURATION = 1e-3
+STEP_DURATION = 1e-3
 """Duration of a step, s."""
 
 VARIED, UNLIKE_ZERO = 1.05, 0.01
@@ -87,7 +87,7 @@ class ReferenceResults:
             },
             PARAMETERS: _two_sets(chosen),
             "input": self._plant_input(command, block.tau_motor),
-            "dt": {"dt": np.full(CASES, DURATION)},
+            "dt": {"dt": np.full(CASES, STEP_DURATION)},
         }
 
     def inputs(self, function: Function) -> list[Arrays]:
