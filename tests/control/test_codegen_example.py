@@ -1,4 +1,4 @@
-"""The closed loop of docs/codegen.md does what the page shows, with a plant that is the tool's."""
+"""The closed loop of docs/codegen.md does what the page shows."""
 
 from __future__ import annotations
 
@@ -9,16 +9,13 @@ import subprocess
 import sysconfig
 from pathlib import Path
 
-import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
 from samples.generated_code import STRICT, compile_c, write_files
 from samples.marks import needs_compiler
-from samples.plants import random_state
 
 from vsacli import load_robot
 from vsacli.control.codegen.project import generate
-from vsacli.dynamics.forward import state_derivative
 
 pytestmark = needs_compiler
 
@@ -67,27 +64,3 @@ def final_error(folder: Path, source: str) -> float:
     found = re.search(r"t = 2\.50 s: largest error (\S+) rad", done.stdout)
     assert found
     return float(found[1])
-
-
-@pytest.mark.slow
-def test_the_plant_of_the_example_is_that_of_the_tool(folder: Path) -> None:
-    robot = load_robot(ROBOT)
-    write_files(generate(robot), folder)
-    state = random_state(robot, 1, seed=3)
-    tau = np.random.default_rng(4).uniform(-50, 50, (1, 3, 2))
-    values = np.concatenate([np.ravel(part) for part in (*vars(state).values(), tau)])
-    source = SOURCE.read_text().replace("int main(void)", "int shown(void);\nint shown(void)")
-    numbers = ", ".join(map(repr, values[:18].tolist()))
-    torques = ", ".join(f"{{{a!r}, {b!r}}}" for a, b in tau[0].tolist())
-    (folder / "plant.c").write_text(
-        f"{source}\nint main(void)\n{{\n    const double x[STATES] = {{{numbers}}};\n"
-        f"    double tau[N][2] = {{{torques}}}, dx[STATES];\n    derivative(x, tau, dx);\n"
-        '    for (int i = 0; i < STATES; i++)\n        printf("%.17g\\n", dx[i]);\n    return 0;\n}\n'
-    )
-    compile_c(folder, *STRICT, "plant.c", "vsa_3r.c", "-o", "plant", "-lm")
-    done = subprocess.run(["./plant"], cwd=folder, capture_output=True, text=True, check=True)
-    found = np.array(done.stdout.split(), dtype=float)
-    expected = np.concatenate([np.ravel(part) for part in state_derivative(robot, state, tau)])
-    np.testing.assert_allclose(
-        found, expected, rtol=1e-9
-    )  # M by differences of torques some 1e3 times its own

@@ -13,6 +13,7 @@ from samples.generated_code import STRICT, compile_c, compiled_robot, write_file
 from samples.marks import needs_compiler, slow, slow_but
 from samples.shipped import shipped_robot
 
+from vsacli import State, state_derivative
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.friction import Friction
 from vsacli.actuators.motor import Motor
@@ -20,7 +21,8 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.variables import Block
 from vsacli.control.codegen.parameters import PARAMETERS, check_parameters, with_parameters
-from vsacli.control.codegen.project import WITHOUT_PARAMETERS, generate
+from vsacli.control.codegen.plant_functions import state_derivative_function
+from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import CASES, ReferenceResults
 from vsacli.dynamics.inverse import compute_block
@@ -98,6 +100,28 @@ def test_results_are_those_of_a_robot_with_these_numbers(name: str, tmp_path: Pa
         close(found, compute_block(robot.replace(values), motion_of(command)))
 
 
+@pytest.mark.cases(2)
+@needs_compiler
+@pytest.mark.parametrize("name", slow_but({"tendon"}, ROBOTS))
+def test_the_plant_is_that_of_a_robot_with_these_numbers(name: str, tmp_path: Path) -> None:
+    robot, rng = ROBOTS[name], np.random.default_rng(4)
+    chosen = possible(robot)
+    function = with_parameters(state_derivative_function, robot, None, chosen)
+    code = compiled_robot(tmp_path / "c", robot, [function], "double")
+    state, acting = ReferenceResults(robot).inputs(state_derivative_function(robot))
+    acting["tau_motor"] *= 0.1  # below the largest torque of the motors, which `state_derivative` ignores
+    nominal = {str(each): each.value for each in chosen}
+    others = {path: value * rng.uniform(1, 1.03) for path, value in nominal.items()}
+    for values in (nominal, others):
+        given = {"_".join(each.by_index): np.full(CASES, values[str(each)]) for each in chosen}
+        found, _ = code(function, state, acting, given)
+        expected = state_derivative(robot.replace(values), State(**state), acting["tau_motor"])
+        for part, rates in expected._asdict().items():
+            there = np.isfinite(rates)
+            atol = CLOSE * np.abs(rates[there]).max()
+            np.testing.assert_allclose(found[part][there], rates[there], rtol=0, atol=atol, err_msg=part)
+
+
 @needs_compiler
 def test_the_constant_holds_the_numbers_of_the_file(tmp_path: Path) -> None:
     robot = ROBOTS["3R"]
@@ -135,6 +159,8 @@ def test_a_function_that_depends_on_none_of_them_takes_no_such_argument() -> Non
     ("name", "path"),
     [
         ("compact_1r", "joints.elbow.actuator.coupled_inertia"),
+        ("sliding_anchor_1r", "joints.elbow.actuator.mechanism.range.phi.0"),
+        slow("devices/jack_spring", "joints.joint.actuator.mechanism.setting.0"),
         slow("qbmove_arm_manual", "joints.pan.actuator.spring.0.k"),
         slow("maccepa_1r", "joints.elbow.actuator.mechanism.k"),
         slow("awas_1r", "joints.elbow.actuator.coupled_inertia"),
@@ -150,9 +176,3 @@ def test_a_path_that_fits_nothing() -> None:
         generate(ROBOTS["3R"], patterns=["joints.2.link.mas"])
     message = "no parameter of the robot matches 'joints.2.link.mas'; did you mean 'joints.*.link.mass'?"
     assert str(caught.value) == message
-
-
-def test_feedback_linearization_is_left_out_with_the_reason() -> None:
-    made = generate(ROBOTS["prismatic"], patterns=["joints.*.link.mass"])
-    assert made.omitted == [f"no {WITHOUT_PARAMETERS}"]
-    assert "There is no feedback" in made.files["README.md"]

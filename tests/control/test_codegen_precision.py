@@ -153,7 +153,7 @@ def test_the_self_test_compares_every_bit() -> None:
     files = generate(shipped_robot("vsa_3r")).files
     text = files["vsa_3r_test.c"]
     comparisons = [line for line in text.splitlines() if "failures += differs(" in line and ".flags[" in line]
-    assert len(comparisons) == 9
+    assert len(comparisons) == 12
     assert all(line.endswith(", 0.0);") for line in comparisons)
 
 

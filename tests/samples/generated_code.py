@@ -57,15 +57,20 @@ class Compiled:
         self.module: Any = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(self.module)
 
-    def __call__(self, function: Function, *arguments: Mapping[str, FloatArray]) -> tuple[Values, list[int]]:
+    def __call__(
+        self, function: Function, *arguments: Mapping[str, FloatArray] | float
+    ) -> tuple[Values, list[int]]:
         """The arrays of the result over samples, and what the function returned for each.
 
         Args:
             function: its declaration.
-            arguments: arrays (samples, ...) by name, for each argument.
+            arguments: arrays (samples, ...) by name, for each argument; a number for one passed by value.
         """
-        given = []
+        given: list[Any] = []
         for (_, structure), arrays in zip(function.arguments, arguments, strict=True):
+            if not isinstance(arrays, Mapping):
+                given.append(arrays)
+                continue
             samples = len(next(iter(arrays.values())))
             records = np.zeros(samples, getattr(self.module, structure.name.capitalize()))
             for array in structure.arrays:

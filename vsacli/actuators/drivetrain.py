@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, SpringTorques
+from vsacli.actuators.elasticity import Components, Elasticity, ElasticState, SpringTorques, indices_of_equals
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import Windings
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
@@ -38,9 +38,11 @@ class Rotors:
             for each in actuators
             for side, motor in enumerate(each.motors)
         ]
-        self._inertia, self._coupling, to_other = np.array(motors).reshape(-1, 3).T
+        inertia, coupling, to_other = zip(*motors, strict=True) if motors else ((), (), ())
+        self._inertia = np.stack(inertia) if inertia else np.zeros(0)
+        self._coupling = np.array(coupling, dtype=np.float64)
         self._coupled = np.flatnonzero(self._coupling)
-        self._other = self._coupled + to_other[self._coupled].astype(np.intp)
+        self._other = self._coupled + np.array(to_other, dtype=np.intp)[self._coupled]
 
     def torques(self, ddtheta: FloatArray) -> FloatArray:
         """Return B theta''."""
@@ -109,7 +111,7 @@ class Drivetrain:
         self.rigid = np.array([not actuator.sprung for actuator in actuators])
         self.sprung = ~self.rigid[self.joint]
         self.inertia, self.damping, self.max_torque = (
-            np.array([getattr(motor, name) for _, motor in motors])
+            np.stack([getattr(motor, name) for _, motor in motors])
             for name in ("inertia", "damping", "max_torque")
         )
         self.rotors = Rotors([actuator for actuator in actuators if actuator.sprung])
@@ -118,19 +120,21 @@ class Drivetrain:
         self.chosen = np.flatnonzero(["stiffness" in actuator.commanded for actuator in actuators])
         self.spring_joint = self.joint[self.sprung]
         self._rigid_joints = np.flatnonzero(self.rigid)
-        groups = dict.fromkeys(actuator.spring_group for actuator in actuators if actuator.sprung)
-        self._groups = [self._make_group(group, actuators) for group in groups]
+        groups = indices_of_equals([each.spring_group if each.sprung else None for each in actuators])
+        self._groups = [self._make_group(joints, actuators) for group, joints in groups if group is not None]
         self._is_one_group = len(self._groups) == 1 and not self.rigid.any()
-        ranges = [each for actuator in actuators if actuator.sprung for each in actuator.phi_ranges]
-        self.domain = np.array(ranges).reshape(-1, 2).T
+        sprung = [actuator for actuator in actuators if actuator.sprung]
+        ends = [np.stack(each) for actuator in sprung for each in actuator.phi_ranges]
+        self.domain: FloatArray = np.stack(ends).T if ends else np.zeros((2, 0))
 
-    def _make_group(self, group: Hashable, actuators: Sequence[Actuator]) -> _SpringGroup:
-        indices = [
-            index for index, each in enumerate(actuators) if each.sprung and each.spring_group == group
-        ]
-        springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in indices])
-        members = [actuators[joint] for joint in indices]
-        return _SpringGroup(type(members[0]).elasticity(members), np.array(indices), springs)
+    def _make_group(self, joints: Sequence[int], actuators: Sequence[Actuator]) -> _SpringGroup:
+        springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in joints])
+        members = [actuators[joint] for joint in joints]
+        return _SpringGroup(type(members[0]).elasticity(members), np.array(joints), springs)
+
+    def limited(self, torque: FloatArray) -> FloatArray:
+        """Return the torques that the motors exert, (..., motors): commanded ones, at most the largest."""
+        return np.clip(torque, -self.max_torque, self.max_torque)
 
     def of_motors(self, values: FloatArray) -> FloatArray:
         """Return (..., motors) from (..., joints, 2), whose entries without a motor are ignored."""
@@ -138,7 +142,7 @@ class Drivetrain:
 
     def of_joints(self, values: FloatArray) -> FloatArray:
         """Return (..., joints, 2) from (..., motors), NaN where there is no motor."""
-        result = np.full((*values.shape[:-1], *self.present.shape), np.nan)
+        result = np.full_like(values, np.nan, shape=(*values.shape[:-1], *self.present.shape))
         result[..., self.present] = values
         return result
 

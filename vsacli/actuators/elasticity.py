@@ -7,8 +7,9 @@ one instant, or samples.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,28 @@ from vsacli.base.arrays import FloatArray
 
 Components: TypeAlias = Sequence[FloatArray] | FloatArray
 """One array for each motor of a joint, or for each coordinate of its springs; all of one shape."""
+
+
+_Key = TypeVar("_Key")
+
+
+def indices_of_equals(keys: Sequence[_Key]) -> Iterator[tuple[_Key, list[int]]]:
+    """Yield each distinct key, with the indices of those that equal it.
+
+    While parameters are symbols, whose values are unknown, only one and the same object equals itself.
+    """
+    rest = list(range(len(keys)))
+    while rest:
+        first = keys[rest[0]]
+        equal = [index for index in rest if _is_equal(keys[index], first)]
+        yield first, equal
+        rest = [index for index in rest if index not in equal]
+
+
+def _is_equal(key: object, other: object) -> bool:
+    with suppress(NotImplementedError):
+        return key is other or key == other
+    return False
 
 
 class SpringTorques(NamedTuple):

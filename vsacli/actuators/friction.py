@@ -7,6 +7,7 @@ sign of v (below, such friction is "sharp"), or tanh(v/w) with the width w ("smo
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -100,6 +101,13 @@ class FrictionLaws(NamedTuple):
         """Whether the torque at rest is undetermined."""
         sharp: BoolArray = (self.width == 0) & (self.backward + self.forward > 0)
         return sharp
+
+    @property
+    def sticks(self) -> bool:
+        """Whether any friction is sharp; a width that is a symbol counts as positive."""
+        with suppress(NotImplementedError):
+            return bool(np.any(self.sharp))
+        return False
 
     def torque(self, velocity: FloatArray, direction: FloatArray | None = None) -> FloatArray:
         """Return the friction at velocities; sharp friction at rest is the offset alone.

@@ -92,7 +92,7 @@ def codegen(
     overwrite: bool,
     talk: Talk,
 ) -> int:
-    """Generate C code for link torques, inverse dynamics and feedback linearization of ROBOT.
+    """Generate C code of ROBOT: link torques, inverse dynamics, feedback linearization, and the plant.
 
     The code is C99 and requires only math.h: no memory allocation, no state between calls, a bounded number
     of operations. The folder also contains a test program with reference values, a Makefile, a CMake file, a

@@ -77,7 +77,7 @@ def response_with_friction(
         ddq, ddtheta, holding = accelerate(torque - friction, laws.sharp & (direction == 0))
         return Response(ddq, ddtheta, friction + holding), laws.direction_beyond(friction + holding)
 
-    if not laws.sharp.any():
+    if not laws.sticks:
         friction = laws.torque(velocity)
         ddq, ddtheta, _ = accelerate(torque - friction, None)
         return Response(ddq, ddtheta, friction)

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import cached_property, lru_cache, reduce
-from typing import Any
+from functools import cached_property, lru_cache, partial, reduce
+from itertools import islice
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from vsacli.base.wrench import WRENCH_NAMES, Wrench, WrenchFrame, wrench_compone
 from vsacli.compute.tracing import Symbol, Tape, TracedArray
 from vsacli.compute.tracing.python_functions import StateFunction
 from vsacli.compute.vector import ZERO, Scalar, Vector
+from vsacli.documents.record_checks import replaced_unchecked
 from vsacli.dynamics.elastic_torques import carriers, joint_state, link_constants, tool_loads
 from vsacli.dynamics.recursion import recursion
 from vsacli.dynamics.recursion_inputs import RecursionInputs, ToolLoad, TorqueDerivatives
@@ -30,6 +31,15 @@ from vsacli.robot.model import Robot
 
 SMALLEST_PIVOT = 1e-12
 """Smallest pivot of M, relative to the diagonal entry; a smaller one is rounding of a missing mass."""
+
+
+LinkFunction: TypeAlias = Callable[..., FloatArray]
+"""Function of arrays (joints,) or (samples, joints), and of components of a wrench."""
+
+_Inputs: TypeAlias = Callable[[int], list[Any]]
+"""Function that returns the next inputs of the recursion, scalars of any kind."""
+
+_Torques: TypeAlias = Callable[[_Inputs], list[Scalar]]
 
 
 class LinkDynamics:
@@ -45,20 +55,26 @@ class LinkDynamics:
         self._robot, self._frame = robot, frame
 
     @cached_property
-    def _inertia(self) -> StateFunction:
-        return _inertia_program(self._robot)
+    def _inertia(self) -> LinkFunction:
+        return self._function(partial(_lower_triangle, self._robot))
 
     @cached_property
-    def _bias(self) -> StateFunction:
-        return _torque_program(self._robot, self._frame, "tau", orders=1)
+    def _bias(self) -> LinkFunction:
+        return self._function(partial(_torques, self._robot, self._frame, "tau", 1))
 
     @cached_property
-    def _rate(self) -> StateFunction:
-        return _torque_program(self._robot, self._frame, "dtau", orders=2)
+    def _rate(self) -> LinkFunction:
+        return self._function(partial(_torques, self._robot, self._frame, "dtau", 2))
 
     @cached_property
-    def _acceleration(self) -> StateFunction:
-        return _torque_program(self._robot, self._frame, "ddtau", orders=4)
+    def _acceleration(self) -> LinkFunction:
+        return self._function(partial(_torques, self._robot, self._frame, "ddtau", 4))
+
+    @staticmethod
+    def _function(torques: _Torques) -> LinkFunction:
+        """Return a function of arrays that computes torques of the recursion."""
+        tape = Tape()
+        return StateFunction(tape.program(torques(tape.inputs)))
 
     def mass_matrix(self, q: FloatArray) -> FloatArray:
         """Return M(q), ([samples,] joints, joints): column k is the recursion's torque at q'' = e_k alone."""
@@ -228,7 +244,6 @@ def _last_pivot(matrices: FloatArray) -> float:
     return float(np.min(np.divide(pivots, entries, out=np.zeros_like(pivots), where=entries > 0)))
 
 
-@lru_cache(maxsize=16)
 def link_dynamics(robot: Robot, frame: WrenchFrame | None = None) -> LinkDynamics:
     """Return the programs of a robot's links and joints; robots with equal links share them.
 
@@ -236,6 +251,14 @@ def link_dynamics(robot: Robot, frame: WrenchFrame | None = None) -> LinkDynamic
         robot: Robot; its actuators and dampers are ignored.
         frame: Frame of the wrench on the tools, as in `Wrench`; None without a wrench.
     """
+    try:
+        return _link_dynamics_of(robot, frame)
+    except NotImplementedError:  # symbols among the parameters, whose values are unknown, have no hash
+        return _SymbolicLinks(without_drives(robot), frame)
+
+
+@lru_cache(maxsize=16)
+def _link_dynamics_of(robot: Robot, frame: WrenchFrame | None) -> LinkDynamics:
     return _shared_link_dynamics(without_drives(robot), frame)
 
 
@@ -245,9 +268,10 @@ def without_drives(robot: Robot) -> Robot:
     Limits are left out, too, as no program depends on them.
     """
     nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
-    joints = tuple(replace(joint, **nothing) for joint in robot.joints)
-    robot = robot.without_tool_limits(robot.limited_tools)
-    return replace(robot, name="links", description="", placeholder=False, joints=joints, sources=())
+    joints = tuple(replaced_unchecked(joint, nothing) for joint in robot.joints)
+    tools = tuple(replaced_unchecked(tool, {"min_stiffness": None}) for tool in robot.tools)
+    common = {"name": "links", "description": "", "placeholder": False, "sources": ()}
+    return replaced_unchecked(robot, {**common, "joints": joints, "tools": tools})
 
 
 _ANY_DRIVE: Any = Rigid(motor=Motor(inertia=1.0))
@@ -258,36 +282,48 @@ def _shared_link_dynamics(robot: Robot, frame: WrenchFrame | None) -> LinkDynami
     return LinkDynamics(robot, frame)
 
 
-def _inertia_program(robot: Robot) -> StateFunction:
-    """Return the program of the lower triangle of M, row by row; friction offsets are left out."""
-    robot = replace(robot, joints=tuple(replace(joint, friction=None) for joint in robot.joints))
-    tape = Tape()
-    q = tape.inputs(len(robot.joints))
+class _SymbolicLinks(LinkDynamics):
+    """Links with parameters that are symbols: each call records the recursion on their tape."""
+
+    @staticmethod
+    def _function(torques: _Torques) -> LinkFunction:
+        def compute(*inputs: Any) -> Any:
+            scalars = iter(np.concatenate(inputs))
+            return np.stack(torques(lambda count: list(islice(scalars, count))))
+
+        return compute
+
+
+def _lower_triangle(robot: Robot, inputs: _Inputs) -> list[Scalar]:
+    """Return the lower triangle of M, row by row; friction offsets are left out."""
+    joints = tuple(replaced_unchecked(joint, {"friction": None}) for joint in robot.joints)
+    robot = replaced_unchecked(robot, {"joints": joints})
+    q = inputs(len(robot.joints))
     numbers = range(len(robot.joints))
     columns = [
         _recursion_torques(robot, q, [(0, int(joint == moving), 0, 0) for joint in numbers], ZERO)
         for moving in numbers
     ]
-    lower = [columns[column][row].tau for row in numbers for column in range(row + 1)]
-    return StateFunction(tape.program(lower))
+    return [columns[column][row].tau for row in numbers for column in range(row + 1)]
 
 
-def _torque_program(robot: Robot, frame: WrenchFrame | None, output: str, orders: int) -> StateFunction:
+def _torques(
+    robot: Robot, frame: WrenchFrame | None, output: str, orders: int, inputs: _Inputs
+) -> list[Scalar]:
     """Return an output of the recursion; derivatives of q beyond `orders` are zero."""
-    tape = Tape()
     joints = len(robot.joints)
-    q = tape.inputs(joints)
-    rates = [tape.inputs(joints) if order < orders else [0] * joints for order in range(4)]
+    q = inputs(joints)
+    rates = [inputs(joints) if order < orders else [0] * joints for order in range(4)]
     order = ("tau", "dtau", "ddtau").index(output)
-    loads = () if frame is None else _tool_load_inputs(tape, robot, frame, order)
+    loads = () if frame is None else _tool_load_inputs(inputs, robot, frame, order)
     torques = _recursion_torques(robot, q, list(zip(*rates, strict=True)), base_gravity(robot), loads)
-    return StateFunction(tape.program([getattr(torque, output) for torque in torques]))
+    return [getattr(torque, output) for torque in torques]
 
 
-def _tool_load_inputs(tape: Tape, robot: Robot, frame: WrenchFrame, order: int) -> list[ToolLoad]:
+def _tool_load_inputs(inputs: _Inputs, robot: Robot, frame: WrenchFrame, order: int) -> list[ToolLoad]:
     """Return the loads with the wrench and its derivatives up to an order as inputs, the others zero."""
     components = wrench_components(frame)
-    wrench = [tape.inputs(components) if derivative <= order else [0] * components for derivative in range(3)]
+    wrench = [inputs(components) if derivative <= order else [0] * components for derivative in range(3)]
     return tool_loads(robot, frame, wrench)
 
 

@@ -10,12 +10,13 @@ from __future__ import annotations
 import copy
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from vsacli.actuators.elasticity import indices_of_equals
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.units import POSITION
 from vsacli.compute.control_flow import subroutine
@@ -266,7 +267,7 @@ class SpringRows:
     """Springs of several joints, the same number at each; deflections and results (..., joints, springs)."""
 
     def __init__(self, laws: Sequence[Sequence[SpringLaw]]) -> None:
-        self._alike = list(_distinct_laws([law for of_joint in laws for law in of_joint]))
+        self._alike = list(indices_of_equals([law for of_joint in laws for law in of_joint]))
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Return the torque of each spring."""
@@ -293,12 +294,3 @@ class SpringRows:
             for whole, part in zip(merged, of_law, strict=True):
                 whole[..., members] = part
         return [whole.reshape(*phi.shape) for whole in merged]
-
-
-def _distinct_laws(laws: list[SpringLaw]) -> Iterator[tuple[SpringLaw, list[int]]]:
-    """Yield each distinct law, with the indices of its springs."""
-    distinct: list[SpringLaw] = []
-    for law in laws:
-        if law not in distinct:
-            distinct.append(law)
-            yield law, [index for index, other in enumerate(laws) if other == law]

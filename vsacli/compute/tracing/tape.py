@@ -141,7 +141,7 @@ class Tape:
         contents.
         """
         operations = [symbol for symbol in self._symbols.values() if symbol.operation != "input"]
-        program = without_dead_code(self._inputs, operations, outputs)
+        program = without_dead_code(self._inputs, operations, [*map(_python_number, outputs)])
         self._ended = True
         self._symbols.clear()
         self.calls.clear()

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.flags import Flag, finite, marked, not_finite_flags
-from vsacli.base.wrench import Wrench, WrenchFrame
-from vsacli.compute.rows import RowLayout
-from vsacli.control.codegen.interface import Array, Function, Rows, Structure
+from vsacli.base.wrench import WrenchFrame
+from vsacli.control.codegen.interface import Array, Function, Rows, Structure, arrays_by_argument
 from vsacli.control.codegen.robot_functions import (
     command_structure,
+    state_structure,
     variable_array,
     wrench_argument,
-    wrench_by_tool,
+    wrench_on_tools,
 )
 from vsacli.control.gains import STIFFNESS_ORDER, Gains, Integral
 from vsacli.control.linearization import control_law, position_order
@@ -78,7 +77,7 @@ class _Law:
         self._plant = Plant(robot, frame)
         joints, order = (len(robot.joints),), position_order(robot, self._plant)
         self.arguments = (
-            ("state", Structure("state", "Measured state.", _state_arrays(robot))),
+            ("state", state_structure(robot)),
             ("reference", command_structure(robot)),
             (
                 "gains",
@@ -108,7 +107,7 @@ class _Law:
 
     def __call__(self, rows: Rows) -> list[Any]:
         """Return the rows of the motor torques, then those of the flags."""
-        state, reference, gains, integral, *wrench = self._unpacked(rows)
+        state, reference, gains, integral, *wrench = arrays_by_argument(self.arguments, rows).values()
         drivetrain = self._plant.drivetrain
         law: Any = control_law(self._plant, cast("Gains", _GainInputs(**gains)))
         theta, dtheta = (
@@ -116,31 +115,18 @@ class _Law:
         )
         acting = None
         if self._frame is not None:
-            by_tool = wrench_by_tool(self._robot, wrench[0])
-            acting = Wrench(*map(np.concatenate, by_tool.values()), frame=self._frame)
+            acting = wrench_on_tools(self._robot, self._frame, wrench[0])
         command = Motion.of(np.zeros(1), reference, acting)
         torque = law.torque(state["q"], state["dq"], theta, dtheta, command, Integral(**integral))
-        tau_motor = self._of_joints(torque)
+        tau_motor = drivetrain.of_joints(torque)
         values = {**state, "phi": state["theta"] - state["q"][:, None], "tau_motor": tau_motor}
         if drivetrain.windings is not None:
             velocity = drivetrain.of_all_motors(state["dq"], dtheta)
             electrical = drivetrain.windings.variables(torque, velocity)
-            values |= {name: self._of_joints(each) for name, each in electrical.items()}
+            values |= {name: drivetrain.of_joints(each) for name, each in electrical.items()}
         singular = drivetrain.determinant(state["q"], theta) == 0
         flags = [self._flags(joint, values, singular[joint]) for joint in range(len(self._robot.joints))]
         return [*tau_motor.ravel(), *flags]
-
-    def _of_joints(self, of_motors: Any) -> Any:
-        """Return (joints, 2) from (motors,), NaN where there is no motor."""
-        present = self._plant.drivetrain.present
-        values = np.full_like(of_motors, np.nan, shape=present.shape)
-        values[present] = of_motors
-        return values
-
-    def _unpacked(self, rows: Rows) -> Iterator[dict[str, Any]]:
-        sizes = RowLayout({name: (structure.layout.size,) for name, structure in self.arguments})
-        entries = sizes.arrays(np.concatenate(rows))
-        return (structure.layout.arrays(entries[name]) for name, structure in self.arguments)
 
     def _flags(self, index: int, values: Arrays, singular: Any) -> Any:
         """Return the flags of a joint: torque undefined, or a limit exceeded by state or torque."""
@@ -148,13 +134,3 @@ class _Law:
         there = finite(of_joint["tau_motor"][: joint.actuator.motor_count])
         flags = marked(Flag.SINGULAR, singular) | not_finite_flags(~(there | singular))
         return limit_flags(joint, of_joint, flags)
-
-
-def _state_arrays(robot: Robot) -> tuple[Array, ...]:
-    motors = (len(robot.joints), SIDES)
-    return (
-        Array("q", motors[:1], "joint position, rad (m)"),
-        Array("dq", motors[:1], "joint velocity, rad/s (m/s)"),
-        Array("theta", motors, "motor position, joint side of the gear, rad (m)"),
-        Array("dtheta", motors, "motor velocity, joint side of the gear, rad/s (m/s)"),
-    )

@@ -8,8 +8,10 @@ from functools import cached_property
 from itertools import product
 from typing import Any
 
+import numpy as np
+
 from vsacli.compute.rows import RowLayout
-from vsacli.compute.tracing import Kind, Program, trace_by_size
+from vsacli.compute.tracing import Kind, Program, Tape, TracedArray, cells_of, trace_by_size
 
 Rows = Sequence[Any]
 
@@ -52,12 +54,14 @@ class Structure:
         meaning: short description.
         arrays: members.
         nominal: nominal values of the entries, written as a constant; empty for none.
+        by_value: whether the only entry is itself the argument, so that there is no such struct in C.
     """
 
     name: str
     meaning: str
     arrays: tuple[Array, ...]
     nominal: tuple[float, ...] = ()
+    by_value: bool = False
 
     @property
     def entries(self) -> Iterator[str]:
@@ -74,15 +78,26 @@ Arguments = tuple[tuple[str, Structure], ...]
 """Names and structures of the arguments of a function."""
 
 
+def rows_by_argument(arguments: Arguments, rows: Rows) -> dict[str, Rows]:
+    """Return the rows of each argument."""
+    return RowLayout({name: (structure.layout.size,) for name, structure in arguments}).unpack(rows)
+
+
+def arrays_by_argument(arguments: Arguments, rows: Rows) -> dict[str, dict[str, Any]]:
+    """Return the arrays of each argument for one sample, by their names."""
+    entries = rows_by_argument(arguments, rows)
+    return {name: structure.layout.arrays(np.concatenate(entries[name])) for name, structure in arguments}
+
+
 def unpacked(arguments: Arguments, rows: Rows) -> dict[str, Rows]:
     """Return the rows of all arguments by array name; names must differ between arguments."""
     return RowLayout({array.name: array.shape for _, each in arguments for array in each.arrays}).unpack(rows)
 
 
 def structures(functions: Sequence[Function]) -> list[Structure]:
-    """Return the structures that functions use, without duplicates."""
+    """Return the structures that functions use in C, without duplicates."""
     used = (each for function in functions for each in (*dict(function.arguments).values(), function.result))
-    return list(dict.fromkeys(used))
+    return [each for each in dict.fromkeys(used) if not each.by_value]
 
 
 @dataclass(frozen=True)
@@ -96,6 +111,7 @@ class Function:
         result: structure that the function fills.
         compute: function from rows of all entries of the arguments to rows of the entries of the result. The
             C function returns the bits of the result, combined over all joints.
+        result_name: name of the result as an argument in C; that of its structure if empty.
     """
 
     name: str
@@ -103,6 +119,21 @@ class Function:
     arguments: Arguments
     result: Structure
     compute: Callable[[Rows], Rows]
+    result_name: str = ""
+
+    @property
+    def output(self) -> str:
+        """Name of the result as an argument in C."""
+        return self.result_name or self.result.name
+
+    @property
+    def inputs(self) -> list[str]:
+        """Entries of all arguments as written in C."""
+        return [
+            name if structure.by_value else f"{name}->{entry}"
+            for name, structure in self.arguments
+            for entry in structure.entries
+        ]
 
     @cached_property
     def program(self) -> Program:
@@ -116,3 +147,32 @@ class Function:
             return trace_by_size(self.compute, kinds, MOST_WRITTEN_OUT, MOST_OF_CALLS, short=True)
         except NotImplementedError as error:
             raise NotImplementedError(f"{self.name}: {error}") from error
+
+
+Evaluate = Callable[[Rows], Rows]
+"""Function from rows of the arguments of a generated function to rows of its result."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step(Function):
+    """A step of an integrator, whose C code calls the function of the derivative.
+
+    Attributes:
+        derivative: function of the time derivative of the state.
+        advance: `compute` with the evaluation of the derivative as a further argument, the first.
+    """
+
+    derivative: Function
+    advance: Callable[[Evaluate, Rows], Rows]
+
+    @cached_property
+    def program(self) -> Program:
+        """Program of a step, in which the derivative is a subroutine."""
+        tape, body = Tape(), self.derivative.program
+
+        def evaluate(rows: Rows) -> Rows:
+            results = tape.emit_subroutine(body, [cells_of(row).item() for row in rows])
+            return [TracedArray(tape, [result]) for result in results]
+
+        rows = [TracedArray(tape, [symbol]) for symbol in tape.inputs(len(self.inputs))]
+        return tape.program([cells_of(row).item() for row in self.advance(evaluate, rows)])

@@ -48,7 +48,12 @@ def with_parameters(
     def compute(rows: Rows) -> Rows:
         given, values = rows[: -len(chosen)], rows[-len(chosen) :]
         other = with_numbers(robot, chosen, [row[0] for row in values])
-        return make(other, frame).compute(given)
+        try:
+            return make(other, frame).compute(given)
+        except InputError:
+            raise
+        except (AttributeError, TypeError, ValueError) as error:  # arrays of numbers hold no symbols
+            raise NotImplementedError(f"a parameter goes into a table of numbers: {error}") from error
 
     taken = (*plain.arguments, (PARAMETERS, parameters_structure(chosen)))
     function = dataclasses.replace(plain, arguments=taken, compute=compute)

@@ -14,11 +14,11 @@ from vsacli.base.outputs import Outputs
 from vsacli.base.texts import counted, sentence
 from vsacli.base.version import __version__
 from vsacli.base.wrench import WrenchFrame, check_wrench_frame
-from vsacli.compute.tracing import TooLongError
 from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.parameters import Maker, check_parameters, with_parameters
+from vsacli.control.codegen.plant_functions import state_derivative_function, step_function
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import ReferenceResults, check_single_precision
 from vsacli.control.codegen.texts import (
@@ -32,11 +32,6 @@ from vsacli.control.codegen.texts import (
 )
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
-
-WITHOUT_PARAMETERS = (
-    "feedback_linearization with --parameters, since it uses the values of the robot file; leave out "
-    "--parameters to get it"
-)
 
 
 class Project(NamedTuple):
@@ -61,7 +56,7 @@ def generate(
     *,
     loops: bool = True,
 ) -> Project:
-    """Generate C99 code for a robot: link torques, inverse dynamics, feedback linearization.
+    """Generate C99 code for a robot: link torques, inverse dynamics, feedback linearization, plant.
 
     Args:
         robot: robot.
@@ -111,7 +106,7 @@ def _functions(
 ) -> tuple[list[Function], list[str]]:
     """Return the functions that can be generated, and the reasons for missing ones.
 
-    Feedback linearization grows with the third power of the number of joints, so it is tried last, after the
+    Feedback and plant grow with the third power of the number of joints, so they are tried last, after the
     others have turned out not to be too long.
 
     Raises:
@@ -133,11 +128,13 @@ def _functions(
     omitted = []
     try:
         functions.append(made(feedback_linearization_function))
-    except InputError as error:
-        omitted.append(f"no feedback_linearization: {error}")
-    except NotImplementedError as error:
-        short = not isinstance(error.__cause__, TooLongError)
-        omitted.append(f"no {WITHOUT_PARAMETERS if chosen and short else error}")
+    except (InputError, NotImplementedError) as error:
+        omitted.append(f"no feedback_linearization: {error.__cause__ or error}")
+    try:
+        derivative = made(state_derivative_function)
+        functions += [derivative, step_function(robot, derivative)]
+    except (InputError, NotImplementedError) as error:
+        omitted.append(f"no state_derivative and no step: {error.__cause__ or error}")
     return functions, omitted
 
 

@@ -13,7 +13,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.flags import finite, not_finite_flags
 from vsacli.base.signals import POSITION
 from vsacli.base.variables import VARIABLES
-from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, WrenchFrame, frames_by_tool
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, WrenchFrame, frames_by_tool
 from vsacli.compute.vector import Scalar
 from vsacli.control.codegen.interface import Arguments, Array, Function, Rows, Structure, unpacked
 from vsacli.dynamics.deflection_rows import INTERNAL, InternalRows
@@ -45,6 +45,21 @@ def command_structure(robot: Robot) -> Structure:
     meaning = "Commanded motion and stiffness; only antagonistic and serial joints read a stiffness."
     names = (name for signal in (POSITION, *robot.signals) for name in signal.names)
     return Structure("command", meaning, _arrays(robot, tuple(names)))
+
+
+def state_structure(robot: Robot) -> Structure:
+    """Return the structure of the full state of joints and motors."""
+    motors = (len(robot.joints), SIDES)
+    return Structure(
+        "state",
+        "Measured state.",
+        (
+            Array("q", motors[:1], "joint position, rad (m)"),
+            Array("dq", motors[:1], "joint velocity, rad/s (m/s)"),
+            Array("theta", motors, "motor position, joint side of the gear, rad (m)"),
+            Array("dtheta", motors, "motor velocity, joint side of the gear, rad/s (m/s)"),
+        ),
+    )
 
 
 def wrench_structure(robot: Robot, frame: WrenchFrame) -> Structure:
@@ -88,6 +103,11 @@ def wrench_by_tool(robot: Robot, arrays: Mapping[str, Any]) -> dict[str, list[An
     return {
         name: [arrays.get(_name_in_c(name, tool), idle) for tool in robot.tool_names] for name in WRENCH_NAMES
     }
+
+
+def wrench_on_tools(robot: Robot, frame: WrenchFrame, arrays: Mapping[str, Any]) -> Wrench:
+    """Return the wrench on all tools from the arrays of a `wrench_structure`."""
+    return Wrench(*map(np.concatenate, wrench_by_tool(robot, arrays).values()), frame=frame)
 
 
 def _kernel_inputs(robot: Robot, arguments: Arguments, rows: Rows) -> dict[str, Any]:

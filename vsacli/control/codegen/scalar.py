@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 from vsacli.compute.rounding import single
-from vsacli.compute.tracing import Kind, Program, Symbol, is_of_calls
+from vsacli.compute.tracing import Kind, Symbol, is_of_calls
 from vsacli.compute.tracing.c_code import (
     REAL_TYPES,
     Dialect,
@@ -21,7 +21,7 @@ from vsacli.compute.tracing.c_code import (
     table_declarations,
 )
 from vsacli.compute.tracing.c_functions import VALUES, CallingCode, Subroutines
-from vsacli.control.codegen.interface import Function, Structure, structures
+from vsacli.control.codegen.interface import Function, Step, Structure, structures
 
 PRECISIONS = REAL_TYPES
 
@@ -134,15 +134,12 @@ def _single_literal(number: float) -> str:
 def definitions(prefix: str, functions: Sequence[Function], precision: str) -> Iterator[str]:
     """Yield the definitions of the source file: constants, tables, helpers, subroutines, functions."""
     dialect = scalar_dialect(precision)
-    programs = [function.program for function in functions]
+    programs = [function.program for function in functions if not isinstance(function, Step)]
     tables = Tables(programs, dialect.array_type)
     subroutines = Subroutines(programs)
     writer = Writer(dialect, tables, subroutines.name)
     bodies = ["\n".join(indented(text)) for text in subroutines.functions(writer)]
-    bodies += [
-        "\n".join(_definition(prefix, function, program, writer))
-        for function, program in zip(functions, programs, strict=True)
-    ]
+    bodies += ["\n".join(_definition(prefix, function, writer)) for function in functions]
     used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
     yield from (_constant(prefix, each, dialect) for each in structures(functions) if each.nominal)
     if declarations := list(table_declarations(tables, dialect)):
@@ -165,10 +162,13 @@ def helper_text(name: str, precision: str) -> str:
     return text if text.startswith("/*") else f"static inline {text}"
 
 
-def signature(prefix: str, function: Function) -> str:
+def signature(prefix: str, function: Function, precision: str) -> str:
     """Return the declarator of a function, with one argument per line if a single line is too long."""
-    arguments = [f"const {prefix}_{structure.name} *{name}" for name, structure in function.arguments]
-    result = f"{prefix}_{function.result.name} *{function.result.name}"
+    arguments = [
+        f"{precision} {name}" if structure.by_value else f"const {prefix}_{structure.name} *{name}"
+        for name, structure in function.arguments
+    ]
+    result = f"{prefix}_{function.result.name} *{function.output}"
     lines = [f"unsigned {prefix}_{function.name}({', '.join([*arguments, result])})"]
     if len(lines[0]) > WIDTH:
         lines = [f"unsigned {prefix}_{function.name}(", ",\n    ".join([*arguments, result]) + ")"]
@@ -183,12 +183,16 @@ def indented(lines: Iterable[str], depth: int = 0) -> Iterator[str]:
         depth += line.endswith("{")
 
 
-def _definition(prefix: str, function: Function, program: Program, writer: Writer) -> Iterator[str]:
-    entries = [f"{name}->{entry}" for name, structure in function.arguments for entry in structure.entries]
+def _definition(prefix: str, function: Function, writer: Writer) -> Iterator[str]:
+    if isinstance(function, Step):
+        yield from _step_definition(prefix, function, writer)
+        return
+    program, entries = function.program, function.inputs
+    head = f"{signature(prefix, function, writer.dialect.types[Kind.REAL])}\n{{"
     if is_of_calls(program):
         code = CallingCode(function.name, program, writer)
         yield from indented(code.declarations("static"))
-        yield f"{signature(prefix, function)}\n{{"
+        yield head
         yield f"    {writer.dialect.types[Kind.REAL]} {VALUES}[{code.slots}];"
         yield from (f"    {VALUES}[{slot}] = {entry};" for slot, entry in enumerate(entries))
         yield from (f"    {line}" for line in code.statements())
@@ -196,20 +200,45 @@ def _definition(prefix: str, function: Function, program: Program, writer: Write
         names = {output.index: code.value(output, code.slot[output.index]) for output in outputs}
     else:
         names = {symbol.index: entry for symbol, entry in zip(program.inputs, entries, strict=True)}
-        yield f"{signature(prefix, function)}\n{{"
+        yield head
         yield from indented(writer.statements(program.operations, names), 1)
-    yield from _results(function, program, writer, names)
+    yield from _results(function, writer, names)
 
 
-def _results(function: Function, program: Program, writer: Writer, names: Names) -> Iterator[str]:
-    flags = []
+def _step_definition(prefix: str, step: Step, writer: Writer) -> Iterator[str]:
+    """Yield the definition of a step, which calls the function of the derivative at each stage."""
+    program, derivative = step.program, step.derivative
+    names = {symbol.index: entry for symbol, entry in zip(program.inputs, step.inputs, strict=True)}
+    rates, flags = list(derivative.result.entries), list[str]()
+    (_, state), *held = derivative.arguments
+    yield f"{signature(prefix, step, writer.dialect.types[Kind.REAL])}\n{{"
+    for symbol in program.operations:
+        if symbol.operation == "item":
+            names[symbol.index] = f"rates_{len(flags)}.{rates[symbol.operands[1]]}"
+        elif symbol.operation == "subroutine":
+            stage = len(flags) + 1
+            flags.append(f"flags_{stage}")
+            yield f"    {prefix}_{state.name} state_{stage};"
+            yield f"    {prefix}_{derivative.result.name} rates_{stage};"
+            for entry, operand in zip(state.entries, symbol.operands[1:], strict=False):
+                yield f"    state_{stage}.{entry} = {writer.value(operand, Kind.REAL, names)};"
+            passed = ", ".join([f"&state_{stage}", *(name for name, _ in held), f"&rates_{stage}"])
+            yield f"    const unsigned flags_{stage} = {prefix}_{derivative.name}({passed});"
+        else:
+            yield from indented(writer.statements([symbol], names), 1)
+    yield from _results(step, writer, names, flags)
+
+
+def _results(function: Function, writer: Writer, names: Names, flags: Sequence[str] = ()) -> Iterator[str]:
+    """Yield the statements that store the results, and return their flags together with others."""
+    program, flags = function.program, list(flags)
     outputs = iter(program.outputs)
     for array in function.result.arrays:
         for entry in array.entries:
             output = next(outputs)
             kind = Kind.BITS if array.bits else Kind.REAL
             value = writer.value(output, kind, names)
-            yield f"    {function.result.name}->{entry} = {value};"
+            yield f"    {function.output}->{entry} = {value};"
             flags += [value] if array.bits and isinstance(output, Symbol) else []
     yield f"    return {' | '.join(flags) or '0u'};"
     yield "}"

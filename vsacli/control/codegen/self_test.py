@@ -11,6 +11,7 @@ from vsacli.base.arrays import FloatArray, over_time
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.signals import DAMPING, POSITION
+from vsacli.base.variables import Block
 from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.tracing.single_precision import in_single_precision
 from vsacli.control.codegen.interface import Array, Function
@@ -33,6 +34,9 @@ MISSED = {"q": 0.01, "dq": 0.1, "theta": 0.01, "dtheta": 0.1}
 """Largest deviations of the measured state from the command, SI units."""
 
 POLE = -20.0
+
+STEP_DURATION = 1e-3
+"""Duration of a step, s."""
 
 VARIED, UNLIKE_ZERO = 1.05, 0.01
 """Factor for varied parameters, and the value in place of zero: small, so that stiffness stays attainable."""
@@ -70,10 +74,11 @@ class ReferenceResults:
         self._rng = np.random.default_rng(1)
         self._results: dict[str, Arrays] = {}
         command = self._command()
+        block = compute_block(robot, self._motion(command, command["stiffness"]))
         self._inputs = {
             "motion": {name: command[name] for name in LinkTorques(robot).arguments.shapes},
             "command": command,
-            "state": self._state(command),
+            "state": self._state(block),
             "internal": self._internal(command),
             "integral": {name: self._drawn(scale) for name, scale in (("q", 1e-3), ("stiffness", 1.0))},
             **{
@@ -81,6 +86,8 @@ class ReferenceResults:
                 for name, structure in wrench_argument(robot, wrench)
             },
             PARAMETERS: _two_sets(chosen),
+            "input": self._plant_input(command, block.tau_motor),
+            "dt": {"dt": np.full(CASES, STEP_DURATION)},
         }
 
     def inputs(self, function: Function) -> list[Arrays]:
@@ -154,8 +161,16 @@ class ReferenceResults:
             deflections[:, index] = 0.9 * np.nan_to_num(over_time(inside.phi))
         return {"internal_phi": deflections}
 
-    def _state(self, command: Arrays) -> Arrays:
-        block = compute_block(self._robot, self._motion(command, command["stiffness"]))
+    def _plant_input(self, command: Arrays, tau_motor: FloatArray) -> Arrays:
+        """Return motor torques away from those of the command, some of them beyond a largest torque."""
+        torque = np.nan_to_num(tau_motor)
+        missed = np.abs(torque).max() * self._rng.uniform(-1, 1, torque.shape)
+        return {
+            "tau_motor": torque + missed,
+            **{name: command[name] for name in command.keys() & {DAMPING.key}},
+        }
+
+    def _state(self, block: Block) -> Arrays:
         of_joint, of_motor = (
             {name: getattr(block, name) for name in names} for names in (("q", "dq"), ("theta", "dtheta"))
         )

@@ -67,7 +67,9 @@ def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precis
         joints=len(robot.joints),
         flags="\n".join(f"    {upper}_{flag.name} = {flag.value}, /* {flag.meaning} */" for flag in Flag),
         structures="\n\n".join(_structure(prefix, each, precision) for each in structures(functions)),
-        functions="\n\n".join(f"{comment(each.meaning)}\n{signature(prefix, each)};" for each in functions),
+        functions="\n\n".join(
+            f"{comment(each.meaning)}\n{signature(prefix, each, precision)};" for each in functions
+        ),
     )
 
 
@@ -123,7 +125,7 @@ def self_test_text(
         constants = (*function.arguments, ("expected", function.result))
         values = (*reference.inputs(function), reference.results(function))
         tests += (
-            _vector(f"{prefix}_{structure.name} {function.name}_{name}", structure, arrays)
+            _vector(f"{_c_type(prefix, structure, precision)} {function.name}_{name}", structure, arrays)
             for (name, structure), arrays in zip(constants, values, strict=True)
         )
         tests.append(_test(prefix, function, reference))
@@ -138,15 +140,22 @@ def self_test_text(
     )
 
 
+def _c_type(prefix: str, structure: Structure, precision: str) -> str:
+    return precision if structure.by_value else f"{prefix}_{structure.name}"
+
+
 def _vector(declared: str, structure: Structure, values: Arrays) -> str:
     cases = (
-        ", ".join(
-            f".{array.name} = {_initializer(values[array.name][case], array.bits)}"
-            for array in structure.arrays
-        )
-        for case in range(CASES)
+        _case(structure, {name: of_cases[case] for name, of_cases in values.items()}) for case in range(CASES)
     )
-    return "\n".join([f"static const {declared}[CASES] = {{", *(f"    {{{case}}}," for case in cases), "};"])
+    return "\n".join([f"static const {declared}[CASES] = {{", *(f"    {case}," for case in cases), "};"])
+
+
+def _case(structure: Structure, values: Arrays) -> str:
+    members = [(array, _initializer(values[array.name], array.bits)) for array in structure.arrays]
+    if structure.by_value:
+        return members[0][1]
+    return "{" + ", ".join(f".{array.name} = {value}" for array, value in members) + "}"
 
 
 def _initializer(values: FloatArray, bits: bool) -> str:
@@ -157,7 +166,7 @@ def _initializer(values: FloatArray, bits: bool) -> str:
 
 def _test(prefix: str, function: Function, reference: ReferenceResults) -> str:
     own, result = function.name, f"{prefix}_{function.result.name}"
-    given = ", ".join(f"&{own}_{name}[n]" for name, _ in function.arguments)
+    given = ", ".join(f"{'' if each.by_value else '&'}{own}_{name}[n]" for name, each in function.arguments)
     comparisons = "\n".join(_comparisons(function, reference))
     return f"""static int test_{own}(void)
 {{
@@ -194,6 +203,7 @@ def binding_text(prefix: str, functions: Sequence[Function], precision: str, abo
         prefix,
         head=textwrap.fill(one_line(about), WIDTH, initial_indent="# ", subsequent_indent="# "),
         call=f"{loop.name}({_names(loop)})",
+        real=_NUMPY_TYPES[precision],
         flags="\n".join(f"    {flag.name} = {flag.value}  # {flag.meaning}" for flag in Flag),
         data_types="\n\n".join(_data_type(each, precision) for each in used),
         functions="\n\n\n".join(called),
@@ -208,9 +218,13 @@ def _type(structure: Structure) -> str:
     return structure.name.capitalize()
 
 
+_NUMPY_TYPES = {"double": "np.float64", "float": "np.float32"}
+"""Types of numbers in Python."""
+
+
 def _data_type(structure: Structure, precision: str) -> str:
     """Return the NumPy data type of a structure, with the memory layout of C."""
-    number = {"double": "np.float64", "float": "np.float32"}[precision]
+    number = _NUMPY_TYPES[precision]
     members = "".join(
         f'        ("{array.name}", {"np.uintc" if array.bits else number}, {array.shape}),\n'
         for array in structure.arrays
@@ -221,7 +235,10 @@ def _data_type(structure: Structure, precision: str) -> str:
 def _binding(prefix: str, function: Function) -> str:
     """Return the Python function that calls the C function with the same arguments."""
     meaning = f'"""{function.meaning}"""'
-    given = "".join(f", ({name}, {_type(structure)})" for name, structure in function.arguments)
+    given = "".join(
+        f", _real({name})" if structure.by_value else f", ({name}, {_type(structure)})"
+        for name, structure in function.arguments
+    )
     return f"""def {function.name}({_names(function)}):
 {textwrap.fill(meaning, WIDTH, initial_indent="    ", subsequent_indent="    ")}
     return _call(_LIBRARY.{prefix}_{function.name}, {_type(function.result)}{given})"""
@@ -250,6 +267,7 @@ def readme_text(
     loop = next(function for function in functions if function.name == "inverse_dynamics")
     programs = [function.program for function in functions]
     costs = [worst_cost(program) for program in programs]
+    heads = [signature(prefix, function, precision) for function in functions]
     return filled(
         "README.md",
         prefix,
@@ -259,8 +277,8 @@ def readme_text(
         arguments=", ".join(f"const {prefix}_{each.name} *{name}" for name, each in loop.arguments),
         tolerance=TOLERANCE[precision],
         functions="\n".join(
-            f"- `{' '.join(signature(prefix, function).split()).replace('( ', '(')}`: {function.meaning}"
-            for function in functions
+            f"- `{' '.join(head.split()).replace('( ', '(')}`: {function.meaning}"
+            for function, head in zip(functions, heads, strict=True)
         ),
         joints=for_markdown(", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names))),
         wrenches=_wrenches(robot, functions),

@@ -189,11 +189,6 @@ class ClosedLoop:
             self.held = ConstantTable(torques)
         self.held.set(torques)
 
-    def applied(self, demand: FloatArray) -> FloatArray:
-        """Return the torques that the motors exert: commanded ones, clipped to the largest torque."""
-        limit = self.plant.drivetrain.max_torque
-        return np.clip(demand, -limit, limit)
-
     def derivative(self, time: float, vector: FloatArray) -> FloatArray:
         """Return the time derivatives of state vectors, (..., entries), while the controller acts."""
         phase = self.packing.unpack(vector)
@@ -206,4 +201,5 @@ class ClosedLoop:
     ) -> Response:
         """Return the response to commanded motor torques; `slip` as in `Plant.accelerations`."""
         wrench, damping = self.reference.wrench(time), self.reference.damping(time)
-        return self.plant.accelerations(*phase[:4], self.applied(demand), wrench, damping, slip)
+        torque = self.plant.drivetrain.limited(demand)
+        return self.plant.accelerations(*phase[:4], torque, wrench, damping, slip)

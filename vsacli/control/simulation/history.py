@@ -213,7 +213,7 @@ def _history(
     read: dict[str, FloatArray] = {}
     if readings is not None:
         states = loop.packing.unpack(integrated.states)
-        read = readings.variables(states, loop.applied(integrated.demand))
+        read = readings.variables(states, loop.plant.drivetrain.limited(integrated.demand))
     return History(
         time=first + integrated.time,
         **found,
@@ -226,7 +226,7 @@ def _history(
 
 def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[str, FloatArray]:
     plant, drivetrain = loop.plant, loop.plant.drivetrain
-    phase, torque = loop.packing.unpack(integrated.states), loop.applied(integrated.demand)
+    phase, torque = loop.packing.unpack(integrated.states), loop.plant.drivetrain.limited(integrated.demand)
     ddq, _, friction = loop.response(integrated.time, phase, integrated.demand)
     springs = drivetrain.state(phase.q, phase.theta, phase.dq, phase.dtheta)
     passed_on = torque if friction is None else torque - friction

@@ -169,9 +169,9 @@ class Awas(SineRatio):
 
     @property
     def setting_range(self) -> tuple[float, float]:
-        """theta_2 at the ends of the arm."""
-        low, high = sorted(arm / self.lead for arm in self.arm)
-        return low, high
+        """theta_2 at the ends of the arm; the lead, which may be a symbol, may be negative."""
+        shortest, longest = (arm / self.lead for arm in self.arm)
+        return np.minimum(shortest, longest), np.maximum(shortest, longest)
 
     @property
     def scale_range(self) -> tuple[float, float]:
