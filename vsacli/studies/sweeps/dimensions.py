@@ -292,7 +292,7 @@ def _noting(problems: Problems, varied: Varied) -> Iterator[None]:
 
 
 MOST_RUNS = 1_000_000
-"""Largest number of runs: at about 10 ms each they take three hours, and the table has 300 MB."""
+"""Largest number of runs: at 3 to 10 ms each they take one to three hours, and the table has 300 MB."""
 
 
 class Design:
