@@ -43,7 +43,7 @@ class Batch:
     """One pass over the trajectories of variants: iterate it to obtain the blocks, then call `report`.
 
     A single run may have any length. Several variants have equal numbers of samples, which are one block, one
-    variant after the other, and what `is_alone` says of none of them.
+    variant after the other; none of them may be a run that `is_alone`.
 
     Args:
         variants: Robots.

@@ -54,15 +54,20 @@ def numbers_as_rows(
         candidates: Numbers on which results depend, see `parameters`; limits are not among them.
     """
     trajectory = adapt_trajectory(robot, trajectory)
-    if is_alone(robot, trajectory):
-        return ()
-    if _can_be_rows(robot, trajectory, candidates):
-        return tuple(candidates)
-    rows: list[Parameter] = []
-    for candidate in candidates:
-        if _can_be_rows(robot, trajectory, [*rows, candidate]):
-            rows.append(candidate)
-    return tuple(rows)
+    return () if is_alone(robot, trajectory) else tuple(_with_rows(robot, trajectory, [], candidates))
+
+
+def _with_rows(
+    robot: Robot, trajectory: Trajectory, rows: Sequence[Parameter], candidates: Sequence[Parameter]
+) -> Sequence[Parameter]:
+    """Return rows and those of the candidates that can be rows with them, found by halving."""
+    if _can_be_rows(robot, trajectory, [*rows, *candidates]):
+        return [*rows, *candidates]
+    if len(candidates) == 1:
+        return rows
+    for half in (candidates[: len(candidates) // 2], candidates[len(candidates) // 2 :]):
+        rows = _with_rows(robot, trajectory, rows, half)
+    return rows
 
 
 def _can_be_rows(robot: Robot, trajectory: Trajectory, numbers: Sequence[Parameter]) -> bool:
@@ -136,14 +141,8 @@ def batches(runs: Sequence[PreparedRun], varied: Sequence[Parameter]) -> Iterato
         for first in range(0, len(members), together):
             chosen = members[first : first + together]
             robots = tuple(runs[index].robot for index in chosen)
-            yield (
-                (
-                    Variants(robots, structures[key], tuple(varied))
-                    if key in structures
-                    else Variants.of_one(*robots)
-                ),
-                chosen,
-            )
+            base = structures.get(key)
+            yield Variants.of_one(*robots) if base is None else Variants(robots, base, tuple(varied)), chosen
 
 
 def _motion_key(trajectory: Trajectory) -> Hashable:

@@ -1,7 +1,7 @@
 """Robots of one structure that differ in numbers, which kernels take as rows: one call computes all of them.
 
 `Variants` are the robots, `VariantKernel` is the kernel of all. `shared_structure` decides which robots can
-be variants of each other, `numbers_as_rows` which numbers may differ.
+be variants of each other, `numbers_as_rows` of `analysis.variant_groups` which numbers may differ.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 PARAMETERS = "parameters"
 """Name of the rows with the varied numbers, behind those of the kernel itself."""
-
 
 TURNED = frozenset(("alpha", "rpy"))
 """Words of paths to angles of the geometry."""

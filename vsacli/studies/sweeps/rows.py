@@ -170,6 +170,7 @@ class Computer:
             if len(prepared) == 1:
                 (run,) = prepared
                 if isinstance(error, InputError):
+                    self._study.check_files()
                     return [run.failed(str(self._study.as_named(error)))]
                 return [run.failed(_bug(error, self._study.point(run.run)))]
         rows = list[Row]()
@@ -185,7 +186,7 @@ class Computer:
             trajectories,
             engine=study.engine,
             threads=1,
-            kernel_samples=study.samples_of_kernel if variants.varied else None,
+            kernel_samples=study.samples_of_kernel if study.runs_of_batch > 1 else None,
         )
         recorders = [Recorder(study.over_time, study.file.every) for _ in prepared]
         for block in batch:

@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vsacli.analysis.variant_groups import BATCH_SAMPLES, numbers_as_rows
+from vsacli.analysis.batch import is_alone
+from vsacli.analysis.variant_groups import BATCH_SAMPLES, PreparedRun, numbers_as_rows
 from vsacli.base import file_formats
 from vsacli.base.did_you_mean import near_file
 from vsacli.base.errors import InputError
@@ -130,20 +131,30 @@ class Study:
         return Point(trajectory, self.design.values(point))
 
     @cached_property
-    def varied(self) -> tuple[Parameter, ...]:
-        """Numbers of the robot that are rows of the kernel; none if the first run cannot be computed.
-
-        They depend on the study alone, so that a row does not depend on the runs that are computed with it.
-        """
-        if self.file.optimize is not None:
-            return ()
+    def _first_run(self) -> PreparedRun | None:
+        """Robot and trajectory of the first run, if runs can be computed together."""
         changes = self.point(0).changes
         try:
             robot = self.read.robot(changes.robot)
             trajectory = declared_trajectory(self.trajectories[0], robot, changes.trajectory)
-            candidates = [parameter for each in self.dimensions for parameter in _led_to(robot, each)]
-            return numbers_as_rows(robot, trajectory, list(dict.fromkeys(candidates)))
         except InputError:
+            return None
+        alone = self.file.optimize is not None or is_alone(robot, trajectory)
+        return None if alone else PreparedRun(robot, trajectory)
+
+    @cached_property
+    def varied(self) -> tuple[Parameter, ...]:
+        """Numbers of the robot that are rows of the kernel.
+
+        They depend on the study alone, so that a row does not depend on the runs that are computed with it.
+        """
+        if self._first_run is None:
+            return ()
+        robot = self._first_run.robot
+        candidates = [parameter for each in self.dimensions for parameter in _led_to(robot, each)]
+        try:
+            return numbers_as_rows(*self._first_run, list(dict.fromkeys(candidates)))
+        except InputError:  # of which the row of the first run tells
             return ()
 
     @cached_property
@@ -157,8 +168,7 @@ class Study:
     @cached_property
     def runs_of_batch(self) -> int:
         """Number of runs that are computed together, if their robots differ in `varied` alone."""
-        samples = _samples_of_run(self.trajectories[0], self.robot, self.point(0).changes.trajectory)
-        return max(1, BATCH_SAMPLES // samples) if self.varied else 1
+        return 1 if self._first_run is None else max(1, BATCH_SAMPLES // self._first_run.trajectory.samples)
 
     def _is_row(self, dimension: Dimension) -> bool:
         """Return whether a dimension is of the motion, or of numbers that are rows of the kernel."""
