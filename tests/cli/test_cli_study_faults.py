@@ -215,7 +215,8 @@ def test_a_study_that_is_edited_before_it_goes_on_computes_what_is_new(vsacli: A
 def test_a_file_that_changes_meanwhile_ends_the_study(
     vsacli: Any, own_folder: Path, monkeypatch: pytest.MonkeyPatch, old: str, new: str
 ) -> None:
-    """No row of what it says now is kept under the key of what it said; the rows before stay."""
+    """No row of what it says now is kept under the key of what it said; the batches before stay."""
+    monkeypatch.setattr("vsacli.studies.sweeps.study.BATCH_SAMPLES", 1)
     study(own_folder, "vary: {duration: [2, 3, 4]}\n")
     move = own_folder / "move.yaml"
     text, original = move.read_text(), Journal.add
