@@ -206,16 +206,30 @@ class MinimaSearch:
 
     def _scan(self, block: Block) -> None:
         """Search whole runs of few samples, at the same number of times from each sample to the next."""
-        steps = block.time.reshape(self._variants, -1)
+        steps, at_steps = self._of_whole_runs(block)
         per_interval = -(-SCANNED // (self._samples - 1))
         shares = np.arange(1, per_interval) / per_interval
         further = steps[:, :-1, None] + np.diff(steps)[..., None] * shares
         variant = np.repeat(np.arange(self._variants), further[0].size)
-        parts = [self._sides.values(part) for _, part in self._dynamics.blocks_at(further.ravel(), variant)]
-        at_steps, between = map(self._by_side, (self._sides.values(block), np.hstack(parts)))
+        between = self._by_side(self._values_at(further.ravel(), variant))
         time = self._times_by_side(_interleaved(steps, further.reshape(self._variants, -1)))
         sides = SampledFunctions(0, time, _interleaved(at_steps, between))
         self._search(sides.opened().closed(), SampledFunctions(0, self._times_by_side(steps), at_steps))
+
+    def _of_whole_runs(self, first: Block) -> tuple[FloatArray, FloatArray]:
+        """Return the times of all samples, (variants, samples), and the values of sides there.
+
+        The first block has them all, unless blocks are shorter than a short run.
+        """
+        times, values = first.time, self._sides.values(first)
+        if len(times) < self._samples * self._variants:
+            times = self._dynamics.trajectories[0].times.block(0, self._samples)
+            values = self._values_at(times, np.zeros(self._samples, dtype=np.intp))
+        return times.reshape(self._variants, -1), self._by_side(values)
+
+    def _values_at(self, time: FloatArray, variant: IndexArray) -> FloatArray:
+        """Return the values of all sides of the variant of each time, (sides, times)."""
+        return np.hstack([self._sides.values(part) for _, part in self._dynamics.blocks_at(time, variant)])
 
     def _search(self, sampled: SampledFunctions, steps: SampledFunctions) -> None:
         """Find the minima where values are known, and keep those lower than the samples around them.
