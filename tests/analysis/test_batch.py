@@ -18,8 +18,9 @@ from vsacli.analysis.run import Run
 from vsacli.analysis.variant_groups import PreparedRun, batches, numbers_as_rows
 from vsacli.base.json_records import JsonObject
 from vsacli.base.variables import Block
+from vsacli.documents.record_values import with_numbers
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, parameters, with_numbers
+from vsacli.robot.parameters import Parameter, parameters
 from vsacli.trajectory.times import UniformTimes
 
 VARIANTS = 5

@@ -18,10 +18,11 @@ from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
 from vsacli.compute.engine import Engine, choose
+from vsacli.documents.record_values import with_numbers
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.variants import Variants
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import parameters, with_numbers
+from vsacli.robot.parameters import parameters
 from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.times import UniformTimes
 

@@ -18,11 +18,12 @@ from vsacli.analysis.batch import is_alone
 from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import Block
+from vsacli.documents.record_values import with_numbers
 from vsacli.dynamics.inverse import adapt_trajectory
 from vsacli.dynamics.limits import limit_checks
 from vsacli.dynamics.variants import Variants, shared_structure
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, with_numbers
+from vsacli.robot.parameters import Parameter
 from vsacli.trajectory.trajectory import Trajectory
 
 CHANGE = 1e-3

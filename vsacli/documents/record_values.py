@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -227,9 +227,22 @@ def entry_names(kind: ValueKind, content: Any, members: Mapping[str, str]) -> li
     return [getattr(entry, "name", "") if isinstance(kind, Items) else "" for entry in content]
 
 
-def with_scalars(record: _Record, scalars: Sequence[tuple[NumberPath, Any]]) -> _Record:
-    """Return a record with scalars of any kind at paths, unchecked; at both sides of an equal pair."""
-    return _with_scalars(record, scalars) if scalars else record
+class AtPath(Protocol):
+    """A number of a record by its path, such as `NumberAtPath`."""
+
+    @property
+    def path(self) -> NumberPath:
+        """Path to the number."""
+
+
+def with_numbers(record: _Record, numbers: Sequence[AtPath], values: Sequence[Any]) -> _Record:
+    """Return a record with other values of some numbers, which may be scalars of any kind.
+
+    Rows of samples among them are one value for each sample. Both sides of an equal pair change. Records on
+    the paths are made without their checks, so the record cannot be checked or written to a file.
+    """
+    entries = [(number.path, value) for number, value in zip(numbers, values, strict=True)]
+    return _with_scalars(record, entries) if entries else record
 
 
 def _with_scalars(content: Any, entries: Sequence[tuple[NumberPath, Any]]) -> Any:

@@ -7,9 +7,9 @@ shafts and links are for `analysis.self_check`, which compares an energy's deriv
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, reduce
-from typing import ClassVar, NamedTuple, TypeAlias
+from typing import ClassVar, NamedTuple, Self, TypeAlias
 
 import numpy as np
 
@@ -24,12 +24,13 @@ from vsacli.base.arrays import BoolArray, FloatArray, stack_constants
 from vsacli.base.flags import Flag, has_flag
 from vsacli.base.variables import VARIABLES, Block, Variable
 from vsacli.base.wrench import WRENCH_AXES, WrenchFrame, frames_by_tool
-from vsacli.compute.rows import RowKernel, RowLayout
+from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
 from vsacli.dynamics.dampers import joints_with_parallel_damper, parallel_damper_torques
 from vsacli.dynamics.elastic_torques import carriers, link_constants
 from vsacli.dynamics.inverse import InverseDynamics, call_at_joints, rows_of_joints
 from vsacli.dynamics.recursion_inputs import Seat
+from vsacli.dynamics.variants import RobotKernel
 from vsacli.robot.joint import Joint, Tool
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot
@@ -219,7 +220,7 @@ class BalancedBlock(Block):
 
 
 @dataclass(frozen=True)
-class BalancedDynamics(RowKernel):
+class BalancedDynamics(RobotKernel):
     """Kernel of a run: inverse dynamics with `BALANCES` at each sample.
 
     As part of one program the balances take hardly any time.
@@ -230,9 +231,9 @@ class BalancedDynamics(RowKernel):
 
     dynamics: InverseDynamics
 
-    def of_robot(self, robot: Robot) -> BalancedDynamics:
-        """Return the kernel of another robot."""
-        return BalancedDynamics(self.dynamics.of_robot(robot))
+    def of_robot(self, robot: Robot) -> Self:
+        """See `RobotKernel.of_robot`."""
+        return replace(self, dynamics=self.dynamics.of_robot(robot))
 
     @property
     def arguments(self) -> RowLayout:

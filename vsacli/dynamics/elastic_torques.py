@@ -7,10 +7,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from vsacli.base.wrench import (
 )
 from vsacli.compute.control_flow import Keyed, call
 from vsacli.compute.engine import KEPT_PROGRAMS, NUMBERS, Engine, engine_of_call
-from vsacli.compute.rows import RowKernel, RowLayout
+from vsacli.compute.rows import RowLayout
 from vsacli.compute.vector import (
     ZERO,
     Matrix,
@@ -51,6 +51,7 @@ from vsacli.dynamics.recursion_inputs import (
     ToolLoad,
     TorqueDerivatives,
 )
+from vsacli.dynamics.variants import RobotKernel
 from vsacli.robot.joint import Joint, Pose, Tool
 from vsacli.robot.kinematics import base_gravity, rotation_matrix
 from vsacli.robot.model import Robot, check_robot
@@ -145,7 +146,7 @@ def _exact_position(pose: Pose) -> Vector:
 
 
 @dataclass(frozen=True)
-class LinkTorques(RowKernel):
+class LinkTorques(RobotKernel):
     """Kernel of the recursion over rows of samples, for an engine.
 
     Inputs are q, dq, ddq, d3q, d4q of the joints, the damping and its two derivatives if there are dampers
@@ -160,9 +161,9 @@ class LinkTorques(RowKernel):
     robot: Robot
     frame: WrenchFrame | None = None
 
-    def of_robot(self, robot: Robot) -> LinkTorques:
-        """Return the kernel of another robot."""
-        return LinkTorques(robot, self.frame)
+    def of_robot(self, robot: Robot) -> Self:
+        """See `RobotKernel.of_robot`."""
+        return replace(self, robot=robot)
 
     @cached_property
     def arguments(self) -> RowLayout:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -20,9 +20,9 @@ from vsacli.base.json_records import Stored, named
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.control_flow import call
 from vsacli.compute.engine import Engine
-from vsacli.compute.rows import RowKernel, RowLayout
+from vsacli.compute.rows import RowLayout
 from vsacli.dynamics.losses import LossMeter, LostEnergy, integral, positive_work, work_on_each_other
-from vsacli.dynamics.variants import Variants
+from vsacli.dynamics.variants import RobotKernel, Variants
 from vsacli.robot.model import Robot
 
 
@@ -191,7 +191,7 @@ AT_STEPS = ("dtheta", "motor_power", "tau_transmission", "passed_power", "passed
 
 
 @dataclass(frozen=True)
-class IntervalEnergy(RowKernel):
+class IntervalEnergy(RobotKernel):
     """Kernel of the energy that flows between samples; a sample of its rows is an interval.
 
     The work of a motor is the sum of the integral of `passed_power`, the change of B theta'^2/2, the work of
@@ -205,9 +205,9 @@ class IntervalEnergy(RowKernel):
     robot: Robot
     rubbing: bool
 
-    def of_robot(self, robot: Robot) -> IntervalEnergy:
-        """Return the kernel of another robot."""
-        return IntervalEnergy(robot, self.rubbing)
+    def of_robot(self, robot: Robot) -> Self:
+        """See `RobotKernel.of_robot`."""
+        return replace(self, robot=robot)
 
     @cached_property
     def at_steps(self) -> tuple[str, ...]:

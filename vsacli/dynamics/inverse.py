@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from itertools import repeat
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from vsacli.dynamics.drive import ACTUATED, OF_DEVICES, drive
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_torques
 from vsacli.dynamics.limits import limit_checks
 from vsacli.dynamics.losses import dissipated_power
+from vsacli.dynamics.variants import RobotKernel
 from vsacli.robot.commanded_joints import describe_commanded_joints
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot, check_robot
@@ -62,7 +63,7 @@ class DeflectionStop(Stored):
 
 
 @dataclass(frozen=True)
-class InverseDynamics(RowKernel):
+class InverseDynamics(RobotKernel):
     """Inverse dynamics (36)-(74) over rows of samples, for an engine.
 
     Inputs are those of `LinkTorques`, the commanded signals of the joints with their derivatives, and
@@ -81,8 +82,8 @@ class InverseDynamics(RowKernel):
     min_margin: float = MIN_MARGIN
     prescribed: tuple[IntegratedRows | InternalRows, ...] = ()
 
-    def of_robot(self, robot: Robot) -> InverseDynamics:
-        """Return the kernel of another robot."""
+    def of_robot(self, robot: Robot) -> Self:
+        """See `RobotKernel.of_robot`."""
         return replace(self, robot=robot)
 
     @cached_property

@@ -6,17 +6,18 @@ be variants of each other, `numbers_as_rows` of `analysis.variant_groups` which 
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Generic, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Generic, Self, TypeVar
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.vector import Scalar, trigonometric
-from vsacli.documents.record_values import number_at, with_scalars
+from vsacli.documents.record_values import number_at, with_numbers
 from vsacli.robot.model import Robot
 
 if TYPE_CHECKING:
@@ -29,22 +30,12 @@ TURNED = frozenset(("alpha", "rpy"))
 """Words of paths to angles of the geometry."""
 
 
-class RobotKernel(Protocol):
+class RobotKernel(RowKernel):
     """A kernel that can be that of another robot."""
 
-    @property
-    def arguments(self) -> RowLayout:
-        """Layout of the input rows."""
-
-    @property
-    def results(self) -> RowLayout:
-        """Layout of the output rows."""
-
+    @abstractmethod
     def of_robot(self, robot: Robot) -> Self:
         """Return the kernel of another robot of the same structure."""
-
-    def __call__(self, rows: Sequence[Any]) -> Sequence[Any]:
-        """Return the output rows."""
 
 
 _Kernel = TypeVar("_Kernel", bound=RobotKernel)
@@ -77,7 +68,7 @@ class VariantKernel(RowKernel, Generic[_Kernel]):
     def __call__(self, rows: Sequence[Scalar]) -> Sequence[Scalar]:
         """Compute with the numbers of each sample."""
         first = len(rows) - len(self.varied)
-        robot = _with_values(self.robot, self.varied, rows[first:])
+        robot = with_numbers(self.robot, self.varied, rows[first:])
         return self.kernel.of_robot(robot)(rows[:first])
 
 
@@ -119,7 +110,7 @@ class Variants:
 
     def robot_over(self, variant: IndexArray) -> Robot:
         """Return a robot whose varied numbers are rows, (samples,), from the variant of each sample."""
-        return _with_values(self.base, self.varied, self._rows(variant))
+        return with_numbers(self.base, self.varied, self._rows(variant))
 
     def _rows(self, variant: IndexArray) -> Sequence[FloatArray]:
         return list(np.ascontiguousarray(self.values[:, variant]))
@@ -132,7 +123,7 @@ def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> Robot | None:
     Robots for which this returns equal robots can be variants of each other.
     """
     try:
-        structure = _with_values(robot, varied, [number.value for number in varied])
+        structure = with_numbers(robot, varied, [number.value for number in varied])
         values = [number_at(robot, number.path) for number in varied]
     except (AttributeError, IndexError, TypeError):  # the robot has another record at a path
         return None
@@ -141,8 +132,4 @@ def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> Robot | None:
     )
     if any(type(trigonometric(name, twist)) is int for twist in twists for name in ("cos", "sin")):
         return None
-    return structure if _with_values(structure, varied, values) == robot else None
-
-
-def _with_values(robot: Robot, varied: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
-    return with_scalars(robot, [(number.path, value) for number, value in zip(varied, values, strict=True)])
+    return structure if with_numbers(structure, varied, values) == robot else None

@@ -10,14 +10,13 @@ from vsacli.base.did_you_mean import MOST_NEAR, nearest
 from vsacli.base.errors import InputError
 from vsacli.base.units import Quantity
 from vsacli.compute.duals import seeds
-from vsacli.compute.vector import Scalar
 from vsacli.documents.record_checks import replaced_unchecked
 from vsacli.documents.record_values import (
     NumberAtPath,
     NumberPath,
     PathIndex,
     numbers_in_record,
-    with_scalars,
+    with_numbers,
 )
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
@@ -153,15 +152,6 @@ def _parameter_at(robot: Robot, number: NumberAtPath) -> Parameter:
 def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:
     """Return a robot that carries derivatives with respect to some of its parameters; see `with_numbers`."""
     return with_numbers(robot, chosen, seeds([parameter.value for parameter in chosen]))
-
-
-def with_numbers(robot: Robot, chosen: Sequence[Parameter], values: Sequence[Scalar]) -> Robot:
-    """Return a robot with other values of some parameters, which may be scalars of any kind.
-
-    Rows of samples among them are one value for each sample. Records on the paths are made without their
-    checks, so the robot cannot be checked or written to a file.
-    """
-    return with_scalars(robot, [(number.path, scalar) for number, scalar in zip(chosen, values, strict=True)])
 
 
 def with_copied_actuator(joint: Joint) -> Joint:

@@ -10,8 +10,9 @@ from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.tracing import Program, Symbol
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
+from vsacli.documents.record_values import with_numbers
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, with_numbers
+from vsacli.robot.parameters import Parameter
 
 Maker = Callable[[Robot, WrenchFrame | None], Function]
 """Factory of a generated function, called with a robot and the frame of a wrench (None without one)."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.drivetrain import Drivetrain
+from vsacli.actuators.drivetrain import SIDES, Drivetrain
 from vsacli.base.arrays import FLAG_TYPE
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, finite, marked, not_finite_flags
@@ -105,7 +105,7 @@ def _input_structure(robot: Robot) -> Structure:
 
 
 def _rates_structure(robot: Robot) -> Structure:
-    motors = (len(robot.joints), 2)
+    motors = (len(robot.joints), SIDES)
     return Structure(
         "rates",
         "Time derivatives of the state; the motor of a rigid drive moves with its joint.",
