@@ -12,7 +12,7 @@ from samples.shipped import shipped_run
 from samples.trees import tree_run
 from samples.valid_runs import valid_run
 
-from vsacli import Trajectory
+from vsacli import Trajectory, inverse_dynamics
 from vsacli.analysis.batch import Batch
 from vsacli.analysis.run import Run
 from vsacli.analysis.variant_groups import PreparedRun, batches, numbers_as_rows
@@ -20,7 +20,7 @@ from vsacli.base.json_records import JsonObject
 from vsacli.base.variables import Block
 from vsacli.documents.record_values import with_numbers
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, parameters
+from vsacli.robot.parameters import Parameter, numbers_of_robot, parameters
 from vsacli.trajectory.times import UniformTimes
 
 VARIANTS = 5
@@ -41,7 +41,7 @@ def drawn_variants(
 ) -> tuple[list[PreparedRun], Sequence[Parameter]]:
     """Robots with other values of some numbers, and motions of other durations with as many samples."""
     rng = np.random.default_rng(seed)
-    available = parameters(robot)
+    available = list(numbers_of_robot(robot))
     chosen = [available[place] for place in rng.permutation(len(available))[:8]]
     varied = numbers_as_rows(robot, trajectory, chosen)
     runs = []
@@ -120,7 +120,7 @@ def test_variants_are_one_batch_and_other_structures_their_own() -> None:
     ("robot", "path"),
     [
         ("maccepa_1r", "joints.elbow.actuator.mechanism.k"),  # enters tables
-        ("planar_2r", "joints.shoulder.actuator.motor.gear_ratio"),  # its sign decides
+        ("puma_560", "joints.waist.actuator.motor.gear_ratio"),  # its sign exchanges both sizes of friction
     ],
 )
 def test_numbers_that_decide_on_the_equations_are_no_rows(robot: str, path: str) -> None:
@@ -136,6 +136,76 @@ def test_a_right_angle_is_exact_only_alone() -> None:
     robots = [robot.replace("joints.base.dh.alpha", angle) for angle in ("89 deg", "90 deg", "91 deg")]
     found = batches([PreparedRun(each, trajectory) for each in robots], varied)
     assert [members for _, members in found] == [[0, 2], [1]]
+
+
+def test_a_zero_and_an_infinite_limit_are_constants() -> None:
+    robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
+    robot = robot.replace({"joints.base.link.com.1": 0.1, "joints.base.actuator.motor.max_torque": 300})
+    paths = ["joints.base.link.com.1", "joints.base.actuator.motor.max_torque"]
+    numbers = {str(each): each for each in numbers_of_robot(robot)}
+    varied = numbers_as_rows(robot, trajectory, [numbers[path] for path in paths])
+    assert len(varied) == 2
+    values = [(0.1, 300), (0.0, 300), (0.2, np.inf), (0.3, 200), (0.0, 100)]
+    runs = [PreparedRun(with_numbers(robot, varied, each), trajectory) for each in values]
+    assert [members for _, members in batches(runs, varied)] == [[0, 3], [1, 4], [2]]
+
+
+def test_limits_differ_in_a_batch() -> None:
+    """Some of the variants exceed theirs, at samples and between them."""
+    robot, trajectory = shipped_run("vsa_3r", "rest_to_rest")
+    trajectory = trajectory.sampled(UniformTimes(trajectory.duration, 20))
+    peaks = {joint.name: joint for joint in inverse_dynamics(robot, trajectory).report.joints}
+    limits = {
+        f"joints.{name}.{path}": limit
+        for name, joint in peaks.items()
+        for path, limit in (
+            ("actuator.motor.max_torque", max(joint.peak_tau_motor)),
+            ("actuator.motor.max_velocity", max(joint.peak_dtheta)),
+            ("limits.stiffness", [joint.commanded_min, joint.commanded_max]),
+        )
+    }
+    robot = robot.replace(limits)
+    bounds = [
+        number
+        for number in numbers_of_robot(robot)
+        if not {"limits", "max_torque", "max_velocity"}.isdisjoint(number.path)
+    ]
+    varied = numbers_as_rows(robot, trajectory, bounds)
+    assert len(varied) == 12
+    rng = np.random.default_rng(3)
+    robots = [
+        with_numbers(robot, varied, [each.value * scale * rng.uniform(1, 1.01) for each in varied])
+        for scale in (0.99, 0.995, 1, 1, 1.01)
+    ]
+    ((variants, _),) = batches([PreparedRun(each, trajectory) for each in robots], varied)
+    batch = Batch(variants, [trajectory] * len(robots))
+    list(batch)
+    reports = [batch.findings(number) for number in range(len(robots))]
+    for each, report in zip(robots, reports, strict=True):
+        alone = Run(each, trajectory)
+        list(alone)
+        assert_equal_reports(report.as_json(), alone.findings().as_json())
+    kinds = [frozenset(kind for joint in report.joints for kind in joint.worst) for report in reports]
+    assert len(set(kinds)) > 2
+    assert any(
+        worst.between for report in reports for joint in report.joints for worst in joint.worst.values()
+    )
+
+
+def test_tools_with_limits_are_in_a_batch() -> None:
+    robot, trajectory = shipped_run("torso_2x3r", "torso_2x3r")
+    limited = f"tools.{robot.tool_names[0]}.min_stiffness"
+    robots = [robot.replace({limited: 600.0, "joints.*.link.mass": mass}) for mass in (2, 2.2, 2.4)]
+    varied = numbers_as_rows(robots[0], trajectory, parameters(robots[0], ["joints.*.link.mass"]))
+    ((variants, _),) = batches([PreparedRun(each, trajectory) for each in robots], varied)
+    batch = Batch(variants, [trajectory] * 3)
+    (block,) = batch
+    for number, part in enumerate(block.divided(3)):
+        alone = Run(robots[number], trajectory, block_samples=10**6)
+        (expected,) = alone
+        assert np.array_equal(part.tool_flags, expected.tool_flags)
+        assert_equal_reports(batch.findings(number).as_json(), alone.findings().as_json())
+    assert batch.findings().tools[0].samples["over_limit"] > 0
 
 
 def test_a_recorded_motion_is_alone() -> None:

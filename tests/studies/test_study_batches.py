@@ -39,7 +39,7 @@ def test_rows_are_those_of_single_runs(tmp_path: Path, engine: str) -> None:
     path, table = study(tmp_path, MIXED), tmp_path / "table.h5"
     run_study(path, table, processes=1, engine=engine).close()
     read, verdicts = load_study(path), column(table, "verdict")
-    assert len(read.varied) == 4  # three masses and an inertia
+    assert len(read.varied) == 5  # three masses, an inertia and a limit
     assert len(set(verdicts)) > 1
     for run in range(read.runs):
         report = report_of(read, run)

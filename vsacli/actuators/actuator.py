@@ -173,8 +173,8 @@ class Actuator(DeclaredRecord, ABC):
                 (Flag.DEFLECTION_LIMIT, "phi", deflection),
                 (Flag.MOTOR_VELOCITY_LIMIT, "dtheta", motor.max_velocity),
                 (Flag.MOTOR_TORQUE_LIMIT, "tau_motor", motor.max_torque),
-                (Flag.CURRENT_LIMIT, "current", motor.max_current or math.inf),
-                (Flag.VOLTAGE_LIMIT, "voltage", motor.max_voltage or math.inf),
+                (Flag.CURRENT_LIMIT, "current", _bound_of(motor.max_current)),
+                (Flag.VOLTAGE_LIMIT, "voltage", _bound_of(motor.max_voltage)),
             )
         )
 
@@ -243,3 +243,8 @@ class Actuator(DeclaredRecord, ABC):
     def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
         """Return where the stiffness is attainable on another branch, (samples,)."""
         return np.zeros(tau_e.shape, dtype=bool)
+
+
+def _bound_of(largest: float | None) -> float:
+    """Return a largest value, infinite if there is none."""
+    return math.inf if largest is None else largest

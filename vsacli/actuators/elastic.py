@@ -24,6 +24,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag, has_flag
 from vsacli.documents.fields import POSITIVE, OneOf, RecordOf, number, value
+from vsacli.documents.record_checks import construct_unchecked
 from vsacli.documents.source import Source
 
 EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
@@ -60,7 +61,7 @@ class Elastic(Actuator):
             return self.spring.unlimited
         from vsacli.actuators.laws.polynomial import Polynomial
 
-        return Polynomial(c1=self.stiffness)
+        return construct_unchecked(Polynomial, {"c1": self.stiffness})
 
     @classmethod
     def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray, stack_constants
+from vsacli.compute.vector import is_zero
 from vsacli.documents.fields import NON_NEGATIVE, NumberWithUnit, PairOf, number, value
 from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
 
@@ -48,16 +49,17 @@ class Friction(DeclaredRecord):
     @property
     def sharp(self) -> bool:
         """Whether the torque at rest is undetermined."""
-        return self.width == 0 and any(self.coulomb)
+        return is_zero(self.width) and not all(map(is_zero, self.coulomb))
 
     def geared(self, ratio: float) -> Friction:
         """Return the friction on the joint side of a gear whose shaft turns `ratio` times.
 
         It is not checked: values were checked on the shaft, or are duals.
         """
-        backward, forward = (abs(ratio) * size for size in self.coulomb)
+        backward, forward = self.coulomb
+        swapped = backward is not forward and ratio < 0
         geared = {
-            "coulomb": (backward, forward) if ratio > 0 else (forward, backward),
+            "coulomb": tuple(abs(ratio) * size for size in self.coulomb[:: -1 if swapped else 1]),
             "offset": ratio * self.offset + 0.0,  # without the sign of zero
             "width": self.width / abs(ratio),
         }

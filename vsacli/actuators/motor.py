@@ -200,14 +200,19 @@ class Motor(DeclaredRecord):
         return {"inertia": 0.5, "damping": 0.01} if revolute else {"inertia": 10, "damping": 0.1}
 
     @property
+    def _ratio(self) -> float:
+        """Gear ratio; 1 without a gear."""
+        return 1.0 if self.gear_ratio is None else self.gear_ratio
+
+    @property
     def ratio_of_side(self) -> float:
         """Motion of the declared side over that on the joint side: 1 or the gear ratio."""
-        return 1.0 if self.side == JOINT else self.gear_ratio or 1.0
+        return 1.0 if self.side == JOINT else self._ratio
 
     @cached_property
     def at_joint(self) -> JointMotor:
         """Motor on the joint side: inertia and damping times the ratio squared, torques times the ratio."""
-        ratio = self.gear_ratio or 1.0
+        ratio = self._ratio
         return JointMotor(
             **self._reflected(self.ratio_of_side),
             gear_ratio=self.gear_ratio,

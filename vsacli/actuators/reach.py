@@ -18,6 +18,7 @@ from vsacli.actuators.laws.law import PairSolution
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import LIMITS, MIN_MARGIN, SINGULAR_MARGIN, Flag, marked
 from vsacli.base.variables import VARIABLES, deviation
+from vsacli.compute.vector import is_finite
 
 LIMIT_ROUNDING = 1e-9
 """Relative excess over a limit that is ignored as rounding, so that a motion may run along its limit."""
@@ -36,7 +37,7 @@ class LimitCheck(NamedTuple):
         flag: Bit that is set outside the range.
         variable: Name of the variable.
         motor: Motor 1 or 2 for a motor variable, else None.
-        range: Lower and upper bound; either may be infinite.
+        range: Lower and upper bound; either may be infinite. Bounds of variants are rows, (samples,).
     """
 
     flag: Flag
@@ -90,7 +91,12 @@ class LimitCheck(NamedTuple):
     @property
     def largest(self) -> float:
         """Largest absolute value of the finite bounds; 0 if there is none."""
-        return max((abs(bound) for bound in self.range if np.isfinite(bound)), default=0.0)
+        return reduce(np.maximum, (abs(end) for end in self.range if is_finite(end)), 0.0)
+
+    @property
+    def exists(self) -> bool:
+        """Whether either end bounds anything."""
+        return any(map(is_finite, self.range))
 
     def outside(self, values: FloatArray) -> FloatArray:
         """Return the distance outside the range; zero or negative inside, NaN for NaN."""

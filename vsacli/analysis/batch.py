@@ -13,6 +13,8 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vsacli.analysis.between_samples import Minima, MinimaSearch
 from vsacli.analysis.dry_friction import FrictionPassages
 from vsacli.analysis.joint_report import JUDGED
@@ -115,7 +117,7 @@ class Batch:
         self._passages = [FrictionPassages(each) for each in variants.robots]
         self._drifts = _drift_summaries(robot, self._dynamics.deflections)
         self._energy = RunEnergy(variants, self.choice.engine)
-        self._tools = _prepare_tools(robot, trajectory, asked)
+        self._tools = [_prepare_tools(each, trajectory, asked) for each in variants.robots]
         self._stopped = False
 
     def __iter__(self) -> Iterator[Block]:
@@ -150,13 +152,20 @@ class Batch:
         if self._uncertainty is not None:
             block = self._uncertainty.add(block)
             _mark_minima(between, block)  # again, since the samples themselves may keep limits within it
-        if self._tools is not None:
-            block = self._tools.add(block)
+        block = self._with_tools(block)
         self._check.add(block)
         for variant, part in enumerate(block.divided(len(self.variants))):
             self._summarize(variant, part, [each.where(each.variant == variant) for each in between])
         self._samples += len(block.time) // len(self.variants)
         return self._without_balances(block)
+
+    def _with_tools(self, block: Block) -> Block:
+        """Return a block with the variables of the tools, if they are computed."""
+        parts = zip(self._tools, block.divided(len(self.variants)), strict=True)
+        added = [tools.add(part) for tools, part in parts if tools is not None]
+        if not added:
+            return block
+        return block.replaced(**{name: np.concatenate([each[name] for each in added]) for name in added[0]})
 
     def _until_infeasible(self, block: Block, between: list[Minima]) -> tuple[Block, list[Minima]]:
         """Return a block up to its first infeasible sample, with the minima of these samples."""
@@ -219,7 +228,7 @@ class Batch:
             ),
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=trajectory.fits,
-            tools=() if self._tools is None else self._tools.reports(),
+            tools=() if (tools := self._tools[variant]) is None else tools.reports(),
         )
 
     @property
@@ -230,10 +239,11 @@ class Batch:
 def is_alone(robot: Robot, trajectory: Trajectory) -> bool:
     """Return whether a run cannot be part of a batch with others.
 
-    Its signals were recorded, its tools have limits, or it has a state that is integrated over time.
+    Its signals were recorded, or it has a state that is integrated over time: the deviations of 401 samples,
+    or the integration, take more than half the time of the run.
     """
     damped = any(joint.damper_at("transmission") for joint in robot.joints)
-    return bool(trajectory.estimates) or bool(robot.limited_tools) or damped
+    return bool(trajectory.estimates) or damped
 
 
 def _adapt_trajectories(robots: Sequence[Robot], trajectories: Sequence[Trajectory]) -> list[Trajectory]:

@@ -50,7 +50,7 @@ class Minima(NamedTuple):
     Attributes:
         block: Variables of the minimum's own joint at each minimum, as of a robot with one joint; a row each.
         variant: Variant of the robot, by index.
-        quantity: Quantity that has the minimum, by index in `MinimaSearch.quantities`.
+        quantity: Quantity that has the minimum, by index in those of its variant.
         joint: Joint of the quantity, by index.
         clearance: Clearance at the minimum.
         step: Nearest sample, by index in the block.
@@ -100,7 +100,7 @@ class MinimaSearch:
         uncertainty: Uncertainty of recorded signals, which corrects flags of limits; None without any.
 
     Attributes:
-        quantities: Quantities with bounds.
+        quantities: Quantities with bounds of each variant.
         notes: Reason why the search is impossible, if it is: a sentence.
     """
 
@@ -108,19 +108,20 @@ class MinimaSearch:
         self, dynamics: RunDynamics, min_margin: float, uncertainty: RunUncertainty | None = None
     ) -> None:
         trajectory = dynamics.trajectories[0]
-        self.quantities = bounded_quantities(dynamics.robot)
+        self.quantities = [bounded_quantities(robot) for robot in dynamics.variants.robots]
+        of_one = self.quantities[0]
         self.notes = () if trajectory.known_between else (SAMPLES_ONLY,)
         self._dynamics, self._samples, self._uncertainty = dynamics, trajectory.samples, uncertainty
         self._joints, self._variants = len(dynamics.robot.joints), len(dynamics.trajectories)
-        self._joint = np.array([quantity.joint_index for quantity in self.quantities], dtype=np.intp)
-        self._bits = np.array([quantity.bits for quantity in self.quantities], dtype=FLAG_TYPE)
-        self._sides = Sides(self.quantities, min_margin, self._variants)
+        self._joint = np.array([quantity.joint_index for quantity in of_one], dtype=np.intp)
+        self._bits = np.array([quantity.bits for quantity in of_one], dtype=FLAG_TYPE)
+        self._sides = Sides(self.quantities, min_margin)
         self._lowest = [np.empty(0)] * len(self._sides.quantity)
         self._least_at_steps = np.full(len(self._sides.quantity), np.inf)
         self._least_between: list[dict[int, tuple[float, Finding]]] = [{} for _ in range(self._variants)]
         self._pending_minima: list[Minima] = []
         self._released = 0
-        looking = not self.notes and bool(self.quantities)
+        looking = not self.notes and bool(of_one)
         self._scans = looking and trajectory.samples < SCANNED
         self._searches = looking and not self._scans
         self._sides_over_time: SampledFunctions | None = None
@@ -167,7 +168,7 @@ class MinimaSearch:
         """Merge minima of samples that are part of the run of a variant into its report."""
         least_between = self._least_between[variant]
         for number in set(minima.quantity.tolist()):
-            of_quantity, quantity = minima.where(minima.quantity == number), self.quantities[number]
+            of_quantity, quantity = minima.where(minima.quantity == number), self.quantities[variant][number]
             least = int(of_quantity.clearance.argmin())
             clearance = float(of_quantity.clearance[least])
             if clearance < least_between.get(number, (math.inf,))[0]:
@@ -179,7 +180,7 @@ class MinimaSearch:
         reports: list[dict[str, Finding]] = [{} for _ in range(self._joints)]
         if not self._least_between[variant]:
             return reports
-        at_steps, sides = np.full(len(self.quantities), np.inf), self._sides
+        at_steps, sides = np.full(len(self.quantities[0]), np.inf), self._sides
         of_variant = np.arange(sides.count) + variant * sides.count
         np.minimum.at(
             at_steps,
@@ -279,7 +280,7 @@ class MinimaSearch:
     def _add_minima(self, minima: Brackets, steps: IndexArray) -> None:
         """Keep the variables at minima, with the flags of the minimal quantities, for the nearest sample."""
         clearance = self._sides.clearance(minima.function, minima.value[:, 1])
-        variants, quantities = np.divmod(self._sides.quantity[minima.function], len(self.quantities))
+        variants, quantities = np.divmod(self._sides.quantity[minima.function], len(self.quantities[0]))
         steps = steps + self._samples * variants
         for part, block in self._dynamics.blocks_at(minima.time[:, 1], variants):
             quantity = quantities[part]

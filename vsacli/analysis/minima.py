@@ -8,7 +8,7 @@ applies them to the blocks of a run.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -104,9 +104,8 @@ class Sides:
     The sides of all variants of a batch follow each other, those of the first one first.
 
     Args:
-        quantities: Quantities with bounds, the same for each variant.
+        quantities: Quantities with bounds of each variant, equal except for the bounds.
         min_margin: Margin that is flagged.
-        variants: Number of variants.
 
     Attributes:
         count: Number of sides of a variant.
@@ -116,12 +115,12 @@ class Sides:
         critical: Value at which the gravest flag of each side is set, (sides,).
     """
 
-    def __init__(self, quantities: list[Bounded], min_margin: float, variants: int = 1) -> None:
-        sides = [(number, side) for number, each in enumerate(quantities) for side in each.sides(min_margin)]
-        self._quantities, self.count = quantities, len(sides)
-        of_one = np.array([number for number, _ in sides], dtype=np.intp)
-        self.quantity = (of_one + len(quantities) * np.arange(variants)[:, None]).ravel()
-        table = np.tile(np.array([side for _, side in sides]).reshape(-1, 6), (variants, 1))
+    def __init__(self, quantities: Sequence[list[Bounded]], min_margin: float) -> None:
+        in_turn = enumerate(each for of_variant in quantities for each in of_variant)
+        sides = [(number, side) for number, each in in_turn for side in each.sides(min_margin)]
+        self._quantities, self.count = quantities[0], len(sides) // len(quantities)
+        self.quantity = np.array([number for number, _ in sides], dtype=np.intp)
+        table = np.array([side for _, side in sides]).reshape(-1, 6)
         self._sign, self._bound, self.size = table[:, :3].T
         self._tolerances = table[:, 3:]
         self.critical = self._bound - self._tolerances[:, 0]

@@ -9,7 +9,7 @@ import numpy as np
 
 from vsacli.actuators.reach import LIMIT_ROUNDING
 from vsacli.analysis.tool_report import NO_DIRECTION, ToolReport
-from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import Flag, SampleFlag, ToolFlag, has_flag, marked
 from vsacli.base.units import LINEAR_STIFFNESS
 from vsacli.base.variables import TIP_COMPLIANCE, Block
@@ -105,8 +105,8 @@ class ToolStiffness:
         self._robot, self._frame, self._stored = robot, frame, stored
         self._summaries = [ToolSummary(tool) for tool in robot.end_effectors]
 
-    def add(self, block: Block) -> Block:
-        """Merge a block into the reports, and return it with the variables of tools."""
+    def add(self, block: Block) -> dict[str, AnyArray]:
+        """Merge a block into the reports, and return the variables of tools by name."""
         wrench = None if self._frame is None else Wrench.constant(block.wrench, self._frame)
         pose = HeldPose(self._robot, block.q, block.stiffness, wrench)
         flags: list[FlagArray] = []
@@ -119,7 +119,7 @@ class ToolStiffness:
             flags.append(summary.add(block.time, *softest_direction(compliance), unstable & ~infeasible))
             compliances.append(compliance)
         asked = {TIP_COMPLIANCE: np.stack(compliances, axis=1)} if self._stored else {}
-        return block.replaced(tool_flags=np.stack(flags, axis=1), **asked)
+        return {"tool_flags": np.stack(flags, axis=1), **asked}
 
     def reports(self) -> tuple[ToolReport, ...]:
         """Return the report of each tool so far."""

@@ -13,14 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.reach import LimitCheck
 from vsacli.analysis.batch import is_alone
 from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import Block
 from vsacli.documents.record_values import with_numbers
 from vsacli.dynamics.inverse import adapt_trajectory
-from vsacli.dynamics.limits import limit_checks
 from vsacli.dynamics.variants import Variants, shared_structure
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
@@ -52,7 +50,7 @@ def numbers_as_rows(
     Args:
         robot: Robot.
         trajectory: Motion to try them with.
-        candidates: Numbers on which results depend, see `parameters`; limits are not among them.
+        candidates: Numbers of the robot, limits included.
     """
     trajectory = adapt_trajectory(robot, trajectory)
     return () if is_alone(robot, trajectory) else tuple(_with_rows(robot, trajectory, [], candidates))
@@ -80,16 +78,10 @@ def _can_be_rows(robot: Robot, trajectory: Trajectory, numbers: Sequence[Paramet
             )
             for change in (CHANGE, 2 * CHANGE)
         )
-        if _limits(robots[0]) != _limits(robots[1]):
-            return False
         rows = _at_trial_times(Variants(robots, robot, tuple(numbers)), trajectory)
         constants = [_at_trial_times(Variants.of_one(each), trajectory) for each in robots]
         return all(_agree(rows.taken(slice(place, None, 2)), each) for place, each in enumerate(constants))
     return False
-
-
-def _limits(robot: Robot) -> list[list[LimitCheck]]:
-    return [limit_checks(joint) for joint in robot.joints]
 
 
 def _at_trial_times(variants: Variants, trajectory: Trajectory) -> Block:
@@ -130,20 +122,16 @@ def batches(runs: Sequence[PreparedRun], varied: Sequence[Parameter]) -> Iterato
         varied: Numbers that are rows of the kernel, see `numbers_as_rows`.
     """
     groups: dict[Hashable, list[int]] = {}
-    structures: dict[Hashable, Robot] = {}
     for index, run in enumerate(runs):
-        structure = None if is_alone(*run) else shared_structure(run.robot, varied)
-        key: Hashable = index if structure is None else (structure, _motion_key(run.trajectory))
+        shared = None if is_alone(*run) else shared_structure(run.robot, varied)
+        structure, rows = shared or (run.robot, ())
+        key = structure, rows, _motion_key(run.trajectory), index if shared is None else None
         groups.setdefault(key, []).append(index)
-        if structure is not None:
-            structures[key] = structure
-    for key, members in groups.items():
+    for (structure, rows, *_), members in groups.items():
         together = max(1, BATCH_SAMPLES // runs[members[0]].trajectory.samples)
         for first in range(0, len(members), together):
             chosen = members[first : first + together]
-            robots = tuple(runs[index].robot for index in chosen)
-            base = structures.get(key)
-            yield Variants.of_one(*robots) if base is None else Variants(robots, base, tuple(varied)), chosen
+            yield Variants(tuple(runs[index].robot for index in chosen), structure, rows), chosen
 
 
 def _motion_key(trajectory: Trajectory) -> Hashable:

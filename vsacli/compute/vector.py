@@ -26,6 +26,16 @@ def exact(number: Scalar) -> Scalar:
     return int(number) if plain and number in (0, 1, -1) else number
 
 
+def is_zero(number: Scalar) -> bool:
+    """Return whether a scalar is the constant zero; rows and symbols stand for other numbers."""
+    return _vanishes(exact(number))
+
+
+def is_finite(number: Scalar) -> bool:
+    """Return whether a scalar is no infinite constant; rows and symbols stand for finite numbers."""
+    return not isinstance(number, float | int) or math.isfinite(number)
+
+
 def trigonometric(name: str, angle: Scalar) -> Scalar:
     """Return `cos` or `sin` of an angle, exactly zero at multiples of pi/2 although pi itself is rounded."""
     return trigonometric_of(angle, name)

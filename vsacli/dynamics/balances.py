@@ -25,7 +25,7 @@ from vsacli.base.flags import Flag, has_flag
 from vsacli.base.variables import VARIABLES, Block, Variable
 from vsacli.base.wrench import WRENCH_AXES, WrenchFrame, frames_by_tool
 from vsacli.compute.rows import RowLayout
-from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross
+from vsacli.compute.vector import ZERO, Rotation, Scalar, Vector, cross, is_zero
 from vsacli.dynamics.dampers import joints_with_parallel_damper, parallel_damper_torques
 from vsacli.dynamics.elastic_torques import carriers, link_constants
 from vsacli.dynamics.inverse import InverseDynamics, call_at_joints, rows_of_joints
@@ -113,7 +113,7 @@ def _momentum_rates(joint: Joint, index: int, ddtheta: FloatArray) -> list[Float
     """Return row `index` of B theta'', term by term."""
     of_rotor = joint.actuator.motors[index].inertia * ddtheta[index]
     coupling = joint.actuator.coupled_rotors
-    return [of_rotor, coupling * ddtheta[1 - index]] if coupling else [of_rotor]
+    return [of_rotor] if is_zero(coupling) else [of_rotor, coupling * ddtheta[1 - index]]
 
 
 def _winding_residuals(
@@ -141,10 +141,10 @@ def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[F
     if friction is None:
         return []
     backward, forward = friction.coulomb
-    if friction.width > 0:
-        shape = np.tanh(velocity / friction.width)
-    else:
+    if is_zero(friction.width):
         shape = np.where(velocity > REST, 1.0, np.where(velocity < -REST, -1.0, 0.0 * velocity))
+    else:
+        shape = np.tanh(velocity / friction.width)
     mean, half = (forward + backward) / 2, (forward - backward) / 2
     return [mean * shape, half * np.abs(shape), friction.offset + 0.0 * velocity]
 

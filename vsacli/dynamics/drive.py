@@ -19,6 +19,7 @@ from vsacli.base.arrays import BoolArray, FloatArray, stack_constants
 from vsacli.base.flags import MIN_MARGIN, Flag, finite, has_flag, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
+from vsacli.compute.vector import is_zero
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.joint import Joint
 
@@ -129,7 +130,7 @@ def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
     """Return B theta'', (2, samples), with the coupling B_12 of the rotors."""
     uncoupled = _by_motor([motor.inertia for motor in actuator.motors]) * ddtheta
     coupling = actuator.coupled_rotors
-    return uncoupled + coupling * ddtheta[::-1] if coupling else uncoupled
+    return uncoupled if is_zero(coupling) else uncoupled + coupling * ddtheta[::-1]
 
 
 def _motors_not_finite(joint: Joint, arrays: OfJoint) -> BoolArray:

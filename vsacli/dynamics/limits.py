@@ -33,7 +33,7 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
     if joint.damper is not None:
         checks.append(LimitCheck(Flag.DAMPING_LIMIT, DAMPING.key, None, joint.damper.range))
     checks += joint.actuator.limits
-    return [check for check in checks if any(map(math.isfinite, check.range))]
+    return [check for check in checks if check.exists]
 
 
 def limit_flags(joint: Joint, of_joint: OfJoint, flags: FlagArray) -> FlagArray:

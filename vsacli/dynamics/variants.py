@@ -6,6 +6,7 @@ be variants of each other, `numbers_as_rows` of `analysis.variant_groups` which 
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -116,20 +117,25 @@ class Variants:
         return list(np.ascontiguousarray(self.values[:, variant]))
 
 
-def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> Robot | None:
-    """Return the robot with each varied number as in `varied`; None if it lacks one of them.
+def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> tuple[Robot, tuple[Parameter, ...]] | None:
+    """Return the robot with each varied number as in `varied`, and those that can differ from it.
 
-    It is also None if a twist is a multiple of a right angle: its zeros and ones are exact only as constants.
-    Robots for which this returns equal robots can be variants of each other.
+    Robots for which this returns the same can be variants of each other. Numbers that decide on the
+    equations stay as they are: zeros, infinite limits, and twists with exact zeros and ones. None if the
+    robot lacks one of the numbers.
     """
     try:
-        structure = with_numbers(robot, varied, [number.value for number in varied])
-        values = [number_at(robot, number.path) for number in varied]
+        values = {number: number_at(robot, number.path) for number in varied}
     except (AttributeError, IndexError, TypeError):  # the robot has another record at a path
         return None
-    twists = (
-        value for number, value in zip(varied, values, strict=True) if not TURNED.isdisjoint(number.path)
-    )
-    if any(type(trigonometric(name, twist)) is int for twist in twists for name in ("cos", "sin")):
-        return None
-    return structure if with_numbers(structure, varied, values) == robot else None
+    rows = tuple(number for number, value in values.items() if not _decides(number, value))
+    structure = with_numbers(robot, rows, [number.value for number in rows])
+    restored = with_numbers(structure, rows, [values[number] for number in rows])
+    return (structure, rows) if restored == robot else None
+
+
+def _decides(number: Parameter, value: float) -> bool:
+    """Return whether a value of a number decides on the equations."""
+    twisted = not TURNED.isdisjoint(number.path)
+    exact = twisted and any(type(trigonometric(name, value)) is int for name in ("cos", "sin"))
+    return exact or value == 0 or not math.isfinite(value)

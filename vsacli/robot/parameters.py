@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from typing import NamedTuple
 
@@ -12,7 +12,6 @@ from vsacli.base.units import Quantity
 from vsacli.compute.duals import seeds
 from vsacli.documents.record_checks import replaced_unchecked
 from vsacli.documents.record_values import (
-    NumberAtPath,
     NumberPath,
     PathIndex,
     numbers_in_record,
@@ -89,9 +88,7 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
     Raises:
         InputError: a pattern matches no parameter.
     """
-    available = [
-        _parameter_at(robot, number) for number in numbers_in_record(robot) if _affects_results(number.path)
-    ]
+    available = [number for number in numbers_of_robot(robot) if _affects_results(number.path)]
     chosen = [
         each
         for each in available
@@ -101,6 +98,16 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
         if not any(_matches_pattern(each, pattern) for each in available):
             raise InputError.one(no_match(pattern, available))
     return tuple(chosen)
+
+
+def numbers_of_robot(robot: Robot) -> Iterator[Parameter]:
+    """Yield all finite numbers of a robot, limits included."""
+    for number in numbers_in_record(robot):
+        entry = number.path[1] if number.path[0] == JOINTS else None
+        if isinstance(entry, PathIndex):
+            yield Parameter(*number, entry.number, robot.joints[entry.number].type)
+        else:
+            yield Parameter(*number, None, "")
 
 
 def no_match(pattern: str, available: Sequence[Parameter]) -> str:
@@ -140,13 +147,6 @@ def _affects_results(path: NumberPath) -> bool:
 def _matches_pattern(parameter: Parameter, pattern: str) -> bool:
     words = (str(parameter), ".".join(parameter.by_index))
     return any(fnmatchcase(path, pattern) for path in words)
-
-
-def _parameter_at(robot: Robot, number: NumberAtPath) -> Parameter:
-    entry = number.path[1] if number.path[0] == JOINTS else None
-    if not isinstance(entry, PathIndex):
-        return Parameter(*number, None, "")
-    return Parameter(*number, entry.number, robot.joints[entry.number].type)
 
 
 def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:

@@ -14,6 +14,7 @@ from vsacli.actuators.laws.inversion import deflection_at_torque, with_sign_of
 from vsacli.actuators.laws.law import SpringLaw, SpringState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
+from vsacli.compute.vector import is_zero
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, number
 
 
@@ -36,7 +37,7 @@ class Polynomial(SpringLaw):
     def _coefficients(self) -> tuple[float, ...]:
         """Coefficients of phi, phi^3, ... up to the last that is not zero."""
         coefficients = (self.c1, self.c3, self.c5, self.c7, self.c9)
-        return coefficients[: max(index for index, each in enumerate(coefficients, start=1) if each)]
+        return coefficients[: max(place for place, each in enumerate(coefficients, 1) if not is_zero(each))]
 
     @property
     def is_linear(self) -> bool:

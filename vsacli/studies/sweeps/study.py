@@ -33,7 +33,7 @@ from vsacli.dynamics.variants import Variants
 from vsacli.results.store.study_table import TEXTS
 from vsacli.robot.file import RobotFileWithSource, read_robot_file
 from vsacli.robot.model import Robot
-from vsacli.robot.parameters import Parameter, parameters
+from vsacli.robot.parameters import Parameter, numbers_of_robot
 from vsacli.studies.sweeps.columns import KEPT, Column, curve_columns
 from vsacli.studies.sweeps.dimensions import Design, Dimension, Entries
 from vsacli.studies.sweeps.study_file import StudyFile
@@ -318,8 +318,8 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
 
 
 def _led_to(robot: Robot, dimension: Dimension) -> Iterator[Parameter]:
-    """Yield the parameters of a robot to which a dimension leads, or which are part of what it leads to."""
-    for parameter in parameters(robot):
+    """Yield the numbers of a robot to which a dimension leads, or which are part of what it leads to."""
+    for parameter in numbers_of_robot(robot):
         paths = str(parameter), ".".join(parameter.by_index)
         if any(fnmatchcase(path, end) for path in paths for end in (dimension.path, f"{dimension.path}.*")):
             yield parameter
