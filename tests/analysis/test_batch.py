@@ -23,6 +23,13 @@ from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, numbers_of_robot, parameters
 from vsacli.trajectory.times import UniformTimes
 
+BUNDLED = [
+    *("awas_1r", "cam_1r", "coupled_1r", "hand_3x2r", "hardening_1r", "maccepa_1r", "maccepa_vd_1r"),
+    *("measured_1r", "mixed_3r", "panda_7r", "planar_2r", "puma_560", "rp_2", "scara_4", "shifted_cams_1r"),
+    *("sliding_anchor_1r", "tendon_1r", "torso_2x3r", "ur5_6r"),
+]
+"""Robots with a trajectory of their name, with every kind of actuator."""
+
 VARIANTS = 5
 PEAK_SHARE = 1e-13
 """Deviation of a variable, relative to its peak: exact zeros and ones of constants are computed as rows."""
@@ -101,6 +108,27 @@ def test_a_batch_gives_what_each_run_gives(seed: int) -> None:
             (expected,) = alone
             assert_equal_blocks(own, expected)
             assert_equal_reports(batch.findings(number).as_json(), alone.findings(0).as_json())
+
+
+@pytest.mark.cases(1)
+@pytest.mark.parametrize("name", slow_but(["coupled_1r"], BUNDLED))
+def test_all_numbers_that_can_be_rows_differ_at_once(name: str) -> None:
+    robot, trajectory = shipped_run(name, name)
+    trajectory = trajectory.sampled(UniformTimes(trajectory.duration, 20 / trajectory.duration))
+    varied = numbers_as_rows(robot, trajectory, list(numbers_of_robot(robot)))
+    rng = np.random.default_rng(0)
+    robots = [
+        with_numbers(robot, varied, [(each.value or 0.01) * rng.uniform(0.98, 1.02) for each in varied])
+        for _ in range(3)
+    ]
+    for variants, members in batches([PreparedRun(each, trajectory) for each in robots], varied):
+        batch = Batch(variants, [trajectory] * len(members))
+        (block,) = batch
+        for number, (index, own) in enumerate(zip(members, block.divided(len(members)), strict=True)):
+            alone = Run(robots[index], trajectory, block_samples=10**6)
+            (expected,) = alone
+            assert_equal_blocks(own, expected)
+            assert_equal_reports(batch.findings(number).as_json(), alone.findings().as_json())
 
 
 def test_variants_are_one_batch_and_other_structures_their_own() -> None:

@@ -49,6 +49,7 @@ ROBOTS: dict[str, Robot] = {
     "mixed": shipped_robot("mixed_3r"),
     "tendon": shipped_robot("tendon_1r"),
     "quadratic": with_springs("quadratic"),
+    "carried motor": shipped_robot("awas_1r"),
 }
 
 
@@ -158,12 +159,10 @@ def test_a_function_that_depends_on_none_of_them_takes_no_such_argument() -> Non
 @pytest.mark.parametrize(
     ("name", "path"),
     [
-        ("compact_1r", "joints.elbow.actuator.coupled_inertia"),
         ("sliding_anchor_1r", "joints.elbow.actuator.mechanism.range.phi.0"),
         slow("devices/jack_spring", "joints.joint.actuator.mechanism.setting.0"),
         slow("qbmove_arm_manual", "joints.pan.actuator.spring.0.k"),
         slow("maccepa_1r", "joints.elbow.actuator.mechanism.k"),
-        slow("awas_1r", "joints.elbow.actuator.coupled_inertia"),
     ],
 )
 def test_what_decides_about_the_code_is_refused(name: str, path: str) -> None:

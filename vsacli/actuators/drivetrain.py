@@ -14,6 +14,7 @@ from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import Windings
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.variables import VARIABLES
+from vsacli.compute.vector import is_zero
 
 
 def largest_coupling(first: float, second: float) -> float:
@@ -40,8 +41,8 @@ class Rotors:
         ]
         inertia, coupling, to_other = zip(*motors, strict=True) if motors else ((), (), ())
         self._inertia = np.stack(inertia) if inertia else np.zeros(0)
-        self._coupling = np.array(coupling, dtype=np.float64)
-        self._coupled = np.flatnonzero(self._coupling)
+        self._coupling = np.stack(coupling) if coupling else np.zeros(0)
+        self._coupled = np.flatnonzero([not is_zero(each) for each in coupling])
         self._other = self._coupled + np.array(to_other, dtype=np.intp)[self._coupled]
 
     def torques(self, ddtheta: FloatArray) -> FloatArray:

@@ -78,7 +78,7 @@ def _can_be_rows(robot: Robot, trajectory: Trajectory, numbers: Sequence[Paramet
             )
             for change in (CHANGE, 2 * CHANGE)
         )
-        rows = _at_trial_times(Variants(robots, robot, tuple(numbers)), trajectory)
+        rows = _at_trial_times(Variants(robots, robots[0], tuple(numbers)), trajectory)
         constants = [_at_trial_times(Variants.of_one(each), trajectory) for each in robots]
         return all(_agree(rows.taken(slice(place, None, 2)), each) for place, each in enumerate(constants))
     return False

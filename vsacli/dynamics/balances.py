@@ -187,7 +187,7 @@ def shaft_energy(joint: Joint, of_joint: JointVariables) -> FloatArray:
     for motor, velocity in zip(motors, dtheta, strict=False):
         energy = energy + motor.inertia / 2 * velocity * velocity
     coupling = joint.actuator.coupled_rotors
-    return energy + coupling * dtheta[0] * dtheta[1] if coupling else energy
+    return energy if is_zero(coupling) else energy + coupling * dtheta[0] * dtheta[1]
 
 
 def shaft_powers(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:

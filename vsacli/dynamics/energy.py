@@ -21,6 +21,7 @@ from vsacli.base.variables import VARIABLES, Block
 from vsacli.compute.control_flow import call
 from vsacli.compute.engine import Engine
 from vsacli.compute.rows import RowLayout
+from vsacli.compute.vector import is_zero
 from vsacli.dynamics.losses import LossMeter, LostEnergy, integral, positive_work, work_on_each_other
 from vsacli.dynamics.variants import RobotKernel, Variants
 from vsacli.robot.model import Robot
@@ -212,7 +213,7 @@ class IntervalEnergy(RobotKernel):
     @cached_property
     def at_steps(self) -> tuple[str, ...]:
         """Names of the input variables at both ends of an interval."""
-        coupled = any(joint.actuator.coupled_rotors for joint in self.robot.joints)
+        coupled = not all(is_zero(joint.actuator.coupled_rotors) for joint in self.robot.joints)
         return (*AT_STEPS, "ddtheta") if coupled else AT_STEPS
 
     @cached_property
@@ -260,7 +261,7 @@ def _joint_flow(
         at_ends = ((each["passed_power"][side], each["passed_rate"][side]) for each in ends)
         before, after = (of_motor / 2 * each["dtheta"][side] ** 2 for each in ends)
         works[side] = integral(interval, *at_ends) + (after - before)
-    if coupling:
+    if not is_zero(coupling):
         motions = ((np.stack(each["dtheta"]), np.stack(each["ddtheta"])) for each in ends)
         of_other = coupling * work_on_each_other(interval, *motions)
         works = [work + of_other[side] for side, work in enumerate(works)]

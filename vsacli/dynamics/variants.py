@@ -118,7 +118,7 @@ class Variants:
 
 
 def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> tuple[Robot, tuple[Parameter, ...]] | None:
-    """Return the robot with each varied number as in `varied`, and those that can differ from it.
+    """Return the robot with each varied number as in `varied`, or 1 for 0, and those that can differ from it.
 
     Robots for which this returns the same can be variants of each other. Numbers that decide on the
     equations stay as they are: zeros, infinite limits, and twists with exact zeros and ones. None if the
@@ -129,7 +129,7 @@ def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> tuple[Robot, 
     except (AttributeError, IndexError, TypeError):  # the robot has another record at a path
         return None
     rows = tuple(number for number, value in values.items() if not _decides(number, value))
-    structure = with_numbers(robot, rows, [number.value for number in rows])
+    structure = with_numbers(robot, rows, [number.value or 1.0 for number in rows])
     restored = with_numbers(structure, rows, [values[number] for number in rows])
     return (structure, rows) if restored == robot else None
 
