@@ -12,7 +12,7 @@ from vsacli import inverse_dynamics
 from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.self_check import LADDER_BOUND
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.engine import NUMPY, Choice, Kernel
+from vsacli.compute.engine import NUMPY, ChosenEngine, Kernel
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.drive import drive
 
@@ -35,7 +35,7 @@ class Faulty:
 @pytest.mark.parametrize("first", [0, 1234, 3980])
 def test_a_program_that_is_wrong_in_a_stretch_is_found_apart_from_it(first: int, monkeypatch):
     """A 199th of the 4001 steps, which are in one block; finite differences do not show it."""
-    choice = Choice(Faulty(first, 21), "a fault")
+    choice = ChosenEngine(Faulty(first, 21), "a fault")
     monkeypatch.setattr("vsacli.analysis.batch.choose", lambda *_, **_keywords: choice)
     monkeypatch.setattr(
         "vsacli.analysis.self_check.ladder", lambda _: (np.zeros(1), np.full(1, LADDER_BOUND))

@@ -22,11 +22,11 @@ from samples.text_boxes import collisions, shown_texts
 from vsacli.cli.main import run
 from vsacli.files.info.robot_info import load_sizes, static_load
 from vsacli.results.charts.arm_chart import arm_chart
-from vsacli.results.charts.chart import Block, Chart, Line, Sheet
+from vsacli.results.charts.chart import Chart, Line, PanelGrid, Sheet
 from vsacli.results.charts.look import LEGIBLE, STYLES, Look, drawing_with
 from vsacli.results.charts.measured import MeasuredCurve, measured_sheet
 from vsacli.results.charts.optimum import change_sheet
-from vsacli.results.charts.ranking import Bar, Ranking
+from vsacli.results.charts.ranking import EffectBar, Ranking
 from vsacli.results.charts.reduction import Curve
 from vsacli.results.charts.robot_charts import ActuatorChart, actuator_charts
 from vsacli.results.plots import (
@@ -99,7 +99,8 @@ def of_tables(folder: Path) -> Figures:
 
 def of_lists() -> Figures:
     bars = [
-        Bar(f"1 % of cubic spring stiffness k_c, shoulder {at}", 1 / at, "shoulder") for at in range(1, 9)
+        EffectBar(f"1 % of cubic spring stiffness k_c, shoulder {at}", 1 / at, "shoulder")
+        for at in range(1, 9)
     ]
     measured = MeasuredCurve("shoulder.tau_motor_measured_1", "N m", 0.09123, TIME, TIME / 4, TIME / 5)
     return {
@@ -201,7 +202,7 @@ def simulated(joints: int, columns: int = 2, most_rows: int = 7, rows: int = 1) 
     panels = [
         [chart[at, row, column] for column in range(columns)] for at in range(joints) for row in range(rows)
     ]
-    block = Block(TIME, panels, (1.7,) * rows, most_rows)
+    block = PanelGrid(TIME, panels, (1.7,) * rows, most_rows)
     return Sheet("sheet", (3.0 * block.columns, block.height + 1), {"computed": 0}, [block])
 
 

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.patches import Patch
 from samples.figure_inputs import FREQUENCIES, TIME, curve
 
-from vsacli.results.charts.measured import Spectrum
+from vsacli.results.charts.measured import AmplitudeSpectrum
 from vsacli.results.charts.reduction import Curve
 from vsacli.results.plots import recorded_figure
 
@@ -83,7 +83,7 @@ def test_a_spline_through_all_samples_has_no_band_and_no_residual() -> None:
 
 @pytest.mark.slow
 def test_a_joint_at_rest_is_said_to_be_so() -> None:
-    nothing = Spectrum(FREQUENCIES, np.zeros(50), np.zeros(50), 1e-18, np.nan, np.nan)
+    nothing = AmplitudeSpectrum(FREQUENCIES, np.zeros(50), np.zeros(50), 1e-18, np.nan, np.nan)
     still = Curve(TIME, np.full(400, 0.3))
     rest = curve(rms=0.0)._replace(recorded=still, fitted=still, spectrum=nothing)
     signal, _, spectrum, _ = recorded_figure([rest], "log").axes

@@ -11,7 +11,7 @@ import numpy as np
 from vsacli import Trajectory, inverse_dynamics
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.conditioning import Signals, bandwidth_of, conditioned
+from vsacli.studies.identification.conditioning import ConditionedRecording, bandwidth_of, conditioned
 
 POSITION_LINES, STIFFNESS_LINES = (0.15, 0.4, 0.7), (0.2, 0.55)
 """Hz."""
@@ -47,7 +47,7 @@ class Recorded(NamedTuple):
     tau_motor: FloatArray
 
     @property
-    def signals(self) -> Signals:
+    def signals(self) -> ConditionedRecording:
         """Ready for equations."""
         return conditioned(*self, bandwidth_of(self.time, self.q, self.theta))
 

@@ -6,19 +6,19 @@ import math
 
 import numpy as np
 
-from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
-from vsacli.results.charts.optimum import JointChange, Moved
+from vsacli.results.charts.measured import AmplitudeSpectrum, Highest, RecordedCurve
+from vsacli.results.charts.optimum import Moved, OptimizedJoint
 from vsacli.results.charts.reduction import Curve
-from vsacli.results.plots import Bounds, TorqueSpeed
+from vsacli.results.plots import MotorLimits, TorqueSpeed
 
 TIME = np.linspace(0, 10, 400)
 PLACE = np.linspace(0.0, 2.0, 50)
 FREQUENCIES = np.geomspace(0.5, 100, 50)
-LIMITED = Bounds(5.0, 2.0, 3.0, math.inf, 0.0, 0.0)
-FREE = Bounds(math.inf, math.inf, math.inf, math.inf, 0.0, 0.0)
+LIMITED = MotorLimits(5.0, 2.0, 3.0, math.inf, 0.0, 0.0)
+FREE = MotorLimits(math.inf, math.inf, math.inf, math.inf, 0.0, 0.0)
 
 
-def motor(bounds: Bounds) -> TorqueSpeed:
+def motor(bounds: MotorLimits) -> TorqueSpeed:
     time = np.linspace(0, 6, 100)
     runs = {"fast": (np.sin(time), np.cos(time)), "slow": (np.sin(time) / 2, np.cos(time))}
     return TorqueSpeed("elbow, motor 1", "joint side", "N m", "rad/s", bounds, runs, (0.7, 0.7))
@@ -41,7 +41,7 @@ def curve(
         rms=rms,
         noise=1e-4,
         inside=(0.5, 9.0),
-        spectrum=Spectrum(FREQUENCIES, motion + 1e-5, motion, 1e-5, cutoff, above),
+        spectrum=AmplitudeSpectrum(FREQUENCIES, motion + 1e-5, motion, 1e-5, cutoff, above),
         highest=Highest("d4q", "rad/s^4", 4, 0.0123 if rms else np.nan),
     )
 
@@ -52,6 +52,8 @@ def moved(stiffness: float) -> Moved:
     return Moved(PLACE, rows, 0.5 * rows, 2 * rows, np.stack([rows / 10, -rows / 10]))
 
 
-def joint(name: str, stiffness: float = 900.0, limit: float = np.inf) -> JointChange:
+def joint(name: str, stiffness: float = 900.0, limit: float = np.inf) -> OptimizedJoint:
     """A joint whose optimum has 0.9 times the commanded stiffness and torques."""
-    return JointChange(name, "revolute", moved(stiffness), moved(0.9 * stiffness), np.array([-limit, limit]))
+    return OptimizedJoint(
+        name, "revolute", moved(stiffness), moved(0.9 * stiffness), np.array([-limit, limit])
+    )

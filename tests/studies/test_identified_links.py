@@ -27,7 +27,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.robot.joint import Tool
 from vsacli.studies.identification import fitted_text
-from vsacli.studies.identification.conditioning import Signals, conditioned
+from vsacli.studies.identification.conditioning import ConditionedRecording, conditioned
 from vsacli.studies.identification.consistent_links import doubts_of, found_links
 from vsacli.studies.identification.fitted_system import Solution, solution
 from vsacli.studies.identification.identification_report import OK, numbers_of
@@ -81,7 +81,7 @@ def motion_of(case: str, folder: Path) -> tuple[Robot, Trajectory]:
     return robot, load_trajectory(motion, robot)
 
 
-def measured(run: Result, seed: int) -> Signals:
+def measured(run: Result, seed: int) -> ConditionedRecording:
     """What sensors would have read of a run, conditioned."""
     random = np.random.default_rng(seed)
     q, theta = (each + POSITION_NOISE * random.normal(size=each.shape) for each in (run.q, run.theta))
@@ -89,7 +89,7 @@ def measured(run: Result, seed: int) -> Signals:
     return conditioned(run.time, q, theta, torque, bandwidth=2.0)
 
 
-def solved(robot: Robot, signals: Signals) -> list[Solution]:
+def solved(robot: Robot, signals: ConditionedRecording) -> list[Solution]:
     """Motors, and last the links."""
     joints = range(len(robot.joints))
     motors = [solution(each, [signals]) for each in motor_systems(robot, joints, GROUPS, [signals])]

@@ -23,7 +23,7 @@ from samples.noisy_records import (
 from scipy.interpolate import BSpline
 
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, SMOOTH, fit_samples, resolution
-from vsacli.trajectory.fits.bins import Bins, Moments, uniform_basis
+from vsacli.trajectory.fits.bins import BinMoments, Bins, uniform_basis
 from vsacli.trajectory.fits.noise import Lines, filtered_noise, spectral_lines
 from vsacli.trajectory.fits.penalized import Model
 from vsacli.trajectory.trajectory import Trajectory
@@ -169,7 +169,7 @@ def test_estimate_is_that_of_dense_algebra(degree):
     """The penalized least squares of whitened bins, the restricted likelihood, and the deviations."""
     time = np.sort(np.random.default_rng(1).uniform(0, 2, 300))
     row = np.sin(3 * time) + 0.01 * np.random.default_rng(2).standard_normal(300)
-    bins = Bins.of(Moments.of(time, row, 40, degree))
+    bins = Bins.of(BinMoments.of(time, row, 40, degree))
     penalties = np.geomspace(1e-3, 1e2, bins.coefficients - degree)
     model = Model(bins, bins.whitened(0.4), penalties, 1)
     lag = 0.4**bins.gaps
@@ -335,7 +335,7 @@ def test_no_record_is_wrong_in_silence(color):
 def test_bins_of_half_the_resolution_are_those_of_the_samples():
     time = np.sort(np.random.default_rng(3).uniform(0, 2, 500))
     row = np.cos(time)
-    fine, coarse = Moments.of(time, row, 64, 7), Moments.of(time, row, 32, 7)
+    fine, coarse = BinMoments.of(time, row, 64, 7), BinMoments.of(time, row, 32, 7)
     for name in ("powers", "time", "row"):
         # sums of some fifteen positive numbers
         np.testing.assert_allclose(getattr(fine.halved, name), getattr(coarse, name), rtol=100 * EPS)

@@ -18,7 +18,7 @@ from vsacli.actuators.laws.law import PairSolution
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import LIMITS, MIN_MARGIN, SINGULAR_MARGIN, Flag, marked
 from vsacli.base.variables import VARIABLES, deviation
-from vsacli.compute.vector import is_finite
+from vsacli.compute.vector import Scalar
 
 LIMIT_ROUNDING = 1e-9
 """Relative excess over a limit that is ignored as rounding, so that a motion may run along its limit."""
@@ -91,16 +91,21 @@ class LimitCheck(NamedTuple):
     @property
     def largest(self) -> float:
         """Largest absolute value of the finite bounds; 0 if there is none."""
-        return reduce(np.maximum, (abs(end) for end in self.range if is_finite(end)), 0.0)
+        return reduce(np.maximum, (abs(end) for end in self.range if _is_bound(end)), 0.0)
 
     @property
     def exists(self) -> bool:
         """Whether either end bounds anything."""
-        return any(map(is_finite, self.range))
+        return any(map(_is_bound, self.range))
 
     def outside(self, values: FloatArray) -> FloatArray:
         """Return the distance outside the range; zero or negative inside, NaN for NaN."""
         return np.maximum(self.range[0] - values, values - self.range[1])
+
+
+def _is_bound(end: Scalar) -> bool:
+    """Return whether an end of a range is finite; rows and symbols stand for finite numbers."""
+    return not isinstance(end, float | int) or math.isfinite(end)
 
 
 def margin(stiffness: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:

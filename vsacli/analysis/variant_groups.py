@@ -121,7 +121,7 @@ def batches(runs: Sequence[PreparedRun], varied: Sequence[Parameter]) -> Iterato
         runs: Runs in any order.
         varied: Numbers that are rows of the kernel, see `numbers_as_rows`.
     """
-    groups: dict[Hashable, list[int]] = {}
+    groups: dict[tuple[Robot, tuple[Parameter, ...], Hashable, int | None], list[int]] = {}
     for index, run in enumerate(runs):
         shared = None if is_alone(*run) else shared_structure(run.robot, varied)
         structure, rows = shared or (run.robot, ())

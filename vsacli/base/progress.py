@@ -7,14 +7,14 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol, TypeAlias
 
 
-class Bar(Protocol):
+class ProgressBar(Protocol):
     """A counter of steps, as the progress bars of click and tqdm are."""
 
     def update(self, steps: int, /) -> object:
         """Count steps that are done."""
 
 
-Progress: TypeAlias = Callable[[int], AbstractContextManager[Bar]]
+Progress: TypeAlias = Callable[[int], AbstractContextManager[ProgressBar]]
 """Callable that gets the number of steps before work begins; returns a context manager of a bar."""
 
 

@@ -10,7 +10,7 @@ from vsacli.analysis.result import Result
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.arrays import FloatArray
 from vsacli.results.charts.chart import Sheet
-from vsacli.results.charts.optimum import JointChange, Moved, change_sheet, pace_sheet
+from vsacli.results.charts.optimum import Moved, OptimizedJoint, change_sheet, pace_sheet
 from vsacli.robot.joint import Joint
 from vsacli.studies.search import Optimum
 from vsacli.studies.search.paced_motion import path_at
@@ -27,7 +27,7 @@ def optimum_sheets(found: Optimum, best: Trajectory, asked: Trajectory) -> dict[
     if found.pace is not None:
         place = path_at(place, found.pace, asked.duration)
     joints = [
-        JointChange(
+        OptimizedJoint(
             name=joint.name,
             joint_type=joint.type,
             before=_moved(before, before.time - asked.start, index),

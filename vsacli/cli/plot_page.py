@@ -22,7 +22,7 @@ from vsacli.results.store.study_table import StoredStudy
 
 if TYPE_CHECKING:
     from vsacli.base.outputs import Outputs
-    from vsacli.base.progress import Bar
+    from vsacli.base.progress import ProgressBar
     from vsacli.cli.figure_options import FigureTarget
     from vsacli.results.store.reader import StoredResult
     from vsacli.studies.search import Fixes
@@ -56,7 +56,7 @@ def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
         fixes = _fixes(whole, talk)
         samples = sum(each.samples for each in files)
 
-        def progress(variables: int) -> AbstractContextManager[Bar]:
+        def progress(variables: int) -> AbstractContextManager[ProgressBar]:
             shown_from = 0 if samples >= LONG_PAGE else variables + 1
             return talk.progress(variables, shown_from=shown_from, label="drawing")
 

@@ -160,9 +160,9 @@ def unheard(_: object) -> None:
 
 
 def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
-    from vsacli.results.store.derived_files import Number, SensitivityWriter
+    from vsacli.results.store.derived_files import ParameterValue, SensitivityWriter
 
-    numbers = [Number(str(each), each.value, each.unit) for each in run.parameters]
+    numbers = [ParameterValue(str(each), each.value, each.unit) for each in run.parameters]
     provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]])}
     return SensitivityWriter(file, run.robot, run.trajectory, numbers, run.slopes, provenance=provenance)
 
@@ -176,7 +176,7 @@ def _draw(
     outputs: Outputs,
 ) -> None:
     """Draw the ranking, and the bands of motor torques if tolerances are given."""
-    from vsacli.results.charts.optimum import Torque, band_sheet
+    from vsacli.results.charts.optimum import MotorTorqueCurve, band_sheet
     from vsacli.results.plots import ranking_figure
 
     names = [RANKING] if found.curves is None else [RANKING, BAND]
@@ -185,7 +185,9 @@ def _draw(
     if found.curves is not None and tolerances is not None:
         time, values, deviation = found.curves
         torques = [
-            Torque(joint.name, joint.type, motor, values[:, index, motor - 1], deviation[:, index, motor - 1])
+            MotorTorqueCurve(
+                joint.name, joint.type, motor, values[:, index, motor - 1], deviation[:, index, motor - 1]
+            )
             for index, joint in enumerate(robot.joints)
             for motor in range(1, joint.actuator.motor_count + 1)
         ]

@@ -125,7 +125,7 @@ def _draw(found: Sizing, target: FigureTarget, stem: str, outputs: Outputs, talk
 
 
 def _torque_speed(motor: MotorSizing) -> TorqueSpeed:
-    from vsacli.results.plots import Bounds, TorqueSpeed
+    from vsacli.results.plots import MotorLimits, TorqueSpeed
 
     points, shaft = motor.points, motor.shaft
     assert points is not None, "as of every motor of which something is known"
@@ -134,7 +134,7 @@ def _torque_speed(motor: MotorSizing) -> TorqueSpeed:
         name: (points.velocities[motor.demand.run == index], points.torques[motor.demand.run == index])
         for index, name in enumerate(motor.demand.trajectories)
     }
-    constants = {name: getattr(shaft, name) for name in Bounds._fields}
+    constants = {name: getattr(shaft, name) for name in MotorLimits._fields}
     rms = points.rms_velocity, points.rms_torque
     name = f"{motor.joint}, motor {motor.motor}"
-    return TorqueSpeed(name, motor.drive, *motor.units, Bounds(**constants), runs, rms)
+    return TorqueSpeed(name, motor.drive, *motor.units, MotorLimits(**constants), runs, rms)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.compute.vector import Scalar, add, mul, sub
+from vsacli.compute.vector import Scalar, add, is_zero, mul, sub
 
 Order = tuple[int, ...]
 """Number of differentiations over each variable."""
@@ -76,7 +76,7 @@ class Jet:
 
     def __init__(self, truncation: Truncation, terms: Terms) -> None:
         self._truncation = truncation
-        self._terms = {order: term for order, term in terms.items() if not _is_zero(term)}
+        self._terms = {order: term for order, term in terms.items() if not is_zero(term)}
 
     @property
     def value(self) -> Scalar:
@@ -146,10 +146,6 @@ class Jet:
             result, power = result + power * coefficient, power * inner
         last: Jet = power * next(outer)
         return result._joined(last, add)
-
-
-def _is_zero(term: Scalar) -> bool:
-    return isinstance(term, int | float) and term == 0
 
 
 def _whole_power(base: Jet, exponent: int) -> Jet:

@@ -28,12 +28,7 @@ def exact(number: Scalar) -> Scalar:
 
 def is_zero(number: Scalar) -> bool:
     """Return whether a scalar is the constant zero; rows and symbols stand for other numbers."""
-    return _vanishes(exact(number))
-
-
-def is_finite(number: Scalar) -> bool:
-    """Return whether a scalar is no infinite constant; rows and symbols stand for finite numbers."""
-    return not isinstance(number, float | int) or math.isfinite(number)
+    return isinstance(number, float | int) and number == 0
 
 
 def trigonometric(name: str, angle: Scalar) -> Scalar:

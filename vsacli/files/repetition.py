@@ -31,7 +31,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
-class Difference:
+class VariableDifference:
     """The difference of a variable between a result and its recomputation.
 
     Attributes:
@@ -59,7 +59,7 @@ class Repetition(NamedTuple):
         precision: precision of the file, "double" or "single".
     """
 
-    differences: list[Difference]
+    differences: list[VariableDifference]
     precision: str
 
 
@@ -80,7 +80,7 @@ def repeat(path: str | Path, tell: Tell = unheard) -> Repetition:
         engine = str(result.attributes.get("engine", "numpy"))
         asked = (JUDGED, *_on_request(result))
         run = Run(robot, trajectory, engine=engine, asked=asked, tell=tell, **options)
-        comparisons = [_Comparison(result, name) for name in result.variables]
+        comparisons = [_VariableComparison(result, name) for name in result.variables]
         for block in run:
             for comparison in comparisons:
                 comparison.add(block)
@@ -124,7 +124,7 @@ def _reading(inputs: Sequence[StoredInput], path: str | Path) -> Iterator[tuple[
         yield roles["robot"], roles["trajectory"]
 
 
-class _Comparison:
+class _VariableComparison:
     """A comparison of a stored variable with the blocks of a run, in order."""
 
     def __init__(self, result: StoredResult, variable: str) -> None:
@@ -148,9 +148,9 @@ class _Comparison:
         self._largest = float(np.maximum(self._largest, np.max(distances, initial=0.0)))
 
     @property
-    def difference(self) -> Difference:
+    def difference(self) -> VariableDifference:
         """Difference found so far."""
-        return Difference(self._variable, self.values, self._largest / (self._peak or 1.0))
+        return VariableDifference(self._variable, self.values, self._largest / (self._peak or 1.0))
 
 
 class Extracted(NamedTuple):

@@ -20,7 +20,6 @@ from vsacli.actuators.elasticity import indices_of_equals
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.units import POSITION
 from vsacli.compute.control_flow import subroutine
-from vsacli.compute.vector import is_finite
 from vsacli.documents.fields import POSITIVE_OR_INFINITE, number
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.source import Source
@@ -163,7 +162,7 @@ class SpringLaw(DeclaredRecord, ABC):
     @property
     def unlimited(self) -> Self:
         """The law without `max_deflection`, for the mathematics: laws of equal torques are equal there."""
-        if not is_finite(self.max_deflection):
+        if isinstance(self.max_deflection, float) and math.isinf(self.max_deflection):
             return self
         law = copy.copy(self)
         object.__setattr__(law, "max_deflection", math.inf)

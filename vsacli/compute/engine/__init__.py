@@ -1,6 +1,6 @@
 """Backends of computations on rows of samples: NumPy, or code from a C compiler."""
 
-from vsacli.compute.engine.choice import NAMES, NUMPY, Choice, Settled, choose, processors, settle
+from vsacli.compute.engine.choice import NAMES, NUMPY, ChosenEngine, Settled, choose, processors, settle
 from vsacli.compute.engine.engines import KEPT_PROGRAMS, Engine, Kernel, samples_per_pass
 from vsacli.compute.engine.number_engine import NUMBERS, engine_of_call
 
@@ -9,7 +9,7 @@ __all__ = [
     "NAMES",
     "NUMBERS",
     "NUMPY",
-    "Choice",
+    "ChosenEngine",
     "Engine",
     "Kernel",
     "Settled",

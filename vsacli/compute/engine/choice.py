@@ -32,7 +32,7 @@ NAMES = ("numpy", "c", "auto")
 NUMPY: Engine = NumPyEngine()
 
 
-class Choice(NamedTuple):
+class ChosenEngine(NamedTuple):
     """The chosen engine and the reason.
 
     Attributes:
@@ -62,7 +62,7 @@ def choose(
     tell: Tell = unheard,
     *,
     busy: int = 0,
-) -> Choice:
+) -> ChosenEngine:
     """Return the engine for a computation.
 
     Args:
@@ -80,9 +80,9 @@ def choose(
     check_engine(name)
     usual = in_usual_blocks(samples, kernel.inputs)
     if name == "numpy":
-        return Choice(_numpy(usual), "NumPy computes, as requested")
+        return ChosenEngine(_numpy(usual), "NumPy computes, as requested")
     if name == "auto" and usual < LOOK_FROM:
-        return Choice(NUMPY, f"NumPy computes: {samples} samples are few")
+        return ChosenEngine(NUMPY, f"NumPy computes: {samples} samples are few")
     from vsacli.compute.engine.compiled_engine import CompiledEngine
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
@@ -94,12 +94,12 @@ def choose(
             engine = CompiledEngine(compiler, max(1, threads - busy), tell)
             loaded = engine.prepare(kernel, lambda code: asked or _repays(code, usual))
     except (CompilerError, NotImplementedError) as error:
-        return Choice(_numpy(usual), f"NumPy computes: {error}")
+        return ChosenEngine(_numpy(usual), f"NumPy computes: {error}")
     if loaded is None:
-        return Choice(_numpy(usual), f"NumPy computes: {samples} samples would not repay compiling")
+        return ChosenEngine(_numpy(usual), f"NumPy computes: {samples} samples would not repay compiling")
     when = "now" if loaded.compiled else "before"
     reason = f"C code computes, compiled {when}, in {_counted(threads)}"
-    return Choice(engine, reason, compiler.name, threads)
+    return ChosenEngine(engine, reason, compiler.name, threads)
 
 
 class Settled(NamedTuple):

@@ -72,7 +72,7 @@ def engine_of_call(engine: str | Engine, kernel: Kernel, samples: int) -> Engine
     return choose(engine, kernel, samples).engine
 
 
-class _Recorded:
+class _RecordedKernel:
     """The function of a kernel, recorded when it has been called often enough."""
 
     def __init__(self, kernel: Kernel) -> None:
@@ -94,5 +94,5 @@ class _Recorded:
 
 
 @lru_cache(maxsize=KEPT_PROGRAMS)
-def _recorded(kernel: Kernel) -> _Recorded:
-    return _Recorded(kernel)
+def _recorded(kernel: Kernel) -> _RecordedKernel:
+    return _RecordedKernel(kernel)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from vsacli.compute.tracing.program import BITWISE, Kind, Operand, Program, Symbol, Table
+from vsacli.compute.tracing.program import BITWISE, Kind, Operand, Program, SelectionTable, Symbol
 from vsacli.compute.tracing.tape import Tape, TooLongError
 
 Cells = npt.NDArray[np.object_]
@@ -155,7 +155,7 @@ def _clip(tape: Tape, values: Any, low: Any, high: Any) -> Cells:
 def _searchsorted(tape: Tape, nodes: Any, values: Any, *, side: str = "left") -> Cells:
     if side != "right":
         raise NotImplementedError("numpy.searchsorted is recorded with side='right' only")
-    table = Table(tuple(np.asarray(nodes, dtype=np.float64).tolist()))
+    table = SelectionTable(tuple(np.asarray(nodes, dtype=np.float64).tolist()))
     return each_entry(lambda cell: tape.emit("searchsorted", table, cell), values)
 
 

@@ -19,8 +19,8 @@ from vsacli.compute.tracing.program import (
     Kind,
     Operand,
     Program,
+    SelectionTable,
     Symbol,
-    Table,
     kind_of,
     kinds_of_operands,
     table_uses,
@@ -111,7 +111,7 @@ class Tables:
             for number, values in enumerate(contents)
         ]
 
-    def place(self, table: Table) -> Place:
+    def place(self, table: SelectionTable) -> Place:
         """Return the place of a table."""
         number, offset = self._places[table]
         return Place(self.arrays[number], offset)
@@ -233,7 +233,7 @@ class Writer:
 
     def _expression(self, symbol: Symbol, names: Names, prefix: str) -> str:
         operation, dialect = symbol.operation, self.dialect
-        if isinstance(table := symbol.operands[0], Table):
+        if isinstance(table := symbol.operands[0], SelectionTable):
             return self._from_table(table, symbol, names, prefix)
         texts = [
             self.value(operand, kind, names, prefix)
@@ -271,7 +271,7 @@ class Writer:
         yield f"{self.dialect.types[Kind.REAL]} {own}[{len(body.outputs)}];"
         yield f"{self._name_of(body)}({', '.join([*arguments, own])});"
 
-    def _from_table(self, table: Table, symbol: Symbol, names: Names, prefix: str) -> str:
+    def _from_table(self, table: SelectionTable, symbol: Symbol, names: Names, prefix: str) -> str:
         place, taken = self._tables.place(table), symbol.operation == "take"
         operand = self.value(symbol.operands[1], Kind.INDEX if taken else Kind.REAL, names, prefix)
         if taken:

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from vsacli.compute.tracing.c_code import Writer
 from vsacli.compute.tracing.calls import Workspace, values_of
-from vsacli.compute.tracing.program import NESTED, Kind, Program, Subroutine, Symbol, Table
+from vsacli.compute.tracing.program import NESTED, Kind, Program, SelectionTable, Subroutine, Symbol
 
 
 class Subroutines:
@@ -70,7 +70,7 @@ def _operand_key(operand: Any) -> Hashable:
     """Return a value by its number, a constant by its digits, so that NaN equals itself."""
     if isinstance(operand, Symbol):
         return operand.index, operand.kind
-    if isinstance(operand, Table):
+    if isinstance(operand, SelectionTable):
         return array("d", operand.values).tobytes()
     if isinstance(operand, tuple):  # a loop, branch, call or subroutine
         body, *rest = operand

@@ -24,7 +24,7 @@ class Kind(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Table:
+class SelectionTable:
     """Constants from which an operation selects."""
 
     values: tuple[float, ...]
@@ -281,20 +281,20 @@ def _common_kind(operands: Sequence[Any]) -> Kind:
     return kinds.pop()
 
 
-def table_uses(*programs: Program) -> Iterator[tuple[Table, str]]:
+def table_uses(*programs: Program) -> Iterator[tuple[SelectionTable, str]]:
     """Yield tables with the operations on them, also of nested programs, each of which is visited once."""
     seen: set[int] = set()
     for program in programs:
         yield from _uses(program, seen)
 
 
-def _uses(program: Program, seen: set[int]) -> Iterator[tuple[Table, str]]:
+def _uses(program: Program, seen: set[int]) -> Iterator[tuple[SelectionTable, str]]:
     if id(program) in seen:
         return
     seen.add(id(program))
     for symbol in program.operations:
         for operand in symbol.operands:
-            if isinstance(operand, Table):
+            if isinstance(operand, SelectionTable):
                 yield operand, symbol.operation
             elif isinstance(operand, Loop | Branch | Call | Subroutine):
                 yield from _uses(operand.body, seen)

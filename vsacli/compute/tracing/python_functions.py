@@ -25,8 +25,8 @@ from vsacli.compute.tracing.program import (
     Kind,
     Loop,
     Program,
+    SelectionTable,
     Symbol,
-    Table,
     kinds_of_operands,
     table_uses,
 )
@@ -99,7 +99,7 @@ def function_text(program: Program, name: str, arguments: Mapping[str, int], nes
         NotImplementedError: The program has calls or subroutines.
     """
     distinct = dict.fromkeys(table for table, _ in table_uses(program))
-    writer = _Writer({table: f"table_{number}" for number, table in enumerate(distinct)}, nesting)
+    writer = _PythonWriter({table: f"table_{number}" for number, table in enumerate(distinct)}, nesting)
     constants = [f"{own} = array({list(table.values)})" for table, own in writer.tables.items()]
     names = {symbol.index: f"v{symbol.index}" for symbol in program.inputs}
     inputs, lines = iter(program.inputs), []
@@ -110,7 +110,7 @@ def function_text(program: Program, name: str, arguments: Mapping[str, int], nes
     return "\n".join([*constants, head, *_indented([*lines, f"return [{', '.join(results)}]"]), ""])
 
 
-class _Writer:
+class _PythonWriter:
     """Writes the statements of programs in Python.
 
     Args:
@@ -118,7 +118,7 @@ class _Writer:
         nesting: As of `function_text`.
     """
 
-    def __init__(self, tables: Mapping[Table, str], nesting: int) -> None:
+    def __init__(self, tables: Mapping[SelectionTable, str], nesting: int) -> None:
         self.tables, self._nesting = tables, nesting
 
     def body(self, program: Program, names: dict[int, str], prefix: str, lines: list[str]) -> list[str]:
@@ -204,7 +204,7 @@ class _Writer:
 
     def _value(self, operand: Any, names: Mapping[int, str]) -> str:
         """Return a name, or a constant exactly."""
-        if isinstance(operand, Table):
+        if isinstance(operand, SelectionTable):
             return self.tables[operand]
         if isinstance(operand, Symbol):
             return names[operand.index]
@@ -213,7 +213,7 @@ class _Writer:
 
 def _exact_operands(symbol: Symbol) -> list[Any]:
     """Return the operands of an operation; constants among bits as integers."""
-    if isinstance(symbol.operands[0], Table) or symbol.operation == "item":
+    if isinstance(symbol.operands[0], SelectionTable) or symbol.operation == "item":
         return list(symbol.operands)
     return [
         int(operand) if kind is Kind.BITS and not isinstance(operand, Symbol) else operand

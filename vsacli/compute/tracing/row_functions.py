@@ -154,14 +154,14 @@ def _unpacking(letter: str, count: int, whole: str) -> str:
     return f" ({''.join(f'{letter}{number}, ' for number in range(count))}) = {whole}"
 
 
-class _Row(NamedTuple):
+class _RowIndex(NamedTuple):
     """Index of a row among those of its kind; inputs come first."""
 
     kind: Kind
     place: int
 
 
-_Source = _Row | npt.NDArray[Any]
+_Source = _RowIndex | npt.NDArray[Any]
 """A row, or a constant as an array ()."""
 
 
@@ -170,7 +170,7 @@ class _Call(NamedTuple):
 
     function: RowFunction
     given: list[_Source]
-    results: list[_Row]
+    results: list[_RowIndex]
 
 
 class CallingRowFunction:
@@ -227,7 +227,7 @@ class CallingRowFunction:
 
 
 def _found(source: _Source, values: dict[Kind, list[Any]]) -> Any:
-    return values[source.kind][source.place] if isinstance(source, _Row) else source
+    return values[source.kind][source.place] if isinstance(source, _RowIndex) else source
 
 
 def _source(operand: Operand, places: Workspace) -> _Source:
@@ -236,5 +236,5 @@ def _source(operand: Operand, places: Workspace) -> _Source:
     return np.array(operand, dtype=np.float64)
 
 
-def _row(symbol: Symbol, places: Workspace) -> _Row:
-    return _Row(symbol.kind, places.slot[symbol.index])
+def _row(symbol: Symbol, places: Workspace) -> _RowIndex:
+    return _RowIndex(symbol.kind, places.slot[symbol.index])

@@ -17,9 +17,9 @@ from vsacli.compute.tracing.program import (
     Kind,
     Loop,
     Program,
+    SelectionTable,
     Subroutine,
     Symbol,
-    Table,
     kind_of,
     kinds_of_operands,
 )
@@ -114,7 +114,7 @@ def _subroutine(subroutine: Subroutine, *operands: Any) -> Results:
     return dict(enumerate(_run(subroutine.body, list(operands))))
 
 
-def _entries(table: Table) -> FloatArray:
+def _entries(table: SelectionTable) -> FloatArray:
     return np.array([single(value) for value in table.values], dtype=np.float32)
 
 

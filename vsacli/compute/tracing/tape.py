@@ -17,9 +17,9 @@ from vsacli.compute.tracing.program import (
     Loop,
     Operand,
     Program,
+    SelectionTable,
     Subroutine,
     Symbol,
-    Table,
     kind_of,
     operation_count,
     result_kind,
@@ -74,7 +74,7 @@ class Tape:
         self._inputs.append(symbol)
         return symbol
 
-    def emit(self, operation: str, *operands: Operand | Table) -> Operand:
+    def emit(self, operation: str, *operands: Operand | SelectionTable) -> Operand:
         """Return the result of an operation on symbols and constants, named as the NumPy function.
 
         In addition there are `bits(truth, mask)`, the mask where true, else 0; and `take(table, index)`.
@@ -150,7 +150,7 @@ class Tape:
 
 def _python_number(operand: Any) -> Any:
     """Return constants as numbers of Python."""
-    return operand if isinstance(operand, Symbol | Table | int | OfRounding) else float(operand)
+    return operand if isinstance(operand, Symbol | SelectionTable | int | OfRounding) else float(operand)
 
 
 def _key(operation: str, operands: tuple[Any, ...]) -> Hashable:
@@ -159,7 +159,7 @@ def _key(operation: str, operands: tuple[Any, ...]) -> Hashable:
         operand.index
         if isinstance(operand, Symbol)
         else operand
-        if isinstance(operand, Table)
+        if isinstance(operand, SelectionTable)
         else repr(operand)
         for operand in operands
     ]

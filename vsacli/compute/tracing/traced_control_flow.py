@@ -21,7 +21,7 @@ from vsacli.compute.control_flow import (
     where_needed_on,
 )
 from vsacli.compute.tracing.array import TracedArray, cells_of, each_entry, trace
-from vsacli.compute.tracing.program import Kind, Operand, Program, Symbol, Table, kind_of
+from vsacli.compute.tracing.program import Kind, Operand, Program, SelectionTable, Symbol, kind_of
 from vsacli.compute.tracing.tape import Tape
 
 Function = Callable[..., Any]
@@ -89,7 +89,7 @@ def _nested(
 def look_up_traced(index: TracedArray, tables: Sequence[Any]) -> tuple[TracedArray, ...]:
     """Record `control_flow.look_up`."""
     return tuple(
-        _taken(index, Table(tuple(np.asarray(table, dtype=np.float64).tolist()))) for table in tables
+        _taken(index, SelectionTable(tuple(np.asarray(table, dtype=np.float64).tolist()))) for table in tables
     )
 
 
@@ -99,7 +99,7 @@ def cell_traced(position: Any, count: int) -> Any:
     return np.searchsorted(np.arange(1, count), position, side="right")
 
 
-def _taken(index: TracedArray, table: Table) -> TracedArray:
+def _taken(index: TracedArray, table: SelectionTable) -> TracedArray:
     tape = index.tape
     return TracedArray(tape, each_entry(lambda cell: tape.emit("take", table, cell), index.cells))
 
@@ -140,7 +140,7 @@ class _Constant:
     value: Any = field(compare=False)
 
 
-class _Array(NamedTuple):
+class _ArrayForm(NamedTuple):
     """A traced array, by its shape and the forms of its cells."""
 
     shape: tuple[int, ...]
@@ -203,7 +203,7 @@ def _recorded(function: Function, form: Any, kinds: Sequence[Kind], *, short: bo
 def _form(tree: Any, found: dict[Symbol, int]) -> Any:
     """Return the form of arguments or a result without its symbols, which are collected."""
     if isinstance(tree, TracedArray):
-        return _Array(tree.shape, tuple(_form(cell, found) for cell in tree.cells.flat))
+        return _ArrayForm(tree.shape, tuple(_form(cell, found) for cell in tree.cells.flat))
     if isinstance(tree, Symbol):
         return _Value(found.setdefault(tree, len(found)), tree.kind)
     if isinstance(tree, dict):
@@ -227,7 +227,7 @@ def _made(form: Any, tape: Tape, values: Sequence[Operand]) -> Any:
         return values[form.number]
     if isinstance(form, _Constant):
         return form.value
-    if isinstance(form, _Array):
+    if isinstance(form, _ArrayForm):
         cells = np.empty(len(form.cells), dtype=object)
         cells[:] = [_made(cell, tape, values) for cell in form.cells]
         return TracedArray(tape, cells.reshape(form.shape))

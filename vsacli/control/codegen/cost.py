@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from vsacli.compute.tracing import Program, Symbol
 from vsacli.compute.tracing.c_code import Tables
-from vsacli.compute.tracing.program import FUNCTIONS, Branch, Call, Loop, Subroutine, Table
+from vsacli.compute.tracing.program import FUNCTIONS, Branch, Call, Loop, SelectionTable, Subroutine
 from vsacli.control.codegen.scalar import BYTES, scalar_dialect
 
 BYTES_OF_PLACE = 4
@@ -66,6 +66,6 @@ def _of_operation(symbol: Symbol) -> Cost:
         return worst_cost(nested.body)
     if symbol.operation == "item":
         return Cost(0, 0, 0)
-    if symbol.operation == "searchsorted" and isinstance(nested, Table):
+    if symbol.operation == "searchsorted" and isinstance(nested, SelectionTable):
         return Cost(math.ceil(math.log2(len(nested.values) + 1)), 0, 1)
     return Cost(1, int(symbol.operation in FUNCTIONS), 0)

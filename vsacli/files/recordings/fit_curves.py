@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.signals import COMMANDED, POSITION, Signal
 from vsacli.documents.csv_file import read_header
-from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
+from vsacli.results.charts.measured import AmplitudeSpectrum, Highest, RecordedCurve
 from vsacli.results.charts.reduction import Curve
 from vsacli.results.store.excerpt import WHOLE, Span, joint_numbers, steps_between
 from vsacli.robot.commanded_joints import CommandedJoints
@@ -159,7 +159,7 @@ def _curve(
 
 def _spectrum(
     time: FloatArray, recorded: FloatArray, fitted: FloatArray, stated: Mapping[str, Any]
-) -> Spectrum:
+) -> AmplitudeSpectrum:
     """Return densities in bands of equal logarithmic width, from equally spaced samples."""
     count, step = len(time), float(time[1] - time[0])
     window = np.sin(np.pi * (np.arange(count) + 0.5) / count) ** WINDOW_POWER
@@ -180,4 +180,4 @@ def _spectrum(
     cutoff = math.nan if last == len(starts) - 1 else float(frequencies[last : last + 2].mean())
     noise = float(stated["noise"]) * math.sqrt(2 * step)
     above = float(stated.get("filtered_noise", {}).get("above", math.nan))
-    return Spectrum(frequencies, np.sqrt(own), np.sqrt(smooth), noise, cutoff, above)
+    return AmplitudeSpectrum(frequencies, np.sqrt(own), np.sqrt(smooth), noise, cutoff, above)

@@ -79,7 +79,7 @@ class Guess(NamedTuple):
         return f"{self.joint}.{self.quantity}"
 
 
-class _Column(NamedTuple):
+class _QuantityColumn(NamedTuple):
     """A column of a quantity.
 
     Attributes:
@@ -119,7 +119,7 @@ class _Column(NamedTuple):
         return tuple("#" if word.isdecimal() or len(word) == 1 else word for word in self.words)
 
 
-class _Joint(NamedTuple):
+class _GuessedJoint(NamedTuple):
     """The joint of a column, the reason, and whether the name is unambiguous."""
 
     name: str
@@ -158,7 +158,7 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
     return sorted(found.values(), key=lambda guess: (guess.quantity not in TAKEN, guess.place))
 
 
-def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
+def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_QuantityColumn]:
     """Return columns of joints by their names: with a quantity first, then in the order of the roles."""
     places = [place for place in rows.of_numbers if time is None or place != time.place]
     columns = [column for place in places if not rows.is_index(place) for column in _of_name(rows, place)]
@@ -166,12 +166,12 @@ def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_Column]:
     return [column for column in columns if column.role != ERROR]
 
 
-def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
+def _of_name(rows: FirstRows, place: int) -> Iterator[_QuantityColumn]:
     """Yield the meaning of a column by its name; a name without a word for a quantity may mean a position."""
     heading = split_heading(rows.columns[place])[0]
     role, name = role_of(heading)
     if _STIFFNESS.fullmatch(name.strip("_ ")) and min(rows.numbers(place)) > 0:
-        yield _Column(place, "stiffness", words=words_of_column_name(name)[1:], role=role)
+        yield _QuantityColumn(place, "stiffness", words=words_of_column_name(name)[1:], role=role)
         return
     for match in reversed(list(WORDS.finditer(name))):
         quantity = next((key for key, known in QUANTITIES.items() if match[0].lower() in known), None)
@@ -181,13 +181,13 @@ def _of_name(rows: FirstRows, place: int) -> Iterator[_Column]:
                 name[: match.start()],
                 (*words_of_column_name(name[: match.start()]), *words_of_column_name(name[match.end() :])),
             )
-            yield _Column(place, quantity, before, words, int(entry[1]) if entry else None, role=role)
+            yield _QuantityColumn(place, quantity, before, words, int(entry[1]) if entry else None, role=role)
             return
     if heading:
-        yield _Column(place, "q", heading, words_of_column_name(heading), bare=True, role=role)
+        yield _QuantityColumn(place, "q", heading, words_of_column_name(heading), bare=True, role=role)
 
 
-def _of_motor(column: _Column, joints: JointNames) -> _Column:
+def _of_motor(column: _QuantityColumn, joints: JointNames) -> _QuantityColumn:
     """Return a column as that of a motor if its name says of which motor it is, otherwise unchanged."""
     variable = OF_MOTORS.get(column.quantity)
     if variable is None or (column.quantity == "q" and not column.of_motors):
@@ -196,7 +196,9 @@ def _of_motor(column: _Column, joints: JointNames) -> _Column:
     if found is None:
         return column
     motor, words = found
-    return _Column(column.place, f"{variable}_{motor}", column.before, words, of_motor=True, role=column.role)
+    return _QuantityColumn(
+        column.place, f"{variable}_{motor}", column.before, words, of_motor=True, role=column.role
+    )
 
 
 def _labels(rows: FirstRows) -> dict[int, str]:
@@ -209,7 +211,7 @@ def _labels(rows: FirstRows) -> dict[int, str]:
     }
 
 
-def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_Column], dict[int, str]]:
+def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_QuantityColumn], dict[int, str]]:
     """Return the columns of a `sensor_msgs/JointState` without header: stamp, frame, names, three arrays."""
     first = None if time is None or time.nanoseconds is None else time.nanoseconds + 2
     texts = [place for place in range(first or 0, len(rows.columns)) if rows.text(place)]
@@ -218,7 +220,7 @@ def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_Colum
         return [], {}
     numbers = range(first + count, min(first + 4 * count, len(rows.columns)))
     columns = [
-        _Column(place, ARRAYS[at // count], entry=at % count)
+        _QuantityColumn(place, ARRAYS[at // count], entry=at % count)
         for at, place in enumerate(numbers)
         if rows.numbers(place)
     ]
@@ -226,8 +228,8 @@ def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_Colum
 
 
 def _of_robot(
-    columns: Sequence[_Column], labels: Mapping[int, str], joints: JointNames
-) -> list[tuple[_Column, _Joint]]:
+    columns: Sequence[_QuantityColumn], labels: Mapping[int, str], joints: JointNames
+) -> list[tuple[_QuantityColumn, _GuessedJoint]]:
     """Return columns with the joints that their names indicate; if none does, one family in joint order."""
     families = defaultdict(list)
     for column in columns:
@@ -238,15 +240,15 @@ def _of_robot(
         if len(family) == len(joints.names) and not any(map(_is_no_joint, family))
     )
     return [pair for family in families.values() for pair in _matched(family, labels, joints)] or [
-        (column, _Joint(name, f"joint {rank} of the robot, by the order alone", sure=False))
+        (column, _GuessedJoint(name, f"joint {rank} of the robot, by the order alone", sure=False))
         for family in islice(complete, 1)
         for rank, (column, name) in enumerate(zip(family, joints.names, strict=True), 1)
     ]
 
 
 def _matched(
-    family: Sequence[_Column], labels: Mapping[int, str], joints: JointNames
-) -> list[tuple[_Column, _Joint]]:
+    family: Sequence[_QuantityColumn], labels: Mapping[int, str], joints: JointNames
+) -> list[tuple[_QuantityColumn, _GuessedJoint]]:
     """Return the columns of a family that match joints, by their names or by names in their rows.
 
     If columns count from zero and joints from one, or vice versa, numbers are not used.
@@ -261,7 +263,7 @@ def _matched(
         else:
             name, reason = joints.in_words(column.words), ""
         if name:
-            found.append((column, _Joint(name, reason, label in (None, name))))
+            found.append((column, _GuessedJoint(name, reason, label in (None, name))))
         elif label is None:
             unmatched.append(column)
     numbered = [column for column in unmatched if any(word.isdecimal() for word in column.words)]
@@ -269,7 +271,9 @@ def _matched(
     return [] if numbered and shifted else found
 
 
-def _named(columns: Sequence[_Column], labels: Mapping[int, str]) -> Iterator[tuple[_Column, _Joint]]:
+def _named(
+    columns: Sequence[_QuantityColumn], labels: Mapping[int, str]
+) -> Iterator[tuple[_QuantityColumn, _GuessedJoint]]:
     """Yield columns with joints named by their own names, or by names in their rows."""
     rank = 0
     for column in columns:
@@ -280,20 +284,20 @@ def _named(columns: Sequence[_Column], labels: Mapping[int, str]) -> Iterator[tu
         rank += 1
         if label is not None:
             if IDENTIFIER.fullmatch(label):
-                yield column, _Joint(label, f"the rows call it {label}")
+                yield column, _GuessedJoint(label, f"the rows call it {label}")
         elif column.entry is None and IDENTIFIER.fullmatch(last) and last.lower() not in GENERIC:
-            yield column, _Joint(last)
+            yield column, _GuessedJoint(last)
         else:
-            yield column, _Joint(f"joint_{rank}", "by the order alone", sure=False)
+            yield column, _GuessedJoint(f"joint_{rank}", "by the order alone", sure=False)
 
 
-def _is_no_joint(column: _Column) -> bool:
+def _is_no_joint(column: _QuantityColumn) -> bool:
     """Return whether a name indicates a pose, such as `tcp_pos_x`, or no quantity."""
     telling = [word for word in column.words if word not in GENERIC]
     return column.bare or any(word in AXES for word in telling) or bool(telling and set(telling) <= {*POSES})
 
 
-def _source(rows: FirstRows, column: _Column) -> tuple[MappedColumn, str]:
+def _source(rows: FirstRows, column: _QuantityColumn) -> tuple[MappedColumn, str]:
     """Return the mapping of a column, and a remark if its unit is uncertain."""
     heading = rows.columns[column.place]
     own = rows.unit(column.place)

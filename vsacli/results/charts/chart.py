@@ -37,7 +37,7 @@ DEVIATIONS = 2
 """Half-width of the band around a curve, in standard deviations."""
 
 
-class Band(NamedTuple):
+class ShadedArea(NamedTuple):
     """Area around a curve: times, lower and upper edge, each (points,), and number of its look in figures."""
 
     time: FloatArray
@@ -46,7 +46,7 @@ class Band(NamedTuple):
     look: int
 
     @classmethod
-    def around(cls, curve: Curve, deviation: FloatArray, look: int) -> Band | None:
+    def around(cls, curve: Curve, deviation: FloatArray, look: int) -> ShadedArea | None:
         """Return the band of a curve for a standard deviation, (points,); None if that is NaN throughout."""
         if np.isnan(deviation).all():
             return None
@@ -76,7 +76,7 @@ class Line(NamedTuple):
     joint: int | None = None
     file: int = 0
     role: str = "computed"
-    band: Band | None = None
+    band: ShadedArea | None = None
     rms: float | None = None
 
 
@@ -175,7 +175,7 @@ Legend: TypeAlias = Mapping[str, int]
 Row: TypeAlias = Sequence[Chart | None]
 
 
-class Block(NamedTuple):
+class PanelGrid(NamedTuple):
     """Panels in rows and columns; the panels of a column share a time axis.
 
     Attributes:
@@ -225,7 +225,7 @@ class Sheet(NamedTuple):
     title: str
     size: tuple[float, float]
     legend: Legend
-    blocks: Sequence[Block]
+    blocks: Sequence[PanelGrid]
     widths: Sequence[float] = (1.0,)
 
 

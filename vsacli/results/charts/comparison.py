@@ -15,7 +15,7 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.base.texts import counted, one_line
-from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Sheet
+from vsacli.results.charts.chart import PANEL_WIDTH, Chart, PanelGrid, Sheet
 from vsacli.results.charts.figures import (
     axis_label,
     drawable_variables,
@@ -23,7 +23,7 @@ from vsacli.results.charts.figures import (
     variable_words,
 )
 from vsacli.results.charts.reduction import GROWING
-from vsacli.results.charts.stored import Signals, StoredCharts
+from vsacli.results.charts.stored import StoredCharts, StoredSignals
 from vsacli.results.store.reader import StoredResult
 
 
@@ -139,7 +139,7 @@ def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
         rows.append([_over(charts, compared, signals, joint, column) for column in there_in])
         rows.append([_apart(charts, compared, differences, joint, column) for column in there_in])
     time = np.sort(np.concatenate([file.time[[0, -1]] for file in charts.files]))
-    block = Block(time, rows, HEIGHTS, MOST_ROWS)
+    block = PanelGrid(time, rows, HEIGHTS, MOST_ROWS)
     size = (max(2, block.columns) * PANEL_WIDTH, block.height + 1.2)
     robots = " / ".join(dict.fromkeys(file.robot_name for file in charts.files))
     legend = {label: number for number, label in enumerate(distinct_labels(charts.files))}
@@ -148,7 +148,7 @@ def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
 
 
 def _over(
-    charts: StoredCharts, compared: _Compared, signals: Signals, joint: int, column: int | None
+    charts: StoredCharts, compared: _Compared, signals: StoredSignals, joint: int, column: int | None
 ) -> Chart | None:
     if column is None:
         return None
@@ -164,7 +164,7 @@ def _over(
 
 
 def _apart(
-    charts: StoredCharts, compared: _Compared, differences: Signals, joint: int, column: int | None
+    charts: StoredCharts, compared: _Compared, differences: StoredSignals, joint: int, column: int | None
 ) -> Chart | None:
     if column is None:
         return None

@@ -25,7 +25,7 @@ from vsacli.base.variables import (
     deviation,
     select_variables,
 )
-from vsacli.results.charts.chart import PANEL_WIDTH, Block, Chart, Legend, Row, Sheet
+from vsacli.results.charts.chart import PANEL_WIDTH, Chart, Legend, PanelGrid, Row, Sheet
 from vsacli.results.charts.stored import StoredCharts, compliant_joints
 from vsacli.results.charts.tool_charts import AXES, ToolPath, tool_charts, tool_path
 from vsacli.results.store.reader import StoredResult
@@ -123,7 +123,7 @@ def _of_parts(*parts: Part) -> Drawing:
     return Drawing(tuple(name for name, _ in parts), lambda charts: grouped(charts, *parts))
 
 
-def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> Block:
+def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> PanelGrid:
     """Return a row of panels for each group of joints with the variable.
 
     Limits of several joints in one panel could not be told apart: their utilization has a row of its own.
@@ -153,7 +153,7 @@ def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> Block:
     else:
         rows, heights = rows[::2], (GROUP_HEIGHT,)
     named = named and legend_width(charts) > 0
-    return Block(charts.first.time, rows, heights, beside=beside if named else ())
+    return PanelGrid(charts.first.time, rows, heights, beside=beside if named else ())
 
 
 def legend_width(charts: StoredCharts) -> float:
@@ -161,7 +161,7 @@ def legend_width(charts: StoredCharts) -> float:
     return LEGEND_WIDTH if len(charts.first.joint_names) > JOINTS_PER_PANEL else 0.0
 
 
-def _legend(charts: StoredCharts, blocks: Sequence[Block]) -> dict[str, int]:
+def _legend(charts: StoredCharts, blocks: Sequence[PanelGrid]) -> dict[str, int]:
     """Return the legend of the joints with a curve; empty if their names are next to the panels."""
     drawn = {
         line.joint
@@ -176,13 +176,13 @@ def _legend(charts: StoredCharts, blocks: Sequence[Block]) -> dict[str, int]:
     return {} if legend_width(charts) else {name: joint for joint, name in names if joint in drawn}
 
 
-def _corridors(charts: StoredCharts, most_rows: int, height: float) -> Block:
+def _corridors(charts: StoredCharts, most_rows: int, height: float) -> PanelGrid:
     """Return the stiffness of each joint within its attainable range, in rows of this height, inches."""
     rows = [
         [replace(chart, failures=[(each, [joint]) for each in charts.failures])]
         for joint, chart in zip(charts.compliant, charts.corridors(), strict=True)
     ]
-    return Block(charts.first.time, rows, (height,), most_rows)
+    return PanelGrid(charts.first.time, rows, (height,), most_rows)
 
 
 def feasibility(charts: StoredCharts) -> Sheet:
@@ -268,7 +268,7 @@ def _simulated_motion(charts: StoredCharts) -> Sheet:
         [panel(joint, name) if has_it else None for name, has_it in zip(names, of_joint, strict=True)]
         for joint, of_joint in enumerate(there)
     ]
-    block = Block(first.time, rows, (MOTION_HEIGHT,), MOTION_ROWS)
+    block = PanelGrid(first.time, rows, (MOTION_HEIGHT,), MOTION_ROWS)
     size = (max(2, block.columns) * PANEL_WIDTH, block.height + 1.2)
     return Sheet(result_title(first), size, _ROLES, [block])
 
@@ -280,7 +280,7 @@ def _tool_stiffness(charts: StoredCharts) -> Sheet:
     beside: list[Legend] = [tools, *({axis: look for look, axis in enumerate(AXES)} for _ in directions)]
     rows = [[chart] for chart in (stiffness, *directions)]
     heights = (GROUP_HEIGHT, *(UTILIZATION * GROUP_HEIGHT for _ in directions))
-    block = Block(charts.first.time, rows, heights, beside=beside)
+    block = PanelGrid(charts.first.time, rows, heights, beside=beside)
     return Sheet(result_title(charts.first), (2 * PANEL_WIDTH + LEGEND_WIDTH, block.height + 1), {}, [block])
 
 

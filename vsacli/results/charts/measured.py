@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.charts.chart import DIFFERENCE, PANEL_WIDTH, Block, Chart, Line, Sheet
+from vsacli.results.charts.chart import DIFFERENCE, PANEL_WIDTH, Chart, Line, PanelGrid, Sheet
 from vsacli.results.charts.reduction import Curve
 
 MOST_ROWS = 8
@@ -63,13 +63,13 @@ def measured_sheet(curves: Sequence[MeasuredCurve], title: str, computed: str = 
         computed: label of the curves compared with the measured ones.
     """
     time = np.array([min(c.time[0] for c in curves), max(c.time[-1] for c in curves)])
-    block = Block(time, [curve.charts(computed) for curve in curves], (ROW_HEIGHT,), MOST_ROWS)
+    block = PanelGrid(time, [curve.charts(computed) for curve in curves], (ROW_HEIGHT,), MOST_ROWS)
     size = (PANEL_WIDTH * block.columns, block.height + 1)
     legend = {computed: 0, "measured": 1, f"measured minus {computed}": DIFFERENCE}
     return Sheet(title, size, legend, [block])
 
 
-class Spectrum(NamedTuple):
+class AmplitudeSpectrum(NamedTuple):
     """Amplitude densities of a recording, in its unit per square root of Hz.
 
     Attributes:
@@ -134,5 +134,5 @@ class RecordedCurve(NamedTuple):
     rms: float
     noise: float
     inside: tuple[float, float]
-    spectrum: Spectrum
+    spectrum: AmplitudeSpectrum
     highest: Highest

@@ -14,11 +14,11 @@ from vsacli.results.charts.chart import (
     ATTAINABLE,
     DEVIATIONS,
     PANEL_WIDTH,
-    Band,
-    Block,
     Chart,
     Limit,
     Line,
+    PanelGrid,
+    ShadedArea,
     Sheet,
 )
 from vsacli.results.charts.reduction import Curve, visible_range
@@ -52,7 +52,7 @@ class Moved(NamedTuple):
 
     def stiffness_line(self, look: int) -> Line:
         """Return the stiffness as a line; at the optimum with its attainable range."""
-        band = Band(self.place, self.lower, self.upper, look)
+        band = ShadedArea(self.place, self.lower, self.upper, look)
         there = look == AFTER and not np.isnan(self.lower).all()
         return Line(Curve.reduced(self.place, self.stiffness), look, band=band if there else None)
 
@@ -61,7 +61,7 @@ class Moved(NamedTuple):
         return Line(Curve.reduced(self.place, self.torques[motor - 1]), look)
 
 
-class JointChange(NamedTuple):
+class OptimizedJoint(NamedTuple):
     """A joint before and after optimization.
 
     Attributes:
@@ -110,7 +110,7 @@ class JointChange(NamedTuple):
         return Chart(title, unit, lines, axis, limits=limits)
 
 
-def change_sheet(joints: Sequence[JointChange], title: str, *, along_path: bool) -> Sheet:
+def change_sheet(joints: Sequence[OptimizedJoint], title: str, *, along_path: bool) -> Sheet:
     """Return a figure with a row of panels for each joint: stiffness, and the torque of each motor.
 
     Args:
@@ -123,7 +123,7 @@ def change_sheet(joints: Sequence[JointChange], title: str, *, along_path: bool)
     panels = [[joint.torque(motor) for motor in motors] for joint in joints]
     if any(stiffness):
         panels = [[chart, *torques] for chart, torques in zip(stiffness, panels, strict=True)]
-    block = Block(joints[0].before.place, panels, (ROW_HEIGHT,), MOST_ROWS)
+    block = PanelGrid(joints[0].before.place, panels, (ROW_HEIGHT,), MOST_ROWS)
     if along_path:
         block = block._replace(xlabel=SHORT_PATH)
     size = (max(2, block.columns) * PANEL_WIDTH, block.height + 1)
@@ -146,11 +146,11 @@ def pace_sheet(place: FloatArray, speed: FloatArray, uniform: float, title: str)
             lines.append(Line(Curve(ends, np.full(2, value)), look))
             legend[label] = look
     chart = Chart("", "", lines, "relative speed", from_zero=True)
-    block = Block(ends, [[chart]], (PACE_HEIGHT,), xlabel=PATH)
+    block = PanelGrid(ends, [[chart]], (PACE_HEIGHT,), xlabel=PATH)
     return Sheet(title, (2 * PANEL_WIDTH, PACE_HEIGHT + 1), legend, [block])
 
 
-class Torque(NamedTuple):
+class MotorTorqueCurve(NamedTuple):
     """Torque of a motor over time, with its standard deviation; arrays (samples,)."""
 
     joint: str
@@ -168,18 +168,18 @@ class Torque(NamedTuple):
         return Chart(
             title=f"{self.joint}, motor {self.motor}",
             unit=unit,
-            lines=[Line(curve, 0, band=Band.around(curve, self.deviation, look=1))],
+            lines=[Line(curve, 0, band=ShadedArea.around(curve, self.deviation, look=1))],
             axis=rf"$\tau_{self.motor}$ [{unit}]",
             shown=(low - room, high + room),
         )
 
 
-def band_sheet(time: FloatArray, torques: Sequence[Torque], title: str) -> Sheet:
+def band_sheet(time: FloatArray, torques: Sequence[MotorTorqueCurve], title: str) -> Sheet:
     """Return a figure of motor torques with their bands, a row of panels for each joint."""
     by_joint: dict[str, dict[int, Chart]] = {}
     for torque in torques:
         by_joint.setdefault(torque.joint, {})[torque.motor] = torque.chart(time)
     rows = [[charts.get(motor) for motor in MOTORS] for charts in by_joint.values()]
-    block = Block(time, rows, (BAND_HEIGHT,), MOST_ROWS)
+    block = PanelGrid(time, rows, (BAND_HEIGHT,), MOST_ROWS)
     size = (block.columns * PANEL_WIDTH, block.height + 1)
     return Sheet(title, size, {"computed": 0}, [block])

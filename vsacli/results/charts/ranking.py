@@ -16,7 +16,7 @@ ABSOLUTE = {"m": (1e-3, "1 mm"), "rad": (math.radians(1), "1 deg")}
 """Absolute changes of lengths and angles, by unit; other parameters change by a share of their value."""
 
 
-class Bar(NamedTuple):
+class EffectBar(NamedTuple):
     """The effect of a change of a parameter.
 
     Attributes:
@@ -34,7 +34,7 @@ class Ranking(NamedTuple):
     """The most important parameters, in order, with the title of their figure."""
 
     title: str
-    bars: Sequence[Bar]
+    bars: Sequence[EffectBar]
 
     @classmethod
     def of(cls, report: Mapping[str, Any], joints: Sequence[str]) -> Ranking:
@@ -54,14 +54,14 @@ class Ranking(NamedTuple):
         return cls(f"sensitivity of {report['robot']}, {report['trajectory']}: {shown}", bars)
 
 
-def _bars(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> Iterator[Bar]:
+def _bars(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> Iterator[EffectBar]:
     """Yield a bar for each parameter that changes a motor torque."""
     for effect in effects:
         shares = {joint: each["share"] or 0.0 for joint, each in effect["joints"].items()}
         joint = max(shares, key=lambda name: shares[name], default=None)
         if joint is not None and shares[joint] > 0:
             words = parameter_words(effect["path"], effect["unit"], joints)
-            yield Bar(f"{_change(effect)} of {words}", shares[joint], joint)
+            yield EffectBar(f"{_change(effect)} of {words}", shares[joint], joint)
 
 
 def _change(effect: Mapping[str, Any]) -> str:

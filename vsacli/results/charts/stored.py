@@ -1,8 +1,8 @@
 """Charts of stored results and simulations, of one file or of several on the same axes.
 
-`Signals` reads and reduces a variable once. `StoredCharts` makes its charts: curves with standard deviations,
-limits, axis ranges without near-singular peaks, attainable stiffness, and differences. `charts_of` returns
-everything that a page shows of a variable.
+`StoredSignals` reads and reduces a variable once. `StoredCharts` makes its charts: curves with standard
+deviations, limits, axis ranges without near-singular peaks, attainable stiffness, and differences.
+`charts_of` returns everything that a page shows of a variable.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vsacli.base.variables import (
     deviation,
 )
 from vsacli.base.wrench import WRENCH_AXES
-from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Band, Chart, Failures, Limit, Line
+from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Chart, Failures, Limit, Line, ShadedArea
 from vsacli.results.charts.reduction import (
     BLOCK,
     GROWING,
@@ -52,7 +52,7 @@ By: TypeAlias = Literal["joint", "file", "role"]
 """Property that the looks of the lines of a chart distinguish."""
 
 
-class Difference:
+class ResultDifference:
     """A result minus another one, at the times of the former that both cover; the latter is interpolated.
 
     Attributes:
@@ -100,7 +100,7 @@ class Difference:
             return np.asarray(np.sqrt(np.divide(total, count)))
 
 
-class Signals:
+class StoredSignals:
     """A variable of each joint of some files, in all roles stored there.
 
     Args:
@@ -137,7 +137,7 @@ class Signals:
         curves, band = self._curves[file][joint], None
         curve = curves[at * self._width + column]
         if self._spread:
-            band = Band.around(curve, curves.values[len(self._roles) * self._width + column], look)
+            band = ShadedArea.around(curve, curves.values[len(self._roles) * self._width + column], look)
         rms = None if self._rms is None else float(self._rms[file][joint, column])
         return Line(curve, look, self._names[joint], joint, joint, file, self._roles[at], band, rms)
 
@@ -177,22 +177,26 @@ class StoredCharts:
         """Return which curves of a variable any file has at each joint, (joints, 1 or 2)."""
         return np.asarray(np.any([file.existing(variable) for file in self.files], axis=0))
 
-    def signals(self, roles: Mapping[str, str], *, uncertain: bool = True) -> Signals:
+    def signals(self, roles: Mapping[str, str], *, uncertain: bool = True) -> StoredSignals:
         """Read a variable by the names of its roles, with its standard deviation if `uncertain`."""
         name = next(iter(roles))
         spread = deviation(name) if uncertain and deviation(name) in self.common else ""
         width = self.existing(self.first.declared[name]).shape[1]
-        return Signals(dict(enumerate(self.files)), roles, width, spread)
+        return StoredSignals(dict(enumerate(self.files)), roles, width, spread)
 
-    def differences(self, name: str) -> Signals:
+    def differences(self, name: str) -> StoredSignals:
         """Read a variable of the other files minus that of the first file, at common times."""
-        several = {number: Difference(file, self.first) for number, file in enumerate(self.files[1:], 1)}
+        several = {
+            number: ResultDifference(file, self.first) for number, file in enumerate(self.files[1:], 1)
+        }
         apart = {number: each for number, each in several.items() if each.time.size}
         rms = {number: each.rms(name).reshape(len(each.joint_names), -1) for number, each in apart.items()}
-        return Signals(apart, {name: "computed"}, self.existing(self.first.declared[name]).shape[1], rms=rms)
+        return StoredSignals(
+            apart, {name: "computed"}, self.existing(self.first.declared[name]).shape[1], rms=rms
+        )
 
     def chart(
-        self, name: str, signals: Signals, column: int, joints: Sequence[int], by: By = "joint"
+        self, name: str, signals: StoredSignals, column: int, joints: Sequence[int], by: By = "joint"
     ) -> Chart:
         """Return the chart of a curve of some joints, all of one type, without title."""
         lines = signals.lines(column, joints, by)
@@ -282,7 +286,7 @@ class StoredCharts:
             band = None
             if edges and not np.isnan(edges[0]).all():
                 lower, upper = edges
-                band = Band(time, lower, upper, joint)
+                band = ShadedArea(time, lower, upper, joint)
             line = Line(curves[joint][0], joint, self.first.joint_names[joint], joint, joint, band=band)
             yield Chart(
                 title=self.first.joint_names[joint],

@@ -22,7 +22,7 @@ from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
 from vsacli.base.variables import VARIABLES, Labels, row_shape, variables_by_tool
 from vsacli.results.exports.result_format import ResultFormat
-from vsacli.results.exports.selection import Chosen, Samples, Selection
+from vsacli.results.exports.selection import Chosen, ExportSamples, Selection
 from vsacli.results.store.schema import storage_type, variable_attributes
 
 if TYPE_CHECKING:
@@ -234,7 +234,7 @@ def write_joint_trajectory(selection: Selection, stream: TextIO, done: Callable[
     stream.write("\n]}\n")
 
 
-def _points(selection: Selection, block: Samples) -> Iterator[dict[str, Any]]:
+def _points(selection: Selection, block: ExportSamples) -> Iterator[dict[str, Any]]:
     values = block.values
     present = {field: values[name].tolist() for field, name in FIELDS.items() if name in values}
     since = np.rint((block.time - selection.time[0]) * NANOSECONDS).astype(np.int64).tolist()

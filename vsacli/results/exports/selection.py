@@ -95,7 +95,7 @@ class Chosen:
         return np.select(faulty, [FAULTS.index(MISSING), FAULTS.index(INFINITE)]).astype(np.uint8)
 
 
-class Samples(NamedTuple):
+class ExportSamples(NamedTuple):
     """Consecutive samples of an export: times, (samples,), s, and values, (samples, ...), by name."""
 
     time: FloatArray
@@ -153,10 +153,10 @@ class Selection:
         for start in range(0, max(1, count), length):
             yield start, min(start + length, count)
 
-    def blocks(self) -> Iterator[Samples]:
+    def blocks(self) -> Iterator[ExportSamples]:
         """Yield all samples in blocks that fit into memory; at least one block."""
         for start, stop in self.spans(self.chosen):
-            yield Samples(
+            yield ExportSamples(
                 self.time[start:stop], {each.name: self.read(each, start, stop) for each in self.chosen}
             )
 

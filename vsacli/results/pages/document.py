@@ -39,7 +39,7 @@ FAIR = ("over_limit", "unreliable", "off_target", "unidentifiable")
 TOO_LONG = "too long for a page"
 
 
-class Library(NamedTuple):
+class ScriptLibrary(NamedTuple):
     """A script library for a page.
 
     Attributes:
@@ -51,7 +51,7 @@ class Library(NamedTuple):
     scripts: tuple[str, ...]
 
 
-def plotting_library() -> Library:
+def plotting_library() -> ScriptLibrary:
     """Return the installed library; its files are read directly, since importing Bokeh takes a second.
 
     Raises:
@@ -64,7 +64,9 @@ def plotting_library() -> Library:
         raise InputError.one(reason) from None
     folder = Path(str(installed.locate_file("bokeh/server/static/js")))
     scripts = (folder / name for name in LIBRARY_SCRIPTS)
-    return Library(f"Bokeh {installed.version}", tuple(each.read_text(encoding="utf-8") for each in scripts))
+    return ScriptLibrary(
+        f"Bokeh {installed.version}", tuple(each.read_text(encoding="utf-8") for each in scripts)
+    )
 
 
 class FixText(NamedTuple):
@@ -120,7 +122,7 @@ class InputText(NamedTuple):
 
 
 def rendered(
-    library: Library, title: str, texts: Sequence[PageTexts], data: Mapping[str, Any], packed: Packed
+    library: ScriptLibrary, title: str, texts: Sequence[PageTexts], data: Mapping[str, Any], packed: Packed
 ) -> str:
     """Return the page as HTML.
 

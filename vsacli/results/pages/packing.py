@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vsacli.base.json_records import json_value
-from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Band, Chart
+from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Chart, ShadedArea
 
 BEYOND = 5.0
 """Height up to which the attainable range extends beyond the initial view, in heights of that view."""
@@ -76,7 +76,7 @@ class Packed:
             "note": "; ".join(filter(None, [CUT_OFF if chart.cut_off else "", chart.note])),
         }
 
-    def _band(self, band: Band, chart: Chart) -> tuple[int, int]:
+    def _band(self, band: ShadedArea, chart: Chart) -> tuple[int, int]:
         """Return the numbers of lower and upper edge; an attainable range is cut off far outside the view."""
         low, high = band.low, band.high
         if chart.band == ATTAINABLE and chart.shown is not None:

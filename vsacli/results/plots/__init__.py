@@ -21,14 +21,14 @@ from vsacli.results.plots.figures import (
 from vsacli.results.plots.recorded_figure import recorded_figure
 from vsacli.results.plots.robot_figures import actuators_figure, stiffness_figure
 from vsacli.results.plots.sheets import drawn
-from vsacli.results.plots.sizing_figure import Bounds, TorqueSpeed, torque_speed_figure
+from vsacli.results.plots.sizing_figure import MotorLimits, TorqueSpeed, torque_speed_figure
 from vsacli.results.plots.study_figures import compared_studies, ranking_figure, study_figures
 
 __all__ = [
     "FORMATS",
-    "Bounds",
     "FigureFiles",
     "Figures",
+    "MotorLimits",
     "TorqueSpeed",
     "actuators_figure",
     "arm_figure",

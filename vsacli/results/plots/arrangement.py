@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias, TypeVar
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vsacli.results.charts.chart import PANEL_WIDTH, Block, Sheet
+from vsacli.results.charts.chart import PANEL_WIDTH, PanelGrid, Sheet
 from vsacli.results.charts.figures import LEGEND_WIDTH
 from vsacli.results.charts.look import CM_PER_INCH, current_look
 from vsacli.results.plots.styles import new_figure
@@ -54,7 +54,7 @@ class Arrangement(NamedTuple):
     """
 
     natural: Size
-    blocks: list[Block]
+    blocks: list[PanelGrid]
     stacked: bool
     shares: list[float]
 
@@ -133,7 +133,7 @@ def _in_columns(sheet: Sheet, columns: int) -> Arrangement:
     return Arrangement((width, height), blocks, stacked=True, shares=heights)
 
 
-def _refolded(block: Block, columns: int) -> Block:
+def _refolded(block: PanelGrid, columns: int) -> PanelGrid:
     """Return a block with at most this number of panels side by side."""
     block = _divided(block, columns)
     if block.most_rows is None:
@@ -143,7 +143,7 @@ def _refolded(block: Block, columns: int) -> Block:
     return block._replace(most_rows=math.ceil(groups / folds))
 
 
-def _divided(block: Block, columns: int) -> Block:
+def _divided(block: PanelGrid, columns: int) -> PanelGrid:
     """Return a block whose rows are divided where they have more panels than that; the first part is short.
 
     Groups of rows stay together, so that a difference remains below its curves.

@@ -275,7 +275,7 @@ def _shade(
     return handles
 
 
-class _Peak(NamedTuple):
+class _ClippedPeak(NamedTuple):
     """The extreme point of an interval in which a curve leaves the panel."""
 
     time: float
@@ -296,17 +296,17 @@ def _mark_peaks(axes: Axes, lines: Sequence[Line], floor: float) -> list[Artist]
     return [Line2D([], [], marker="^", color="0.4", **scaled(_MARK), label="cut off, near-singular")]
 
 
-def _peaks(line: Line, sign: int, end: float) -> list[_Peak]:
+def _peaks(line: Line, sign: int, end: float) -> list[_ClippedPeak]:
     """Return the extreme point of each interval beyond one end of the panel."""
     time, values, color = line.curve.time, line.curve.values, line_style(line.look).color
     heights = np.where(np.isnan(values), -np.inf, sign * values)
     changes = np.flatnonzero(np.diff(heights > sign * end, prepend=False, append=False))
     stretches = changes.reshape(-1, 2).tolist()
     points = [start + int(np.argmax(heights[start:stop])) for start, stop in stretches]
-    return [_Peak(float(time[at]), float(values[at]), color) for at in points]
+    return [_ClippedPeak(float(time[at]), float(values[at]), color) for at in points]
 
 
-def _mark(axes: Axes, peaks: Sequence[_Peak], sign: int, middle: float, edge: float) -> None:
+def _mark(axes: Axes, peaks: Sequence[_ClippedPeak], sign: int, middle: float, edge: float) -> None:
     """Draw a triangle for each peak at an edge of the panel, and write the value of the largest."""
     place = axes.get_xaxis_transform()
     marker = "^" if sign > 0 else "v"

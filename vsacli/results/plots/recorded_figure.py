@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.results.charts.chart import DIFFERENCE, PANEL_WIDTH, folding
-from vsacli.results.charts.measured import Highest, RecordedCurve, Spectrum
+from vsacli.results.charts.measured import AmplitudeSpectrum, Highest, RecordedCurve
 from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.panels import ZERO, add_title, draw_curve
 from vsacli.results.plots.sheets import AxesGrid, complete, share_time
@@ -161,7 +161,7 @@ def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> l
     return [*handles, *_draw_bands(axes, spectrum)]
 
 
-def _draw_bands(axes: Axes, spectrum: Spectrum) -> list[Artist]:
+def _draw_bands(axes: Axes, spectrum: AmplitudeSpectrum) -> list[Artist]:
     """Shade the frequency band of the motion, and that of noise below the cut-off of the spline."""
     first, last = float(spectrum.frequencies[0]), float(spectrum.frequencies[-1])
     handles: list[Artist] = []

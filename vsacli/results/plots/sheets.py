@@ -17,7 +17,7 @@ from matplotlib.legend import Legend
 from vsacli.base.arrays import FloatArray
 from vsacli.base.units import TIME
 from vsacli.results.charts import chart as charts
-from vsacli.results.charts.chart import Block, Sheet
+from vsacli.results.charts.chart import PanelGrid, Sheet
 from vsacli.results.charts.look import current_look
 from vsacli.results.plots.arrangement import arranged
 from vsacli.results.plots.long_texts import LINE, broken, fit_texts
@@ -65,7 +65,7 @@ def line_handles(lines: charts.Legend) -> list[Artist]:
     return [line_handle(line_style(look), label) for label, look in lines.items()]
 
 
-def _draw_block(place: SubplotSpec, block: Block) -> list[Artist]:
+def _draw_block(place: SubplotSpec, block: PanelGrid) -> list[Artist]:
     """Draw the charts of a block; return the legend entries besides those of the lines."""
     handles: list[Artist] = []
     panels = _panels(place, block)
@@ -79,7 +79,7 @@ def _draw_block(place: SubplotSpec, block: Block) -> list[Artist]:
     return handles
 
 
-def _panels(place: SubplotSpec, block: Block) -> AxesGrid:
+def _panels(place: SubplotSpec, block: PanelGrid) -> AxesGrid:
     """Return the panels of a block, (rows, columns); panels without a chart are removed."""
     rows, folds = block.folding
     each, columns = len(block.heights), len(block.rows[0])

@@ -47,7 +47,7 @@ BRAKING = 0.3
 """Opacity of curves while the motor brakes."""
 
 
-class Bounds(NamedTuple):
+class MotorLimits(NamedTuple):
     """Limits of a motor, infinite where there is none.
 
     Attributes:
@@ -94,7 +94,7 @@ class TorqueSpeed(NamedTuple):
     drive: str
     torque_unit: str
     velocity_unit: str
-    bounds: Bounds
+    bounds: MotorLimits
     runs: Mapping[str, tuple[FloatArray, FloatArray]]
     rms: tuple[float, float]
 
@@ -142,12 +142,12 @@ def _end(used: float, bounds: Sequence[float]) -> float:
     return ROOM * max([used, *seen]) or 1.0
 
 
-def _fastest(bounds: Bounds) -> float:
+def _fastest(bounds: MotorLimits) -> float:
     """Return the no-load speed at the maximum voltage."""
     return bounds.max_voltage / bounds.torque_constant if math.isfinite(bounds.max_voltage) else math.inf
 
 
-def _draw_bounds(axes: Axes, bounds: Bounds, right: float, top: float) -> list[Artist]:
+def _draw_bounds(axes: Axes, bounds: MotorLimits, right: float, top: float) -> list[Artist]:
     speed = np.linspace(0, right, POINTS)
     edge = bounds.torque_at(speed)
     handles: list[Artist] = []

@@ -54,7 +54,7 @@ class SimulationWriter(ResultWriter):
         return {} if self._sensed else dict.fromkeys(map(measured, MEASURED), "the run had no sensors")
 
 
-class Number(NamedTuple):
+class ParameterValue(NamedTuple):
     """A parameter of the robot: its path, its value in SI units, and its unit."""
 
     path: str
@@ -92,7 +92,7 @@ class SensitivityWriter(ResultWriter):
         file: Staged,
         robot: Robot,
         trajectory: Trajectory,
-        numbers: Sequence[Number],
+        numbers: Sequence[ParameterValue],
         slopes: Mapping[str, bool],
         *,
         provenance: Mapping[str, str],

@@ -58,7 +58,7 @@ def rows_at_once(steps: int) -> int:
     return 1 + ROWS_AT_ONCE // (1 + steps)
 
 
-class Column(Protocol):
+class StudyColumn(Protocol):
     """A column of a study: name, dimensions after `run`, unit, and short description."""
 
     @property
@@ -78,7 +78,7 @@ class Column(Protocol):
         """Short description."""
 
 
-class Parameter(NamedTuple):
+class VariedParameter(NamedTuple):
     """A parameter that varies: path, unit, and whether its values are numbers rather than texts."""
 
     path: str
@@ -107,14 +107,14 @@ class Head(NamedTuple):
     runs: int
     joint_names: tuple[str, ...]
     joint_types: tuple[str, ...]
-    parameters: tuple[Parameter, ...]
-    columns: Sequence[Column]
+    parameters: tuple[VariedParameter, ...]
+    columns: Sequence[StudyColumn]
     steps: int
     sources: Mapping[str, tuple[Source, ...]]
     provenance: Mapping[str, str]
 
 
-class Rows(NamedTuple):
+class StudyRows(NamedTuple):
     """Consecutive rows: numbers of the runs, and arrays or lists of texts by name."""
 
     run: Sequence[int]
@@ -134,7 +134,7 @@ class StudyWriter(NewFile):
         super().__init__(file)
         self._head, self._rows, self._written = head, rows, 0
 
-    def write(self, rows: Rows) -> None:
+    def write(self, rows: StudyRows) -> None:
         """Append rows.
 
         Raises:
@@ -160,7 +160,7 @@ class StudyWriter(NewFile):
         columns = sum(int(np.prod(self._shape(each)[1:])) for each in self._head.columns)
         return self._rows * 8 * (columns + len(self._head.parameters) + 16)
 
-    def _shape(self, column: Column) -> tuple[int, ...]:
+    def _shape(self, column: StudyColumn) -> tuple[int, ...]:
         lengths = {"step": self._head.steps, "joint": len(self._head.joint_names), "motor": len(MOTORS)}
         return (self._rows, *(lengths[dim] for dim in column.dims))
 
@@ -246,7 +246,7 @@ ALL = slice(None)
 
 
 class StoredColumn(NamedTuple):
-    """A `Column` as read from a table."""
+    """A `StudyColumn` as read from a table."""
 
     name: str
     dims: tuple[str, ...]

@@ -73,7 +73,7 @@ class Filter(NamedTuple):
         return self.smoothed(columns)[:: self.stride]
 
 
-class Signals(NamedTuple):
+class ConditionedRecording(NamedTuple):
     """A conditioned recording on a uniform grid, in SI units on the joint side of the gears.
 
     Attributes:
@@ -100,7 +100,7 @@ class Signals(NamedTuple):
     filter: Filter
     noise: FloatArray | None = None
 
-    def during(self, samples: slice) -> Signals:
+    def during(self, samples: slice) -> ConditionedRecording:
         """Return consecutive samples of the recording."""
         over_time = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta", "tau_motor")
         return self._replace(**{name: getattr(self, name)[samples] for name in over_time})
@@ -108,7 +108,7 @@ class Signals(NamedTuple):
 
 def conditioned(
     time: FloatArray, q: FloatArray, theta: FloatArray, tau_motor: FloatArray, bandwidth: float
-) -> Signals:
+) -> ConditionedRecording:
     """Filter and differentiate a recording.
 
     Args:
@@ -125,7 +125,7 @@ def conditioned(
     noise = np.sqrt(
         np.mean((positions[inside] - motion[0]) ** 2, axis=0) / (1 - 2 * WIDER * bandwidth / rate)
     )
-    return Signals(
+    return ConditionedRecording(
         time=time[inside],
         **_by_name(motion),
         tau_motor=tau_motor[inside],
@@ -136,14 +136,14 @@ def conditioned(
 
 
 def _by_name(motion: Sequence[FloatArray]) -> dict[str, FloatArray]:
-    """Return positions, velocities and accelerations, (samples, joints, 3), as fields of `Signals`."""
+    """Return positions, velocities and accelerations, (samples, joints, 3), by their fields."""
     named: dict[str, FloatArray] = {}
     for derivative, each in zip(("", "d", "dd"), motion, strict=True):
         named |= {f"{derivative}q": each[..., 0], f"{derivative}theta": each[..., 1:]}
     return named
 
 
-def disturbed(signals: Signals) -> Signals:
+def disturbed(signals: ConditionedRecording) -> ConditionedRecording:
     """Return the recording with position noise added once more; every call adds the same noise."""
     assert signals.noise is not None, "of a record"
     samples = len(signals.time) + 2 * signals.filter.reach
@@ -239,7 +239,7 @@ QUIET_FROM = 2.0
 """Multiple of the bandwidth above which a recording has hardly any motion."""
 
 
-def torque_noise(signals: Signals) -> FloatArray:
+def torque_noise(signals: ConditionedRecording) -> FloatArray:
     """Return the rms noise of each motor's torque after the filter, (joints, 2); NaN if unidentifiable.
 
     The noise is assumed white; that of drives which filter their torque is larger.

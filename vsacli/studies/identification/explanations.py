@@ -16,7 +16,7 @@ import scipy
 
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.conditioning import Signals
+from vsacli.studies.identification.conditioning import ConditionedRecording
 from vsacli.studies.identification.estimation import (
     SEPARABLE,
     Equations,
@@ -135,7 +135,9 @@ class Explanation(NamedTuple):
 NOTHING = Explanation((), matters=False)
 
 
-def explanation(robot: Robot, found: Solution, records: Sequence[Signals], *, fails: bool) -> Explanation:
+def explanation(
+    robot: Robot, found: Solution, records: Sequence[ConditionedRecording], *, fails: bool
+) -> Explanation:
     """Explain the residuals of a joint's motors, or of all links.
 
     Args:

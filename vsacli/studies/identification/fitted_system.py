@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.studies.identification.conditioning import Signals, disturbed
+from vsacli.studies.identification.conditioning import ConditionedRecording, disturbed
 from vsacli.studies.identification.estimation import Equations, LeastSquaresFit, gauss_newton
 
 FEWEST_ROWS = 5
@@ -39,14 +39,14 @@ class SystemOfEquations(ABC):
     before: FloatArray
 
     @abstractmethod
-    def of_record(self, values: FloatArray, signals: Signals) -> Equations:
+    def of_record(self, values: FloatArray, signals: ConditionedRecording) -> Equations:
         """Return the equations of a recording at given values of the parameters, (parameters,)."""
 
     @abstractmethod
     def admissible(self, number: int, value: float) -> float | None:
         """Return the nearest admissible value of a parameter, by index; None if it must keep its value."""
 
-    def equations(self, values: FloatArray, signals: Signals) -> Equations:
+    def equations(self, values: FloatArray, signals: ConditionedRecording) -> Equations:
         """Return the equations of a recording, with the effect of its noise if that is known."""
         found = self.of_record(values, signals)
         if signals.noise is None:
@@ -96,12 +96,12 @@ class Solution(NamedTuple):
         values[list(self.free)] = self.fit.solution
         return values
 
-    def equations(self, signals: Signals) -> Equations:
+    def equations(self, signals: ConditionedRecording) -> Equations:
         """Return the equations of a recording at the values that predict best."""
         return self.system.equations(self.predicting, signals)
 
 
-def solution(system: SystemOfEquations, records: Sequence[Signals]) -> Solution:
+def solution(system: SystemOfEquations, records: Sequence[ConditionedRecording]) -> Solution:
     """Fit a system repeatedly, holding parameters with inadmissible results, until all are admissible."""
     bound: dict[int, Bound] = {}
     while True:
@@ -121,7 +121,7 @@ def solution(system: SystemOfEquations, records: Sequence[Signals]) -> Solution:
 
 def _equations(
     system: SystemOfEquations,
-    records: Sequence[Signals],
+    records: Sequence[ConditionedRecording],
     free: Sequence[int],
     held: FloatArray,
     values: FloatArray,
@@ -153,7 +153,7 @@ def _bound(system: SystemOfEquations, number: int, value: float, error: float) -
     return Bound(before, math.nan) if nearest is None else Bound(nearest, error)
 
 
-def held_out(found: Solution, records: list[Signals]) -> dict[str, float]:
+def held_out(found: Solution, records: list[ConditionedRecording]) -> dict[str, float]:
     """Return the rms residual of each group on held-out samples.
 
     Each of several recordings is predicted by a fit to the others, the last fifth of a single recording by a

@@ -23,7 +23,12 @@ from vsacli.robot.file import text_to_change
 from vsacli.robot.model import Robot, check_robot
 from vsacli.robot.modified_dh import modified_link
 from vsacli.robot.parameters import JOINTS, parameters
-from vsacli.studies.identification.conditioning import Signals, bandwidth_bounds, bandwidth_of, conditioned
+from vsacli.studies.identification.conditioning import (
+    ConditionedRecording,
+    bandwidth_bounds,
+    bandwidth_of,
+    conditioned,
+)
 from vsacli.studies.identification.consistent_links import ConsistentLinks, doubts_of, found_links
 from vsacli.studies.identification.explanations import Explanation, explanation
 from vsacli.studies.identification.fitted_system import Solution, solution
@@ -180,7 +185,9 @@ def _count_results(systems: Countdown, results: Iterable[_Result]) -> Iterator[_
         yield result
 
 
-def _without_delays(signals: Sequence[Signals], delays: Sequence[Delay]) -> tuple[list[Signals], bool]:
+def _without_delays(
+    signals: Sequence[ConditionedRecording], delays: Sequence[Delay]
+) -> tuple[list[ConditionedRecording], bool]:
     """Return signals without their significant delays, and whether any delay was removed."""
     late = [by.matters(each.rate) for each, by in zip(signals, delays, strict=True)]
     moved = zip(signals, delays, late, strict=True)
@@ -204,7 +211,7 @@ def _read_all_recordings(
     return records
 
 
-def _condition_record(record: Record, bandwidth: float | None) -> Signals:
+def _condition_record(record: Record, bandwidth: float | None) -> ConditionedRecording:
     """Return a recording filtered and differentiated.
 
     Raises:
@@ -224,7 +231,7 @@ def solutions(
     robot: Robot,
     joints: Sequence[int],
     fit: Sequence[str],
-    signals: Sequence[Signals],
+    signals: Sequence[ConditionedRecording],
     *,
     pushed: bool = False,
 ) -> list[Solution]:
@@ -267,7 +274,9 @@ def _fails(residual: Residual) -> bool:
     return worst > max(ABOVE_NOISE * noise, ABOVE_TORQUE * residual.torque)
 
 
-def _record_report(record: Record, signals: Signals, late: Delay, doubts: tuple[str, ...]) -> RecordReport:
+def _record_report(
+    record: Record, signals: ConditionedRecording, late: Delay, doubts: tuple[str, ...]
+) -> RecordReport:
     return RecordReport(
         path=record.path,
         duration=float(signals.time[-1] - signals.time[0]),
@@ -285,7 +294,7 @@ def _identification_notes(
     robot: Robot,
     joints: Sequence[int],
     fit: Sequence[str],
-    signals: Sequence[Signals],
+    signals: Sequence[ConditionedRecording],
     records: Sequence[Record],
     pushed: Mapping[str, str],
 ) -> Iterator[str]:
@@ -329,7 +338,7 @@ def _explanations(
     robot: Robot,
     found: Sequence[Solution],
     reports: Sequence[SystemReport],
-    signals: Sequence[Signals],
+    signals: Sequence[ConditionedRecording],
     of_gains: Sequence[Gain],
 ) -> Iterator[Explanation]:
     """Yield explanations of the residuals."""

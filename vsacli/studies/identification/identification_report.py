@@ -17,7 +17,7 @@ from vsacli.base.variables import VARIABLES
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import JOINTS
-from vsacli.studies.identification.conditioning import Signals, torque_noise
+from vsacli.studies.identification.conditioning import ConditionedRecording, torque_noise
 from vsacli.studies.identification.estimation import Equations
 from vsacli.studies.identification.fitted_system import Solution, held_out, rms
 from vsacli.studies.identification.identification_text import (
@@ -144,7 +144,7 @@ SMOOTH_CURVES = 8
 """Rows of a figure per row of the equations, whose coarse curves would have corners."""
 
 
-def system_report(robot: Robot, found: Solution, signals: list[Signals]) -> SystemReport:
+def system_report(robot: Robot, found: Solution, signals: list[ConditionedRecording]) -> SystemReport:
     """Return the results and residuals of a system."""
     system, fit = found.system, found.fit
     of_joint = f"{JOINTS}.{system.title}.actuator."
@@ -182,7 +182,7 @@ def numbers_of(found: Solution) -> Iterator[Number]:
         yield Number(name, unit, before, value, error, note, total)
 
 
-def _residuals(robot: Robot, found: Solution, signals: list[Signals]) -> Iterator[Residual]:
+def _residuals(robot: Robot, found: Solution, signals: list[ConditionedRecording]) -> Iterator[Residual]:
     equations = [found.equations(each) for each in signals]
     beyond = held_out(found, signals)
     measured, residual, group = (
@@ -215,7 +215,7 @@ def _unit(robot: Robot, group: str) -> str:
 
 
 def _group_noise(
-    robot: Robot, group: str, signals: Sequence[Signals], equations: Sequence[Equations]
+    robot: Robot, group: str, signals: Sequence[ConditionedRecording], equations: Sequence[Equations]
 ) -> float:
     """Return the noise of a group's residual from that of torques and positions; NaN if either is unknown."""
     index = _joint_of_group(robot, group)
@@ -230,7 +230,10 @@ def _group_noise(
 
 
 def torque_comparisons(
-    robot: Robot, found: Sequence[Solution], records: Sequence[Record], signals: Sequence[Signals]
+    robot: Robot,
+    found: Sequence[Solution],
+    records: Sequence[Record],
+    signals: Sequence[ConditionedRecording],
 ) -> Iterator[Torques]:
     """Yield measured and predicted torques of all recordings and systems."""
     for record, coarse in zip(records, signals, strict=True):

@@ -22,7 +22,7 @@ from vsacli.dynamics.drive import shaft_torques
 from vsacli.dynamics.dry_friction import joint_friction
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, seeded, with_copied_actuator
-from vsacli.studies.identification.conditioning import Signals
+from vsacli.studies.identification.conditioning import ConditionedRecording
 from vsacli.studies.identification.estimation import Equations
 from vsacli.studies.identification.fitted_system import Solution, SystemOfEquations
 from vsacli.studies.identification.motor_equations import (
@@ -90,7 +90,7 @@ class LinkSystem(SystemOfEquations):
             for place, one in enumerate(alone)
         )
 
-    def of_record(self, values: FloatArray, signals: Signals) -> Equations:
+    def of_record(self, values: FloatArray, signals: ConditionedRecording) -> Equations:
         """See `SystemOfEquations.of_record`."""
         robot, bodies = self._robot, self.bodies
         own = self.base.kept[bodies:] - self._first
@@ -206,7 +206,7 @@ def _best_springs(motors: Sequence[Solution]) -> tuple[list[Parameter], FloatArr
 
 
 def _carried(
-    robot: Robot, index: int, signals: Signals, springs: Sequence[Parameter]
+    robot: Robot, index: int, signals: ConditionedRecording, springs: Sequence[Parameter]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the torque of springs or a rigid drive at a joint, (samples,), and its slopes by springs."""
     actuator = robot.joints[index].actuator
@@ -234,7 +234,9 @@ def _resistance(
     return value_of(torque), tangent_of(torque, len(numbers), np.shape(dq.value))
 
 
-def without_links(robot: Robot, joints: Sequence[int], system: LinkSystem, records: Sequence[Signals]) -> str:
+def without_links(
+    robot: Robot, joints: Sequence[int], system: LinkSystem, records: Sequence[ConditionedRecording]
+) -> str:
     """Return the reason why a system of links cannot be identified, as a sentence; "" if it can.
 
     Args:

@@ -22,7 +22,7 @@ from vsacli.compute.duals import Dual, tangent_of, value_of
 from vsacli.dynamics.drive import shaft_torques
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters, seeded, with_copied_actuator
-from vsacli.studies.identification.conditioning import Signals
+from vsacli.studies.identification.conditioning import ConditionedRecording
 from vsacli.studies.identification.estimation import Equations
 from vsacli.studies.identification.fitted_system import CERTAIN, Solution, SystemOfEquations
 from vsacli.studies.identification.regressor import BaseParameters
@@ -160,7 +160,7 @@ def motor_names(robot: Robot, index: int) -> tuple[str, ...]:
     return tuple(f"motor {number} of {joint.name}" for number, _ in enumerate(joint.actuator.motors, 1))
 
 
-def joint_motion(signals: Signals, index: int) -> JointVariables:
+def joint_motion(signals: ConditionedRecording, index: int) -> JointVariables:
     """Return the motion of a joint and its motors, samples last, as duals without derivatives."""
     # NumPy functions of duals accept robot parameters that are duals, which those of arrays do not
     return as_duals(_motor_arrays(signals, index))
@@ -172,7 +172,7 @@ def as_duals(arrays: Mapping[str, FloatArray]) -> JointVariables:
     return JointVariables(**motion)
 
 
-def _motor_arrays(signals: Signals, index: int) -> dict[str, FloatArray]:
+def _motor_arrays(signals: ConditionedRecording, index: int) -> dict[str, FloatArray]:
     q, theta = signals.q[:, index], signals.theta[:, index].T
     return {
         "q": q,
@@ -222,7 +222,7 @@ class MotorSystem(SystemOfEquations):
         """Return the values of `sought` in a file that keeps the other parts, (unknowns,)."""
         return np.asarray(values - self._of_others)
 
-    def of_record(self, values: FloatArray, signals: Signals) -> Equations:
+    def of_record(self, values: FloatArray, signals: ConditionedRecording) -> Equations:
         """See `SystemOfEquations.of_record`; only motors with a recorded torque have equations."""
         index, count = self._index, len(self.sought)
         present = [
@@ -287,7 +287,7 @@ def motor_systems(
     robot: Robot,
     joints: Sequence[int],
     fit: Sequence[str],
-    records: Sequence[Signals],
+    records: Sequence[ConditionedRecording],
 ) -> Iterator[MotorSystem]:
     """Yield the systems of joints with springs that have parameters to identify.
 
@@ -320,7 +320,7 @@ SAMPLES = 100
 
 
 def _motor_combinations(
-    robot: Robot, index: int, parts: Sequence[Parameter], records: Sequence[Signals]
+    robot: Robot, index: int, parts: Sequence[Parameter], records: Sequence[ConditionedRecording]
 ) -> BaseParameters | None:
     """Return the combinations of parameters that motor torques of any motion determine; None if unknown."""
     random = np.random.default_rng(0)

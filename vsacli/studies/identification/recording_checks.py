@@ -24,7 +24,7 @@ import scipy
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.variables import MOTORS, VARIABLES
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.conditioning import Signals
+from vsacli.studies.identification.conditioning import ConditionedRecording
 from vsacli.studies.identification.estimation import SEPARABLE, Equations, least_squares
 from vsacli.studies.identification.fitted_system import Solution
 from vsacli.studies.identification.identification_text import rounded_by_error
@@ -61,7 +61,9 @@ ODD_GAINS: Mapping[str, float] = MappingProxyType(
 """Ratios of a motor's motion to its joint's, by the likely mistake."""
 
 
-def model_doubts(robot: Robot, joints: Sequence[int], record: Record, signals: Signals) -> Iterator[str]:
+def model_doubts(
+    robot: Robot, joints: Sequence[int], record: Record, signals: ConditionedRecording
+) -> Iterator[str]:
     """Yield sentences on columns whose content does not fit their names.
 
     Motors should follow their joints, and torques the predictions of the robot file, apart from the errors of
@@ -96,7 +98,7 @@ def _exchanged_torques(torques: Sequence[Agreement]) -> list[Agreement]:
     return found
 
 
-def _positions(robot: Robot, index: int, record: Record, signals: Signals) -> Iterator[str]:
+def _positions(robot: Robot, index: int, record: Record, signals: ConditionedRecording) -> Iterator[str]:
     """Yield sentences on motors behind springs that do not follow their joint."""
     stride = signals.filter.stride
     actuator, q = robot.joints[index].actuator, signals.q[::stride]
@@ -131,7 +133,7 @@ def _least_variance(theta: FloatArray, q: FloatArray) -> float:
 
 
 def _torque_agreements(
-    robot: Robot, index: int, record: Record, signals: Signals
+    robot: Robot, index: int, record: Record, signals: ConditionedRecording
 ) -> Iterator[tuple[Agreement, float]]:
     """Yield the agreement of each motor's measured torque with its prediction, and the gear ratio."""
     system = MotorSystem(robot, index)
@@ -187,7 +189,7 @@ def _torque_agreement(
     )
 
 
-def _branch_sentences(robot: Robot, index: int, signals: Signals) -> Iterator[str]:
+def _branch_sentences(robot: Robot, index: int, signals: ConditionedRecording) -> Iterator[str]:
     """Yield a sentence if most deflections are on another branch than that of the robot."""
     actuator = robot.joints[index].actuator
     if not actuator.commanded or actuator.opposite_branch is None:
@@ -231,7 +233,7 @@ class Delay(NamedTuple):
         return size > CERTAIN_DELAY * self.standard_error and size * rate > WORTH_IT
 
 
-def delay(found: Sequence[Solution], signals: Signals) -> Delay:
+def delay(found: Sequence[Solution], signals: ConditionedRecording) -> Delay:
     """Return the delay with which the equations of all systems hold best.
 
     Torques delayed by d are tau(t - d) = tau(t) - d tau'(t), so that d is a further unknown of each system.
@@ -248,7 +250,9 @@ def delay(found: Sequence[Solution], signals: Signals) -> Delay:
     return Delay(float(weights @ values / weights.sum()), float(weights.sum() ** -0.5))
 
 
-def _delay_of(found: Solution, signals: Signals, rates: Signals) -> Iterator[tuple[float, float]]:
+def _delay_of(
+    found: Solution, signals: ConditionedRecording, rates: ConditionedRecording
+) -> Iterator[tuple[float, float]]:
     """Yield the delay and its standard error, unless the system has no equations."""
     equations, of_rates = found.equations(signals), found.equations(rates)
     if len(equations.measured):
@@ -258,7 +262,7 @@ def _delay_of(found: Solution, signals: Signals, rates: Signals) -> Iterator[tup
         yield float(fit.values[-1]), float(fit.standard_errors[-1])
 
 
-def without_delay(signals: Signals, late: float) -> Signals:
+def without_delay(signals: ConditionedRecording, late: float) -> ConditionedRecording:
     """Return the recording with torques advanced by `late` seconds."""
     torques = signals.tau_motor.copy()
     there = np.isfinite(torques).all(axis=0)
@@ -303,7 +307,7 @@ class Gain(NamedTuple):
 
 
 def gain_findings(
-    robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[Signals]
+    robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[ConditionedRecording]
 ) -> list[Gain]:
     """Return findings on joints whose parameters all differ from the file by one factor.
 
@@ -324,7 +328,7 @@ def gain_findings(
     ]
 
 
-def _common_factor(found: Solution, signals: Sequence[Signals]) -> Factor | None:
+def _common_factor(found: Solution, signals: Sequence[ConditionedRecording]) -> Factor | None:
     """Return the common factor of a joint's motor and spring parameters over those of the file, if any."""
     equations = [found.equations(each) for each in signals]
     slopes = np.concatenate([each.slopes[:, found.free] for each in equations])
@@ -358,7 +362,7 @@ def _fitted_factor(found: Solution, by_gain: FloatArray, identifiable: IndexArra
 
 
 def _by_links(
-    robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[Signals]
+    robot: Robot, joints: Sequence[int], motors: Sequence[Solution], signals: Sequence[ConditionedRecording]
 ) -> dict[str, Factor]:
     """Return the ratio of identified spring torque to that required by the links of the file, by joint."""
     system = link_system(robot, (), motors)

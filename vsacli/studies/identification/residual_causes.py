@@ -15,7 +15,7 @@ from numpy.polynomial import legendre
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.variables import VARIABLES
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.conditioning import Signals
+from vsacli.studies.identification.conditioning import ConditionedRecording
 from vsacli.studies.identification.estimation import Equations, least_squares
 from vsacli.studies.identification.fitted_system import Solution
 from vsacli.studies.identification.motor_equations import LINKS, motor_names
@@ -82,7 +82,7 @@ PLACE = "{name}: what is left depends on its position: a cable, a stop or a weig
 
 
 def residual_causes(
-    robot: Robot, found: Solution, records: Sequence[Signals], equations: Sequence[Equations]
+    robot: Robot, found: Solution, records: Sequence[ConditionedRecording], equations: Sequence[Equations]
 ) -> list[Cause]:
     """Return possible causes of residuals of a joint's motors, or of all links.
 
@@ -98,7 +98,7 @@ def residual_causes(
 
 
 def _motor_causes(
-    robot: Robot, found: Solution, records: Sequence[Signals], equations: Sequence[Equations]
+    robot: Robot, found: Solution, records: Sequence[ConditionedRecording], equations: Sequence[Equations]
 ) -> Iterator[Cause]:
     index = robot.joint_names.index(found.system.title)
     joint = robot.joints[index]
@@ -129,13 +129,15 @@ def _motor_causes(
             yield first._replace(name=f"both motors of {joint.name}", columns=columns)
 
 
-def _deflections(behind: Sequence[bool], signals: Signals, index: int) -> FloatArray:
+def _deflections(behind: Sequence[bool], signals: ConditionedRecording, index: int) -> FloatArray:
     """Return the deflections of motors behind a spring and the positions of others, (motors, samples)."""
     theta, q = signals.theta[:, index, : len(behind)].T, signals.q[:, index]
     return np.where(np.array(behind)[:, None], theta - q, theta)
 
 
-def _of_links(robot: Robot, records: Sequence[Signals], equations: Sequence[Equations]) -> Iterator[Cause]:
+def _of_links(
+    robot: Robot, records: Sequence[ConditionedRecording], equations: Sequence[Equations]
+) -> Iterator[Cause]:
     for index, joint in enumerate(robot.joints):
         name = f"link of {joint.name}"
         own = [each.group == name for each in equations]
@@ -160,7 +162,7 @@ def _gain_cause(name: str, own: Sequence[BoolArray], equations: Sequence[Equatio
 
 
 def _frictions(
-    name: str, own: Sequence[BoolArray], records: Sequence[Signals], speeds: Sequence[FloatArray]
+    name: str, own: Sequence[BoolArray], records: Sequence[ConditionedRecording], speeds: Sequence[FloatArray]
 ) -> Iterator[Cause]:
     """Yield quadratic friction, then dry and Stribeck friction."""
     # separate causes, since a test with fewer columns detects smaller effects
@@ -176,7 +178,7 @@ def _law(
     words: str,
     name: str,
     own: Sequence[BoolArray],
-    records: Sequence[Signals],
+    records: Sequence[ConditionedRecording],
     terms: Sequence[FloatArray],
 ) -> Cause:
     """Return a cause from functions of the motion, (terms, samples) for each recording, filtered."""
@@ -204,7 +206,11 @@ def _polynomial_terms(positions: Sequence[FloatArray], place: int, sign: float) 
 
 
 def _by_zero(
-    found: Solution, records: Sequence[Signals], equations: Sequence[Equations], index: int, motor: int
+    found: Solution,
+    records: Sequence[ConditionedRecording],
+    equations: Sequence[Equations],
+    index: int,
+    motor: int,
 ) -> list[FloatArray]:
     """Return the change of the prediction per error of a motor's position, (rows, 1) for each recording.
 
@@ -229,7 +235,7 @@ def _by_zero(
 
 
 def _secant(
-    found: Solution, values: FloatArray, signals: Signals, place: tuple[int, int], error: float
+    found: Solution, values: FloatArray, signals: ConditionedRecording, place: tuple[int, int], error: float
 ) -> FloatArray:
     theta = signals.theta.copy()
     theta[:, *place] -= error

@@ -17,7 +17,7 @@ from vsacli.base.variables import VARIABLES
 from vsacli.compute.duals import value_of
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import JOINTS, parameters
-from vsacli.studies.identification.conditioning import Signals, spline_derivatives
+from vsacli.studies.identification.conditioning import ConditionedRecording, spline_derivatives
 from vsacli.studies.identification.fitted_system import Solution, SystemOfEquations
 from vsacli.studies.identification.identified_values import TorqueDeviation
 from vsacli.studies.identification.link_equations import LinkSystem
@@ -35,7 +35,7 @@ OF_LINK = ("mass", *(f"com.{axis}" for axis in range(3)), *(f"inertia.{entry}" f
 
 
 def torque_deviations(
-    robot: Robot, found: Sequence[Solution], records: Sequence[Signals]
+    robot: Robot, found: Sequence[Solution], records: Sequence[ConditionedRecording]
 ) -> tuple[TorqueDeviation, ...]:
     """Return the largest standard deviations of each motor's torque, along the recordings and elsewhere.
 
@@ -61,7 +61,7 @@ def torque_deviations(
     )
 
 
-def _recorded_motion(robot: Robot, signals: Signals) -> Motion:
+def _recorded_motion(robot: Robot, signals: ConditionedRecording) -> Motion:
     """Return the motion of a recording with its stiffness."""
     stiffness = np.full_like(signals.q, np.nan)
     for index, actuator in enumerate(robot.actuators):

@@ -19,10 +19,10 @@ from vsacli.results.store.study_table import (
     OF_RUN,
     TEXTS,
     Head,
-    Parameter,
-    Rows,
     StoredStudy,
+    StudyRows,
     StudyWriter,
+    VariedParameter,
     rows_at_once,
 )
 from vsacli.studies.sweeps.columns import arrays_of, pad_curves, steps_of, width
@@ -68,7 +68,7 @@ def write(
 
 
 def _head_of_study(study: Study, steps: int, provenance: dict[str, str]) -> Head:
-    parameters = [Parameter(each.path, each.unit, each.numeric) for each in study.dimensions]
+    parameters = [VariedParameter(each.path, each.unit, each.numeric) for each in study.dimensions]
     return Head(
         study=study.file.name,
         robot=study.robot.name,
@@ -95,7 +95,7 @@ def _head_of_study(study: Study, steps: int, provenance: dict[str, str]) -> Head
     )
 
 
-def _table_rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
+def _table_rows(study: Study, rows: Sequence[Row], steps: int) -> StudyRows:
     points = [study.point(row.run) for row in rows]
     arrays: dict[str, Any] = {
         "trajectory": [study.trajectories[point.trajectory] for point in points],
@@ -118,7 +118,7 @@ def _table_rows(study: Study, rows: Sequence[Row], steps: int) -> Rows:
     arrays |= arrays_of(columns, table, joints)
     if study.over_time:
         arrays |= pad_curves([row.curves for row in rows], study.over_time, steps, joints)
-    return Rows([row.run for row in rows], arrays)
+    return StudyRows([row.run for row in rows], arrays)
 
 
 MOST_NAMED = 5
@@ -148,7 +148,9 @@ def merge(paths: Sequence[str | Path], file: Staged, **provenance: str) -> None:
         with StudyWriter(file, _head_of_parts(parts[0], steps, provenance), len(order)) as writer:
             for start in range(0, len(order), rows_at_once(steps)):
                 rows = order[start : start + rows_at_once(steps)]
-                writer.write(Rows(range(start, start + len(rows)), _concatenated_columns(parts, rows, steps)))
+                writer.write(
+                    StudyRows(range(start, start + len(rows)), _concatenated_columns(parts, rows, steps))
+                )
             writer.finish()
 
 
@@ -228,7 +230,7 @@ def _head_of_parts(part: StoredStudy, steps: int, provenance: dict[str, str]) ->
         joint_names=part.joint_names,
         joint_types=part.joint_types,
         parameters=tuple(
-            Parameter(
+            VariedParameter(
                 path,
                 "" if part.parameter_is_text(path) else part.unit(path),
                 not part.parameter_is_text(path),

@@ -22,7 +22,7 @@ LOWER = np.tri(BLOCK)
 """Mask of the lower triangle of a block."""
 
 
-class Rows(NamedTuple):
+class BandedRows(NamedTuple):
     """Rows sorted by the block in which they start.
 
     Attributes:
@@ -36,7 +36,7 @@ class Rows(NamedTuple):
     place: IndexArray
 
 
-class Factor(NamedTuple):
+class BandedFactor(NamedTuple):
     """A block-bidiagonal triangular factor, and its residual.
 
     Attributes:
@@ -53,7 +53,7 @@ class Factor(NamedTuple):
 
     @property
     def rows(self) -> FloatArray:
-        """Rows as in `Rows.blocks`, (blocks, `BLOCK`, 2 `BLOCK`), which say the same as those factorized."""
+        """Rows that say the same as those factorized, (blocks, `BLOCK`, 2 `BLOCK`), see `BandedRows`."""
         return np.concatenate([self.diagonal, self.upper], axis=2)
 
     @property
@@ -68,7 +68,7 @@ def block_count(unknowns: int) -> int:
     return -(-unknowns // BLOCK)
 
 
-def sort_rows(first: IndexArray, rows: FloatArray, unknowns: int) -> Rows:
+def sort_rows(first: IndexArray, rows: FloatArray, unknowns: int) -> BandedRows:
     """Sort rows into blocks.
 
     Args:
@@ -82,10 +82,10 @@ def sort_rows(first: IndexArray, rows: FloatArray, unknowns: int) -> Rows:
     blocks = np.zeros((count, int(place.max()) + 1, 2 * BLOCK))
     columns = (first - block * BLOCK)[:, None] + np.arange(rows.shape[1])
     blocks[block[:, None], place[:, None], columns] = rows
-    return Rows(blocks, block, place)
+    return BandedRows(blocks, block, place)
 
 
-def factorize(rows: FloatArray, target: FloatArray) -> Factor:
+def factorize(rows: FloatArray, target: FloatArray) -> BandedFactor:
     """Return the triangular factor of rows.
 
     Args:
@@ -104,7 +104,7 @@ def factorize(rows: FloatArray, target: FloatArray) -> Factor:
     triangle = np.swapaxes(work[:-1], 1, 2)
     rest = np.sum(triangle[:, 2 * BLOCK, -1] ** 2) + np.sum(work[-1, -1, :BLOCK] ** 2)
     diagonal, upper = LOWER.T * triangle[:, :BLOCK, :BLOCK], triangle[:, :BLOCK, BLOCK:-1].copy()
-    return Factor(diagonal, upper, triangle[:, :BLOCK, -1].copy(), float(rest))
+    return BandedFactor(diagonal, upper, triangle[:, :BLOCK, -1].copy(), float(rest))
 
 
 class Posterior:
@@ -150,5 +150,5 @@ class Posterior:
         return np.concatenate([near, far], axis=-1)
 
     def variances(self, blocks: FloatArray) -> FloatArray:
-        """Return variances of values, (blocks, rows), given by rows as in `Rows.blocks`."""
+        """Return variances of values, (blocks, rows), given by rows as in `BandedRows.blocks`."""
         return np.asarray(np.sum(self.roots_of(blocks) ** 2, axis=2))

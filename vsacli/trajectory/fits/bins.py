@@ -1,7 +1,8 @@
 """Means of samples over equal bins of time, from moments that serve bins of all widths by powers of two.
 
-`Moments` of fine bins are summed once, and halved for each coarser resolution. `Bins` has the means and the
-mean B-splines of a resolution, and `Bins.whitened` the rows of a linear estimation with independent errors.
+`BinMoments` of fine bins are summed once, and halved for each coarser resolution. `Bins` has the means and
+the mean B-splines of a resolution, and `Bins.whitened` the rows of a linear estimation with independent
+errors.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
-from vsacli.trajectory.fits.banded_qr import Factor, block_count, factorize, sort_rows
+from vsacli.trajectory.fits.banded_qr import BandedFactor, block_count, factorize, sort_rows
 
 BLOCK_SAMPLES = 65536
 """Samples processed at a time; a block that fits into the cache is twice as fast."""
 
 
-class Moments(NamedTuple):
+class BinMoments(NamedTuple):
     """Moments of samples in fine bins, from which those of coarser bins follow.
 
     Attributes:
@@ -38,7 +39,7 @@ class Moments(NamedTuple):
     row: FloatArray
 
     @classmethod
-    def of(cls, time: FloatArray, row: FloatArray, bins: int, degree: int) -> Moments:
+    def of(cls, time: FloatArray, row: FloatArray, bins: int, degree: int) -> BinMoments:
         """Return the moments of samples.
 
         Args:
@@ -63,11 +64,11 @@ class Moments(NamedTuple):
         return cls(start, width, sums[:-2], sums[-2], sums[-1])
 
     @property
-    def halved(self) -> Moments:
+    def halved(self) -> BinMoments:
         """Moments of half as many bins, twice as wide; the number of bins must be even."""
         powers = merged(self.powers[:, ::2], self.powers[:, 1::2])
         time, row = self.time[::2] + self.time[1::2], self.row[::2] + self.row[1::2]
-        return Moments(self.start, 2 * self.width, powers, time, row)
+        return BinMoments(self.start, 2 * self.width, powers, time, row)
 
 
 def merged(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -95,7 +96,7 @@ class Whitened(NamedTuple):
     """
 
     correlation: float
-    factor: Factor
+    factor: BandedFactor
     log_scale: float
     variance: float | None
 
@@ -129,7 +130,7 @@ class Bins:
     noise: float | None = None
 
     @classmethod
-    def of(cls, moments: Moments, noise: float | None = None) -> Bins:
+    def of(cls, moments: BinMoments, noise: float | None = None) -> Bins:
         """Return the means of samples from their moments.
 
         Args:

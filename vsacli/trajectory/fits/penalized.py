@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
-from vsacli.trajectory.fits.banded_qr import BLOCK, Factor, Posterior, factorize, sort_rows
+from vsacli.trajectory.fits.banded_qr import BLOCK, BandedFactor, Posterior, factorize, sort_rows
 from vsacli.trajectory.fits.bins import Bins, Whitened, uniform_basis
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Model:
         return self.penalties[np.searchsorted(self._segment, np.arange(self.segments))]
 
     @cached_property
-    def _factor(self) -> Factor:
+    def _factor(self) -> BandedFactor:
         return _factor(self.bins, self.whitened, self.penalties)
 
     @cached_property
@@ -194,7 +194,9 @@ class Evidence(NamedTuple):
     variance: float | None
 
 
-def evidence(bins: Bins, whitened: Whitened, penalties: FloatArray, factor: Factor | None = None) -> Evidence:
+def evidence(
+    bins: Bins, whitened: Whitened, penalties: FloatArray, factor: BandedFactor | None = None
+) -> Evidence:
     """Return the evidence for penalties, (differences,)."""
     factor = factor or _factor(bins, whitened, penalties)
     volume = factor.log_determinant - float(np.sum(np.log(penalties))) - whitened.log_scale
@@ -212,7 +214,7 @@ def deviance(stretches: Sequence[Evidence]) -> float:
     return size + sum(each.volume for each in stretches)
 
 
-def _factor(bins: Bins, whitened: Whitened, penalties: FloatArray) -> Factor:
+def _factor(bins: Bins, whitened: Whitened, penalties: FloatArray) -> BandedFactor:
     differences, samples = bins.differences, whitened.factor
     weights = np.ones(differences.shape[:2])
     weights.ravel()[: len(penalties)] = np.sqrt(penalties)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.trajectory.fits.bins import BINS_PER_SPAN, Bins, Moments
+from vsacli.trajectory.fits.bins import BINS_PER_SPAN, BinMoments, Bins
 from vsacli.trajectory.fits.noise_floor import enough_spans
 from vsacli.trajectory.fits.penalized import Model, deviance, evidence, segment_of
 
@@ -324,7 +324,7 @@ def _given(
     finest = int(np.clip(np.ceil(spans), 1, max(1, len(time) // BINS_PER_SPAN - degree)))
     halvings = range(int(np.log2(max(1, finest / FIRST_SPANS))), -1, -1)
     bins = [BINS_PER_SPAN * -(-finest // 2**halving) for halving in halvings]
-    models = list(_models((Moments.of(time, row, count, degree) for count in bins), known))
+    models = list(_models((BinMoments.of(time, row, count, degree) for count in bins), known))
     if not models:
         return None
     return _compared(time, row, models[-1], models[-1], order)._replace(given=True)
@@ -340,20 +340,20 @@ def _judged(resolution: Resolution, known: KnownNoise) -> Resolution:
 
 def _moments(
     time: FloatArray, row: FloatArray, degree: int, below: float, fewest_samples: int
-) -> list[Moments]:
+) -> list[BinMoments]:
     """Return the moments of all resolutions, from coarse to fine."""
     samples = len(time)
     spans = FIRST_SPANS if samples >= SHORT else FIRST_SPANS_SHORT
     most = max(samples // fewest_samples, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
     slower = max(spans, 2 * below * float(time[-1] - time[0]))
     doublings = int(np.log2(min(most, MOST_SPANS, slower) // spans))
-    found = [Moments.of(time, row, BINS_PER_SPAN * spans * 2**doublings, degree)]
+    found = [BinMoments.of(time, row, BINS_PER_SPAN * spans * 2**doublings, degree)]
     for _ in range(doublings):
         found.append(found[-1].halved)
     return found[::-1]
 
 
-def _models(moments: Iterable[Moments], known: KnownNoise) -> Iterator[Model]:
+def _models(moments: Iterable[BinMoments], known: KnownNoise) -> Iterator[Model]:
     """Yield the most likely model of each resolution, from coarse to fine."""
     model: Model | None = None
     for each in moments:

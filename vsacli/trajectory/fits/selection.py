@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
-from vsacli.base.progress import Bar, Progress, unseen
+from vsacli.base.progress import Progress, ProgressBar, unseen
 from vsacli.trajectory.fits.fit import Fit, Part, join
 from vsacli.trajectory.fits.least_squares import best_spans, fit_spline
 from vsacli.trajectory.fits.left_over import LeftOutMotion, left_out_motion
@@ -46,7 +46,7 @@ PASSING = 2.0
 """Bandwidth with which a spline follows a vibration, over the frequency of the vibration."""
 
 
-class Record(NamedTuple):
+class FittedRecording(NamedTuple):
     """The fitted recording.
 
     Attributes:
@@ -68,7 +68,7 @@ class Record(NamedTuple):
     least: float = 0.0
 
 
-def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | None = None) -> Part:
+def smooth_part(record: FittedRecording, member: int, degree: int, known: KnownNoise | None = None) -> Part:
     """Return a smoothing spline of one component; a polynomial by least squares if that is impossible."""
     row, members = record.values[member], np.array([member])
     found = smoothing_spline(record.time, row, degree, record.order, known or record.known[member])
@@ -79,7 +79,7 @@ def smooth_part(record: Record, member: int, degree: int, known: KnownNoise | No
     return _following(*_without_ends(part, record), record)
 
 
-def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part]:
+def judged(record: FittedRecording, fit: Fit, bar: ProgressBar, *, chosen: bool) -> Iterator[Part]:
     """Yield parts whose fit may follow noise, with their assessment, or replacements for them.
 
     Such fits are least-squares splines, whose number of knots has a bias, and splines through noisy samples.
@@ -99,7 +99,7 @@ def judged(record: Record, fit: Fit, bar: Bar, *, chosen: bool) -> Iterator[Part
                 yield instead
 
 
-def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part | None:
+def _instead(record: FittedRecording, part: Part, column: int, *, chosen: bool) -> Part | None:
     """Return the replacement of a component of a part; None if it needs no assessment, or has none."""
     member, degree = int(part.members[column]), part.spline.k
     wanted = not chosen and record.known[member].bandwidth is not None
@@ -129,7 +129,7 @@ def _instead(record: Record, part: Part, column: int, *, chosen: bool) -> Part |
     return unjudged
 
 
-def _without_ends(part: Part, record: Record) -> tuple[Part, FollowedNoise]:
+def _without_ends(part: Part, record: FittedRecording) -> tuple[Part, FollowedNoise]:
     """Return a part of one component with the ends at which a filter rings, or its transient lasts.
 
     Also returns the filtered noise that it follows between them.
@@ -142,7 +142,7 @@ def _without_ends(part: Part, record: Record) -> tuple[Part, FollowedNoise]:
     return part, between if between.share else noise
 
 
-def _noise_of(record: Record, part: Part) -> FollowedNoise:
+def _noise_of(record: FittedRecording, part: Part) -> FollowedNoise:
     """Return the filtered noise that a part of one component follows."""
     bandwidth = record.known[int(part.members[0])].bandwidth
     rings = any(part.ringing)
@@ -152,12 +152,12 @@ def _noise_of(record: Record, part: Part) -> FollowedNoise:
     return noise._replace(share=noise.share * min(1.0, part.size(record.order).item() / record.least))
 
 
-def _interval(record: Record) -> float:
+def _interval(record: FittedRecording) -> float:
     """Return the mean sampling interval of a recording, s."""
     return float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
 
 
-def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
+def _following(part: Part, noise: FollowedNoise, record: FittedRecording) -> Part:
     """Return a part of one component whose assessment includes the noise that it follows."""
     known = part.smoothing
     if known is None or not noise.share or (part.smooth and noise.relative <= known.relative):
@@ -165,7 +165,7 @@ def _following(part: Part, noise: FollowedNoise, record: Record) -> Part:
     return replace(part, smoothing=known.following(noise, part.size(record.order).item()), noise=noise)
 
 
-def _judge(record: Record, member: int, degree: int) -> Part:
+def _judge(record: FittedRecording, member: int, degree: int) -> Part:
     """Return the smoothing spline of a component; it follows a strong vibration, which may be motion."""
     judge = smooth_part(record, member, degree)
     known, lines = record.known[member], judge.smoothing and judge.smoothing.lines
@@ -177,7 +177,7 @@ def _judge(record: Record, member: int, degree: int) -> Part:
     return replace(follower, smoothing=replace(follower.smoothing, lines=lines, follows_lines=True))
 
 
-def _better(judge: Part, difference: float, record: Record, filtered: bool) -> bool:
+def _better(judge: Part, difference: float, record: FittedRecording, filtered: bool) -> bool:
     """Return whether a smoothing spline should replace a spline through the samples of a component.
 
     If no resolution is accepted, noise must dominate more in the latter. If noise was filtered, both must
@@ -191,7 +191,7 @@ def _better(judge: Part, difference: float, record: Record, filtered: bool) -> b
     return filtered and difference > DISAGREEMENT + DISAGREEING_DEVIATIONS * known.relative
 
 
-def _inside(part: Part, record: Record) -> FloatArray:
+def _inside(part: Part, record: FittedRecording) -> FloatArray:
     """Return some sample times away from the ends, s."""
     time, (start, end) = record.time, part.inside
     inside = time[(time >= start) & (time <= end)]
@@ -260,13 +260,13 @@ SMALLEST_SHARE = 1e-3
 be only rounding of a component at rest."""
 
 
-def _with_left_out_motion(parts: Sequence[Part], record: Record) -> list[Part]:
+def _with_left_out_motion(parts: Sequence[Part], record: FittedRecording) -> list[Part]:
     """Return parts of one component each, with the motion that those near the samples leave out."""
     single = [part.of_columns(np.array([column])) for part in parts for column in range(len(part.members))]
     return [part if part.exact else replace(part, left_out=_left_out(part, record)) for part in single]
 
 
-def _left_out(part: Part, record: Record) -> LeftOutMotion | None:
+def _left_out(part: Part, record: FittedRecording) -> LeftOutMotion | None:
     """Return the motion that a part of one component leaves out; lines count as vibrations instead.
 
     A residual as large as the filtered noise that the default fit follows is such noise.
@@ -314,7 +314,7 @@ def fit_samples(
     estimate = np.zeros(len(values))
     estimate[present] = estimated_noise(time, values[present], degree + 1)
     estimate = np.where(np.isnan(given), estimate, given)
-    record = Record(
+    record = FittedRecording(
         time,
         values,
         spoilt=np.zeros(len(values)),

@@ -19,7 +19,7 @@ from vsacli.base.json_records import Published
 from vsacli.base.variables import Block
 from vsacli.dynamics.inverse import adapt_trajectory, compute_block
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.conditioning import Filter, Signals, bandwidth_of, conditioned
+from vsacli.studies.identification.conditioning import ConditionedRecording, Filter, bandwidth_of, conditioned
 from vsacli.studies.identification.excitation.family import RATE
 from vsacli.studies.identification.identification import WORDS, solutions
 from vsacli.studies.identification.identification_report import numbers_of
@@ -135,10 +135,10 @@ def _condition(slopes: FloatArray) -> float:
     return float(np.linalg.cond(slopes / norms))
 
 
-def exact_signals(block: Block) -> Signals:
+def exact_signals(block: Block) -> ConditionedRecording:
     """Return a motion as a recording without noise."""
     motion = {name: getattr(block, name) for name in ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta")}
-    return Signals(**motion, tau_motor=block.tau_motor, rate=np.nan, filter=ALL_PASS)
+    return ConditionedRecording(**motion, tau_motor=block.tau_motor, rate=np.nan, filter=ALL_PASS)
 
 
 POSITION_NOISE = 2e-5
@@ -220,14 +220,16 @@ def predicted_errors(
     )
 
 
-def _identified(robot: Robot, record: Signals) -> list[Number]:
+def _identified(robot: Robot, record: ConditionedRecording) -> list[Number]:
     """Return the results for all parameters, from a recording of all joints."""
     joints = range(len(robot.joints))
     systems = solutions(with_friction(robot, joints), joints, WORDS, [record])
     return [number for system in systems for number in numbers_of(system)]
 
 
-def noisy_record(robot: Robot, block: Block, noise: Noise, random: np.random.Generator) -> Signals:
+def noisy_record(
+    robot: Robot, block: Block, noise: Noise, random: np.random.Generator
+) -> ConditionedRecording:
     """Return a simulated noisy recording of a motion, conditioned."""
     q, theta = (each + noise.position * random.standard_normal(each.shape) for each in (block.q, block.theta))
     for index, joint in enumerate(robot.joints):
