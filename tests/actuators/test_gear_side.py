@@ -136,6 +136,14 @@ SLIPS = {
 }
 
 
+@pytest.mark.parametrize(("velocity", "finds"), [(2400, False), (2600, True)])
+def test_a_motor_is_as_fast_as_its_shaft(velocity, finds):
+    """No motor turns faster than 24,000 turns a minute, however slow it makes the joint."""
+    motor = {"inertia": 1e-4, "gear_ratio": 100, "side": "shaft", "max_velocity": velocity}
+    robot = shipped_robot("planar_2r").replace("joints.0.actuator.motor", motor)
+    assert any("turns a minute of the motor" in warning for warning in robot.warnings) == finds
+
+
 @pytest.mark.parametrize("slip", SLIPS.values(), ids=SLIPS)
 def test_plausibility_judges_the_right_side(slip):
     robot = shipped_robot("scara_4").replace(slip)

@@ -6,7 +6,7 @@ import pytest
 
 from vsacli.base.errors import InputError
 from vsacli.base.variables import VARIABLES
-from vsacli.documents.expression import conversion_factor
+from vsacli.documents.expression import BASES, conversion_factor
 
 DEG = math.pi / 180
 
@@ -47,6 +47,32 @@ DEG = math.pi / 180
 )
 def test_factor(text, expected, factor):
     assert conversion_factor(text, expected) == pytest.approx(factor, rel=1e-15)
+
+
+SYMBOLS = {
+    "rad": {"rad": 1, "deg": DEG, "rev": 2 * math.pi},
+    "rad/s": {"rpm": math.pi / 30},
+    "m": {"m": 1, "cm": 0.01, "mm": 0.001, "um": 1e-6},
+    "s": {"s": 1, "ms": 0.001, "us": 1e-6, "ns": 1e-9, "min": 60},
+    "1/s": {"Hz": 1, "kHz": 1000},
+    "N": {"N": 1, "mN": 0.001, "kN": 1000},
+    "N m": {"Nm": 1, "mNm": 0.001, "Nmm": 0.001, "J": 1},
+    "N m/s": {"W": 1},
+    "kg": {"kg": 1, "g": 0.001},
+    "A": {"A": 1, "mA": 0.001},
+    "V": {"V": 1, "mV": 0.001},
+    "V/A": {"ohm": 1, "mohm": 0.001},
+}
+"""Size of every symbol, by the unit that has its dimensions."""
+
+
+def test_every_symbol_has_its_size_and_dimensions():
+    sizes = {(symbol, unit): size for unit, symbols in SYMBOLS.items() for symbol, size in symbols.items()}
+    assert {symbol for symbol, _ in sizes} == BASES.keys()
+    for (symbol, unit), size in sizes.items():
+        per_second = unit == "1/s"  # no unit begins with a number
+        text, expected = (f"rad {symbol}", "rad/s") if per_second else (symbol, unit)
+        assert conversion_factor(text, expected) == pytest.approx(size, rel=1e-15), symbol
 
 
 @pytest.mark.parametrize("name", ["time", "q", "d4q", "stiffness", "ddstiffness", "wrench", "ddwrench"])

@@ -13,6 +13,7 @@ from samples.studies import HEAD, column, content, study
 from vsacli import inverse_dynamics, load_robot, load_trajectory, optimize
 from vsacli.cli.optimize import optimize as command
 from vsacli.studies.search.criteria import CRITERIA
+from vsacli.studies.sweeps.study import load_study
 from vsacli.studies.sweeps.study_file import MINIMIZED, VARIED
 
 ONE_JOINT = HEAD.replace("arm.yaml", "tendon.yaml").replace("move.yaml", "pull.yaml")
@@ -33,6 +34,13 @@ def test_words_are_those_of_the_command() -> None:
     words: dict[str | None, Any] = {each.name: each.type for each in command.params}
     assert (tuple(words["minimize"].choices), tuple(words["vary"].choices)) == (MINIMIZED, VARIED)
     assert {*MINIMIZED} == {*CRITERIA, "time"}
+
+
+@pytest.mark.parametrize("share", ["10 %", "10%", "0.1", "'10 %'", "1e1 %"])
+def test_a_margin_in_percent_is_a_hundredth(share: str, tmp_path: Path) -> None:
+    optimized = load_study(one_joint(tmp_path, f"optimize: {{min_margin: {share}}}\n")).file.optimize
+    assert optimized is not None
+    assert optimized.min_margin == 0.1
 
 
 @pytest.mark.slow
