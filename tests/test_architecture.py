@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 from samples.call_paths import returns, visited
 from samples.command_line import REST_TO_REST, ROBOT
 from samples.defined_names import defined_twice, share_of_empty_words
@@ -42,7 +43,7 @@ MOST_CLASS_NAMES_TWICE, MOST_FUNCTION_NAMES_TWICE, LARGEST_SHARE_OF_EMPTY_WORDS 
 not; and the share of names that are a word without content. Like the counts above, they are lowered, or
 raised with a reason."""
 
-MOST_RETURNS = {"robot file": 106, "trajectory file": 1787, "block": 252}
+MOST_RETURNS = {"robot file": 106, "trajectory file": 1787, "block": 252, "recording": 249}
 """How often reading a robot or a trajectory, and computing a block, come back to a module they have left."""
 
 HEADLESS = re.compile(
@@ -133,13 +134,19 @@ def test_names_are_defined_once_and_say_something() -> None:
     assert share_of_empty_words() <= LARGEST_SHARE_OF_EMPTY_WORDS
 
 
-def test_data_seldom_return_to_a_module_that_they_have_left() -> None:
+def test_data_seldom_return_to_a_module_that_they_have_left(tmp_path: Path) -> None:
     robot = load_robot(ROBOT)
     trajectory = load_trajectory(REST_TO_REST, robot)
+    times = np.linspace(0, trajectory.duration, 401)
+    motion, log = trajectory.at(times), tmp_path / "log.csv"
+    columns = [f"{name}.{quantity}" for quantity in ("q", "stiffness") for name in robot.joint_names]
+    rows = np.column_stack([times, motion.q, motion.commanded["stiffness"]])
+    np.savetxt(log, rows, delimiter=",", header=",".join(["time", *columns]), comments="")
     stages = {
         "robot file": lambda: load_robot(ROBOT),
         "trajectory file": lambda: load_trajectory(REST_TO_REST, robot),
         "block": lambda: motor_torques(robot, trajectory.block(0, 100)),
+        "recording": lambda: load_trajectory(log, robot),
     }
     counts = {name: returns(visited(stage)) for name, stage in stages.items()}
     assert {name: count for name, count in counts.items() if count > MOST_RETURNS[name]} == {}

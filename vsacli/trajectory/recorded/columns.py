@@ -129,13 +129,9 @@ def column_layout(
     columns = {names[place]: SignalColumn(place, names[place], factor) for place, factor in factors.items()}
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
+    of_all_joints = _namings_of_all_joints(joints)
     of_signals = {
-        key: {
-            column
-            for each in _namings_of_all_joints(joints)
-            for name in signal.names
-            for column in each[name].values()
-        }
+        key: {column for each in of_all_joints for name in signal.names for column in each[name].values()}
         for key, signal in COMMANDED.items()
     }
     return _assemble_layout(names, columns, naming, of_signals)
@@ -163,12 +159,13 @@ def _assemble_layout(
 
 
 def _name_columns(pattern: str, joints: CommandedJoints) -> Naming:
+    commanded = ((signal, joints.joints_of(signal).items()) for signal in (POSITION, *COMMANDED.values()))
     return {
         name: {
             index: pattern.format(name=name, joint=joint, number=index + 1, ending="")
-            for index, joint in joints.joints_of(signal).items()
+            for index, joint in of_signal
         }
-        for signal in (POSITION, *COMMANDED.values())
+        for signal, of_signal in commanded
         for name in signal.names
     }
 

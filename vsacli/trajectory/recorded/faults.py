@@ -31,7 +31,6 @@ from vsacli.trajectory.recorded.thresholds import (
     MARGIN,
     MOST_EVENTS,
     MOST_TOGETHER,
-    NOISE_DEVIATIONS,
     POLYNOMIAL,
     QUANTA,
     SATURATED_STEPS,
@@ -101,7 +100,7 @@ def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -
     """Return samples, up to three together, that are far off a smooth curve through their neighbors."""
     size = np.abs(quantization.differences)
     centers = np.arange(len(size)) + ORDER // 2
-    off = size > _noticeable(quantization, centers)
+    off = size > quantization.noticeable[centers]
     events = _largest_disturbances(centers[off], size[off])
     isolated = [_isolated_outliers(time, values, event, quantization) for event in events]
     error_of_sample = dict(_outliers_at_ends(values, quantization))
@@ -170,7 +169,7 @@ def _outliers_at_ends(values: FloatArray, quantization: Quantization) -> Iterato
             continue
         near = sliding_window_view(inward[: END_SAMPLES + len(END_WEIGHTS)], len(END_WEIGHTS))
         error, *other_errors = near @ END_WEIGHTS
-        least = float(_noticeable(quantization, np.array([end]))[0]) * float(np.linalg.norm(END_WEIGHTS))
+        least = float(quantization.noticeable[end]) * float(np.linalg.norm(END_WEIGHTS))
         if abs(error) > max(END_SHARE * np.abs(other_errors).max(), least):
             yield end, float(error)
 
@@ -183,7 +182,7 @@ def _isolated_outliers(
         return []
     first, last = max(0, event.first - MARGIN), min(len(values) - 1, event.last + MARGIN)
     near, kept = values[first : last + 1], np.ones(last + 1 - first, dtype=bool)
-    least = float(_noticeable(quantization, np.array([event.first]))[0])
+    least = float(quantization.noticeable[event.first])
     place = time[first : last + 1] - time[first]
     powers = np.vander(2 * place / place[-1] - 1, POLYNOMIAL + 1)
     errors_of_samples: list[tuple[int, float]] = []
@@ -246,7 +245,7 @@ def _catches_up(
     low, high = JUMP_SHARE
     onward = before_speed * after_speed > 0
     return np.asarray(
-        onward & (np.abs(jump) >= _noticeable(quantization, first)) & (low <= share) & (share <= high)
+        onward & (np.abs(jump) >= quantization.noticeable[first]) & (low <= share) & (share <= high)
     )
 
 
@@ -261,7 +260,7 @@ def _stops_abruptly(values: FloatArray, quantization: Quantization, first: int, 
     steps = np.diff(near)
     if len(steps) < reach:
         return False
-    noticeable = float(_noticeable(quantization, np.array([first if first else last]))[0])
+    noticeable = float(quantization.noticeable[first if first else last])
     least = max(noticeable, ABRUPT_SHARE * float(np.abs(steps).mean()))
     return bool((np.all(steps > 0) or np.all(steps < 0)) and abs(steps[-1]) >= least)
 
@@ -272,7 +271,7 @@ def saturated_stretches(time: FloatArray, values: FloatArray, quantization: Quan
     extreme = (values[first] == values.max()) | (values[first] == values.min())
     inner = extreme & (first >= 3) & (last + 3 < len(values))
     first, last = first[inner], last[inner]
-    least = _noticeable(quantization, first)
+    least = quantization.noticeable[first]
     beyond = [_overshoot(values, first, -1) >= least, _overshoot(values, last, 1) >= least]
     cut = beyond[0] & beyond[1]
     return _faults_of_stretches(time, first[cut], last[cut])
@@ -301,11 +300,6 @@ def angle_wraps(values: FloatArray) -> Faults | None:
     lone = near & (around[:-2] < WRAP_TOLERANCE) & (around[2:] < WRAP_TOLERANCE)
     samples = np.flatnonzero(lone) + 1
     return Faults(samples, samples, steps[lone]) if samples.size else None
-
-
-def _noticeable(quantization: Quantization, samples: IndexArray) -> FloatArray:
-    """Return the smallest changes that exceed noise and quantization near samples."""
-    return np.maximum(NOISE_DEVIATIONS * quantization.noise_at(samples), QUANTA * quantization.quantum)
 
 
 def _equal_runs(values: FloatArray, least: int) -> tuple[IndexArray, IndexArray]:

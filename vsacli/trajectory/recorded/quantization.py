@@ -1,4 +1,4 @@
-"""The resolution of a column of samples: quantum of its numbers, and noise near each sample."""
+"""The resolution of a column of samples: quantum of its numbers, and changes beyond it and its noise."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, IndexArray
-from vsacli.trajectory.recorded.thresholds import BLOCK
+from vsacli.base.arrays import FloatArray
+from vsacli.trajectory.recorded.thresholds import BLOCK, NOISE_DEVIATIONS, QUANTA
 
 ORDER = 4
 NORMAL_MEDIAN = 0.6745
@@ -35,28 +35,33 @@ class Quantization:
         differences: divided differences of fourth order, (samples - 4,), scaled so that noise keeps its
             standard deviation; a motion that is sampled fast enough contributes little.
         quantum: step of the numbers, of an encoder or of printed digits.
-        noise: standard deviation near each `BLOCK` of differences, (blocks,), by medians, which outliers do
-            not change; the largest of three blocks, since noise may begin with a motion.
+        noticeable: smallest changes that exceed noise and quantum near each sample, (samples,).
     """
 
     differences: FloatArray
     quantum: float
-    noise: FloatArray
+    noticeable: FloatArray
 
     @classmethod
     def of(cls, time: FloatArray, values: FloatArray) -> Quantization:
         """Return the resolution of a column with more than four samples, (samples,)."""
-        differences = _divided_differences(time, values)
-        whole = len(differences) // BLOCK * BLOCK
-        rows = differences[:whole].reshape(-1, BLOCK) if whole else differences[None]
-        near = np.pad(np.median(np.abs(rows), axis=1) / NORMAL_MEDIAN, 1, mode="edge")
-        noise = np.maximum(np.maximum(near[:-2], near[1:-1]), near[2:])
-        return cls(differences, _quantum(values), noise)
+        differences, quantum = _divided_differences(time, values), _quantum(values)
+        blocks = np.maximum(np.arange(len(values)) - ORDER // 2, 0) // BLOCK
+        noise = _noise_of_blocks(differences)
+        near = noise[np.minimum(blocks, len(noise) - 1)]
+        return cls(differences, quantum, np.maximum(NOISE_DEVIATIONS * near, QUANTA * quantum))
 
-    def noise_at(self, samples: IndexArray) -> FloatArray:
-        """Return the standard deviation of the noise near samples."""
-        blocks = np.maximum(samples - ORDER // 2, 0) // BLOCK
-        return np.asarray(self.noise[np.minimum(blocks, len(self.noise) - 1)])
+
+def _noise_of_blocks(differences: FloatArray) -> FloatArray:
+    """Return the standard deviation near each `BLOCK` of differences, (blocks,).
+
+    Outliers do not change the medians. The largest of three blocks counts, since noise may begin with a
+    motion.
+    """
+    whole = len(differences) // BLOCK * BLOCK
+    rows = differences[:whole].reshape(-1, BLOCK) if whole else differences[None]
+    near = np.pad(np.median(np.abs(rows), axis=1) / NORMAL_MEDIAN, 1, mode="edge")
+    return np.maximum(np.maximum(near[:-2], near[1:-1]), near[2:])
 
 
 def _divided_differences(time: FloatArray, values: FloatArray) -> FloatArray:
