@@ -1,0 +1,158 @@
+"""Kernels for a GPU: one thread a sample, which calls the generated functions as device code.
+
+A kernel loads the arguments of its sample from arrays, calls functions, and stores the results. The same text
+compiles as C++ for the host, where tests compare it with the functions themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from vsacli.control.codegen.interface import Arguments, Function, Step, Structure
+from vsacli.control.codegen.scalar import indented
+
+THREADS = 128
+"""Threads of a block."""
+
+BLOCKS = 2
+"""Blocks that a multiprocessor holds at least: registers for the longest functions, of which 255 are left."""
+
+VALUES = "values"
+"""Name of the rows of all parameters, which come as one array."""
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A kernel of the generated project.
+
+    Attributes:
+        name: Name in C, without the robot's prefix.
+        arguments: Names and structures of the arguments.
+        result: Structure of the result, whose arrays are stored.
+        output: Name of the result.
+        lines: Statements that compute `returned`, the flags, and store results.
+        scalars: Declarations of further arguments, numbers equal for all samples.
+    """
+
+    name: str
+    arguments: Arguments
+    result: Structure
+    output: str
+    lines: tuple[str, ...]
+    scalars: tuple[str, ...] = ()
+
+
+def evaluation_kernel(prefix: str, function: Function) -> Kernel:
+    """Return the kernel that evaluates a function for each sample."""
+    lines = (
+        *load_arguments(prefix, function.arguments),
+        f"{prefix}_{function.result.name} {function.output};",
+        f"const unsigned returned = {call_text(prefix, function, function.output)};",
+        *store_result(function.result, function.output),
+    )
+    return Kernel(function.name, function.arguments, function.result, function.output, lines)
+
+
+def rollout_kernel(prefix: str, step: Step) -> Kernel:
+    """Return the kernel of many steps of the plant, during which its state stays in registers."""
+    arguments = tuple((name, structure) for name, structure in step.arguments if not structure.by_value)
+    (state, of_state), *held = arguments
+    over_time = ((name, each.arrays) for name, each in held if not each.nominal)
+    timed = [(name, array.name) for name, arrays in over_time for array in arrays]
+    lines = (
+        *load_arguments(prefix, arguments),
+        "unsigned returned = 0;",
+        "for (Index step = 0; step < steps; step++) {",
+        *(f"load_if_timed({name}.{array}, {name}_{array}, n, step);" for name, array in timed),
+        f"returned |= {call_text(prefix, step, state)};",
+        "}",
+        *store_result(of_state, state, step.output),
+    )
+    return Kernel("rollout", arguments, of_state, step.output, lines, ("Real dt", "Index steps"))
+
+
+def integration_kernel(prefix: str, law: Function, stiffness: Function) -> Kernel:
+    """Return the kernel that advances the integrals of a law's errors over a control period.
+
+    Args:
+        prefix: Prefix of the robot's names in C.
+        law: Function of feedback linearization.
+        stiffness: Function of the stiffness of the joints at a state.
+    """
+    structures = dict(law.arguments)
+    names = ("state", "reference", "integral", *(name for name, _ in stiffness.arguments[1:]))
+    arguments = tuple((name, structures[name]) for name in names)
+    integral = structures["integral"]
+    lines = (
+        *load_arguments(prefix, arguments),
+        f"{prefix}_{stiffness.result.name} measured;",
+        f"const unsigned returned = {call_text(prefix, stiffness, 'measured')};",
+        f"for (int joint = 0; joint < {prefix.upper()}_JOINTS; joint++) {{",
+        "integral.q[joint] += duration * (reference.q[joint] - state.q[joint]);",
+        "integral.stiffness[joint] += duration * (reference.stiffness[joint] - measured.stiffness[joint]);",
+        "}",
+        *store_result(integral, "integral", "next"),
+    )
+    return Kernel("integrate", arguments, integral, "next", lines, ("Real duration",))
+
+
+def call_text(prefix: str, function: Function, result: str) -> str:
+    """Return the call of a function with variables that are named as its arguments."""
+    passed = [name if structure.by_value else f"&{name}" for name, structure in function.arguments]
+    return f"{prefix}_{function.name}({', '.join([*passed, f'&{result}'])})"
+
+
+def load_arguments(prefix: str, arguments: Arguments) -> Iterator[str]:
+    """Yield the declarations of the arguments of a function, and statements that load them."""
+    for name, structure in arguments:
+        yield f"{prefix}_{structure.name} {name};"
+        yield from load_lines(name, structure)
+
+
+def load_lines(name: str, structure: Structure) -> Iterator[str]:
+    """Yield the statements that load the members of an argument."""
+    if structure.nominal:
+        yield from (
+            f"{name}.{entry} = entry({name}_{VALUES}, n, {row});"
+            for row, entry in enumerate(structure.entries)
+        )
+    else:
+        yield from (f"load({name}.{array.name}, {name}_{array.name}, n);" for array in structure.arrays)
+
+
+def store_result(structure: Structure, name: str, output: str = "") -> Iterator[str]:
+    """Yield the statements that store the arrays of a result that are wanted, and add the flags."""
+    for bit, array in enumerate(structure.arrays):
+        yield f"if (STORED({bit}))"
+        yield f"    store({name}.{array.name}, {output or name}_{array.name}, n);"
+    yield "entry(flags, n) |= returned;"
+
+
+def kernel_text(prefix: str, number: int, kernel: Kernel) -> str:
+    """Return the definition of a kernel, which is compiled alone if KERNEL is its number."""
+    parameters = ["Index samples", *kernel.scalars]
+    parameters += [f"Input {name}_{array}" for name, array in _array_names(kernel.arguments)]
+    parameters += [
+        f"{'FlagOutput' if array.bits else 'Output'} {kernel.output}_{array.name}"
+        for array in kernel.result.arrays
+    ]
+    declared = ",\n    ".join([*parameters, "FlagOutput flags"])
+    body = "\n".join(indented(kernel.lines, 1))
+    return f"""#if !defined(KERNEL) || KERNEL == {number}
+extern "C" __global__ void BOUNDS {prefix}_gpu_{kernel.name}(
+    {declared})
+{{
+    const Index n = this_sample();
+    if (n >= samples)
+        return;
+{body}
+}}
+#endif"""
+
+
+def _array_names(arguments: Arguments) -> Iterator[tuple[str, str]]:
+    """Yield each argument with each of its arrays."""
+    for name, structure in arguments:
+        members = [VALUES] if structure.nominal else [array.name for array in structure.arrays]
+        yield from ((name, member) for member in members)
