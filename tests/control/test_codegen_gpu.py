@@ -214,7 +214,7 @@ REFUSED: dict[str, tuple[type[Exception], str, Callable[[], dict[str, Any]]]] = 
     "single precision": (
         TypeError,
         r"command\.q is float32, but this code computes in float64: give float64, in JAX by jax_enable_x64, "
-        r"in PyTorch by \.double\(\), or generate the code with --precision float",
+        r"in PyTorch by \.double\(\), or generate it with --precision float",
         lambda: {"command": wrong(q=np.zeros((2, SAMPLES), np.float32))},
     ),
     "an integer": (

@@ -27,8 +27,6 @@ STEPS = 12
 TOLERANCE = 1e-12
 """Of integrals and what follows from them: rounding of the stiffness in NumPy, times the gains."""
 
-SIGNALS = ("q", "dq", "ddq", "d3q", "d4q", "stiffness", "dstiffness", "ddstiffness")
-
 
 def start(name: str, seed: int = 1) -> tuple[Arrays, Arrays]:
     """States near the start of a trajectory, and torques near those that hold it, (samples, ...)."""
@@ -103,11 +101,9 @@ def reference(name: str, controls: int, period: float) -> Arrays:
     motion = trajectory.at(np.arange(controls) * period)
     values = motion.variables()
     zero = np.zeros((controls, len(robot.joints)))
-    return {signal: np.nan_to_num(values.get(signal, zero)) for signal in (*SIGNALS, *_damping(name))}
-
-
-def _damping(name: str) -> list[str]:
-    return ["damping"] if "damping" in host_project(name).cpu.Command.names else []
+    return {
+        signal: np.nan_to_num(values.get(signal, zero)) for signal in host_project(name).cpu.Command.names
+    }
 
 
 def gains_of(name: str, integral: bool) -> Arrays:
@@ -211,7 +207,7 @@ def test_plant_and_law_have_parameters_of_their_own() -> None:
         ({"steps": 0}, "every is 0, expected a divisor of the number of steps, 0"),
         (
             {"torques": np.zeros((7, 1, 2, 1))},
-            r"input\.tau_motor has 7 steps, expected 12, or 1 for constant ones",
+            r"input\.tau_motor has 7 steps, expected 12, or 1 if constant",
         ),
         (
             {"torques": np.zeros((12, 1, 2))},
@@ -237,7 +233,8 @@ def test_a_step_that_is_long_for_the_plant_is_told_once() -> None:
             project.gpu.rollout(contiguous(state), contiguous(acting), dt, 1)
         assert [str(each.message) for each in caught] == [
             f"dt = {dt:g} s is long for the fastest vibration of the plant, {fastest:.3g} rad/s: a step of "
-            f"this method requires dt below {0.25 / fastest:.2g} s, and is unstable from {2.8 / fastest:.2g} s on"
+            f"this method requires dt below {0.25 / fastest:.2g} s, and is unstable from "
+            f"{2.8 / fastest:.2g} s on"
         ] * told
 
 

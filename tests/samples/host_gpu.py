@@ -28,7 +28,7 @@ PRELUDE = """
 #undef HUGE_VAL
 #define __global__
 #define __launch_bounds__(...)
-#define __constant__
+#define __constant__ static
 #define __noinline__
 #define __shared__ static
 static struct { unsigned x; } blockIdx, threadIdx, blockDim;
@@ -40,10 +40,10 @@ extern "C" void choose_thread(unsigned block, unsigned thread, unsigned threads,
 
 CPP = (
     *("g++", "-std=c++20", "-O0", "-ffp-contract=off", "-shared", "-fPIC"),
-    *("-Wall", "-Werror", "-Wno-unused", "-Wno-narrowing"),
+    *("-Wall", "-Werror", "-Wno-unused", "-Wno-narrowing", "-Wno-unknown-pragmas"),
 )
-"""A compiler that neither reorders nor contracts operations, as for C99 of the projects on this processor. Tables
-of single precision contain NaN of double precision, which is an error to g++, not to NVRTC."""
+"""A compiler that neither reorders nor contracts operations, as for C99 of the projects on this processor.
+Tables of single precision contain NaN of double precision, which is an error to g++, not to NVRTC."""
 
 
 class HostArray(np.ndarray):

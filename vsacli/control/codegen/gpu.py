@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any
 
@@ -11,19 +12,26 @@ import numpy as np
 
 from vsacli.base.texts import one_line
 from vsacli.base.wrench import WrenchFrame
+from vsacli.compute.tracing import is_of_calls
+from vsacli.compute.tracing.c_code import Dialect
+from vsacli.compute.tracing.program import operation_count
+from vsacli.control.codegen.actuation_functions import Actuation, actuation
+from vsacli.control.codegen.feedback_function import law_in_parts, link_motion_function
 from vsacli.control.codegen.interface import Function, Rows, Step, Structure, structures
 from vsacli.control.codegen.kernels import (
     BLOCKS,
     THREADS,
     Kernel,
+    actuated_kernel,
+    actuation_tables,
     evaluation_kernel,
     integration_kernel,
     kernel_text,
     rollout_kernel,
 )
-from vsacli.control.codegen.parameters import PARAMETERS, with_parameters
+from vsacli.control.codegen.parameters import PARAMETERS, Maker, with_parameters
 from vsacli.control.codegen.robot_functions import state_structure, variable_array
-from vsacli.control.codegen.scalar import WIDTH, further_definitions
+from vsacli.control.codegen.scalar import WIDTH, further_definitions, scalar_dialect
 from vsacli.control.codegen.texts import NUMPY_TYPES, comment, filled, structure_text
 from vsacli.dynamics.forward import Plant
 from vsacli.robot.model import Robot
@@ -35,12 +43,36 @@ ROLLOUTS = {
 }
 """Templates of the Python functions that need a kernel, by its name."""
 
+_GLUE = "\xa0"
+"""A space at which no line is broken."""
+
 _CONVERSIONS = {
-    "double": "give float64, in JAX by jax_enable_x64, in PyTorch by .double(), or generate the code with "
+    "double": "give float64, in JAX by jax_enable_x64, in PyTorch by .double(), or generate it with "
     "--precision float",
-    "float": "give float32, in PyTorch by .float(), or generate the code without --precision float",
+    "float": "give float32, in PyTorch by .float(), or generate it without --precision float",
 }
 """Ways out of arrays of the other precision."""
+
+
+MOST_OF_LAW = 4_000
+"""Largest number of operations of a law in one kernel; two kernels write and read less than one spills."""
+
+
+@dataclass
+class DeviceCode:
+    """What the source file lacks.
+
+    Attributes:
+        functions: Further functions.
+        kernels: Kernels by name.
+        before: Kernels that compute an argument of another one, by its name.
+        tables: Definitions of constants that the kernels read.
+    """
+
+    functions: list[Function] = field(default_factory=list)
+    kernels: dict[str, Kernel] = field(default_factory=dict)
+    before: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    tables: list[str] = field(default_factory=list)
 
 
 def gpu_files(
@@ -63,19 +95,50 @@ def gpu_files(
         frame: Frame of the wrench that the functions have as an argument; None without one.
         chosen: Parameters that they have as an argument.
     """
-    by_name = {function.name: function for function in functions}
-    further: list[Function] = []
-    kernels = [evaluation_kernel(prefix, each) for each in functions if not isinstance(each, Step)]
+
+    def make_function(make: Maker) -> Function:
+        return with_parameters(make, robot, frame, chosen)
+
+    code, by_name = DeviceCode(), {function.name: function for function in functions}
+    for function in functions:
+        if not isinstance(function, Step):
+            code.kernels[function.name] = evaluation_kernel(prefix, function)
+    of_joints = actuation(robot, by_name["inverse_dynamics"], chosen)
+    if of_joints is not None:
+        _add_actuation(code, prefix, by_name, of_joints, scalar_dialect(precision))
     law, step = by_name.get("feedback_linearization"), by_name.get("step")
+    if law is not None and operation_count(law.program) > MOST_OF_LAW and not is_of_calls(law.program):
+        _add_law_in_parts(code, prefix, law.name, make_function)
     if isinstance(step, Step):
-        kernels.append(rollout_kernel(prefix, step))
-    if law is not None and step is not None:
-        further.append(with_parameters(measured_stiffness_function, robot, frame, chosen))
-        kernels.append(integration_kernel(prefix, law, further[-1]))
+        code.kernels["rollout"] = rollout_kernel(prefix, step)
+        if law is not None:
+            code.functions.append(make_function(measured_stiffness_function))
+            code.kernels["integrate"] = integration_kernel(prefix, law, code.functions[-1])
     return {
-        f"{prefix}_gpu.cu": _kernel_file(prefix, functions, further, kernels, precision, about),
-        f"{prefix}_gpu.py": _loader(prefix, by_name, kernels, precision, about),
+        f"{prefix}_gpu.cu": _kernel_file(prefix, functions, code, precision, about),
+        f"{prefix}_gpu.py": _loader(prefix, by_name, code, precision, about),
     }
+
+
+def _add_actuation(
+    code: DeviceCode, prefix: str, by_name: Mapping[str, Function], of_joints: Actuation, dialect: Dialect
+) -> None:
+    """Let the kernel of inverse dynamics run the recursion, then the joints in a loop."""
+    inverse, links = by_name["inverse_dynamics"], by_name["link_torques"]
+    code.functions += of_joints.functions
+    code.kernels[inverse.name] = actuated_kernel(prefix, inverse, links, of_joints)
+    code.tables += actuation_tables(prefix, of_joints, dialect)
+
+
+def _add_law_in_parts(
+    code: DeviceCode, prefix: str, name: str, make_function: Callable[[Maker], Function]
+) -> None:
+    """Let the kernel of a law follow one that computes the motion of the links."""
+    first, second = make_function(link_motion_function), make_function(law_in_parts)
+    code.functions += [first, second]
+    code.kernels[first.name] = evaluation_kernel(prefix, first)
+    code.kernels[name] = evaluation_kernel(prefix, second, name)
+    code.before[name] = (first.name,)
 
 
 def measured_stiffness_function(robot: Robot, frame: WrenchFrame | None = None) -> Function:
@@ -97,18 +160,13 @@ def measured_stiffness_function(robot: Robot, frame: WrenchFrame | None = None) 
 
 
 def _kernel_file(
-    prefix: str,
-    functions: Sequence[Function],
-    further: Sequence[Function],
-    kernels: Sequence[Kernel],
-    precision: str,
-    about: str,
+    prefix: str, functions: Sequence[Function], code: DeviceCode, precision: str, about: str
 ) -> str:
     """Return the text of the kernels, with functions and structures that the source file lacks."""
-    declared = structures(functions)
-    new = [each for each in structures(further) if each not in declared]
+    declared, kernels = structures(functions), code.kernels.values()
+    new = [each for each in structures(code.functions) if each not in declared]
     definitions = [structure_text(prefix, each, precision) for each in new]
-    definitions += further_definitions(prefix, functions, further, precision)
+    definitions += further_definitions(prefix, functions, code.functions, precision)
     return filled(
         "robot_gpu.cu",
         prefix,
@@ -116,15 +174,16 @@ def _kernel_file(
         precision=precision,
         threads=THREADS,
         blocks=BLOCKS,
-        definitions="\n\n".join(definitions),
+        definitions="\n\n".join([*definitions, *code.tables]),
         kernels="\n\n".join(kernel_text(prefix, number, each) for number, each in enumerate(kernels)),
     )
 
 
 def _loader(
-    prefix: str, by_name: Mapping[str, Function], kernels: Sequence[Kernel], precision: str, about: str
+    prefix: str, by_name: Mapping[str, Function], code: DeviceCode, precision: str, about: str
 ) -> str:
     """Return the text of the Python module."""
+    kernels = code.kernels.values()
     of_kernels = ((*dict(kernel.arguments).values(), kernel.result) for kernel in kernels)
     used = dict.fromkeys(chain.from_iterable(of_kernels))
     shapes = {each.name: each.layout.shapes for each in used if not each.nominal}
@@ -148,18 +207,19 @@ def _loader(
         structures=_entries(shapes),
         nominal=f"\n{_entries(nominal)}\n" if nominal else "",
         kernels=_entries(tables),
-        before="",
+        before=f"\n{_entries(code.before)}\n" if code.before else "",
         functions="\n\n\n".join(public),
         rollouts="".join(_rollout(prefix, kernel, by_name) for kernel in kernels if kernel.name in ROLLOUTS),
     )
 
 
 def _entries(table: Mapping[str, Any]) -> str:
-    """Return the entries of a dictionary in Python, one below the other."""
-    lines = (f'"{name}": {value!r},'.replace("'", '"') for name, value in table.items())
-    return "\n".join(
-        textwrap.fill(line, WIDTH, initial_indent="    ", subsequent_indent="        ") for line in lines
+    """Return the entries of a dictionary in Python, one below the other; no line ends with a key."""
+    lines = (
+        f'"{name}": {value!r},'.replace("'", '"').replace(": ", f":{_GLUE}") for name, value in table.items()
     )
+    indents = {"initial_indent": "    ", "subsequent_indent": "        "}
+    return "\n".join(textwrap.fill(line, WIDTH, **indents).replace(_GLUE, " ") for line in lines)
 
 
 def _evaluation(function: Function) -> str:

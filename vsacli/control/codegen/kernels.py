@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from vsacli.compute.tracing.c_code import Dialect
+from vsacli.control.codegen.actuation_functions import CONSTANTS, Actuation
 from vsacli.control.codegen.interface import Arguments, Function, Step, Structure
 from vsacli.control.codegen.scalar import indented
 
@@ -43,15 +45,92 @@ class Kernel:
     scalars: tuple[str, ...] = ()
 
 
-def evaluation_kernel(prefix: str, function: Function) -> Kernel:
-    """Return the kernel that evaluates a function for each sample."""
+def evaluation_kernel(prefix: str, function: Function, name: str = "") -> Kernel:
+    """Return the kernel that evaluates a function for each sample, with the function's name by default."""
     lines = (
         *load_arguments(prefix, function.arguments),
         f"{prefix}_{function.result.name} {function.output};",
         f"const unsigned returned = {call_text(prefix, function, function.output)};",
         *store_result(function.result, function.output),
     )
-    return Kernel(function.name, function.arguments, function.result, function.output, lines)
+    return Kernel(name or function.name, function.arguments, function.result, function.output, lines)
+
+
+def actuated_kernel(prefix: str, inverse: Function, links: Function, actuation: Actuation) -> Kernel:
+    """Return the kernel of inverse dynamics that runs the recursion, then the actuation joint by joint.
+
+    The threads of a block are at the same joint at the same time, so that the branch costs nothing.
+
+    Args:
+        prefix: Prefix of the robot's names in C.
+        inverse: Function of inverse dynamics.
+        links: Function of the link torques.
+        actuation: Functions of the actuation.
+    """
+    motion = dict(links.arguments)["motion"]
+    (_, of_torques), (_, of_command), *_ = actuation.functions[0].arguments
+    names = [array.name for array in of_torques.arrays]
+    others = tuple(each for each in inverse.arguments if each[0] != "command")
+    joints = f"{prefix.upper()}_JOINTS"
+    lines = (
+        *load_arguments(prefix, others),
+        f"__shared__ Real torque_of[{len(names)}][{joints}][{THREADS}];",
+        "{",
+        f"{prefix}_{motion.name} motion;",
+        *(f"load(motion.{array.name}, command_{array.name}, n);" for array in motion.arrays),
+        f"{prefix}_{links.result.name} {links.output};",
+        f"{call_text(prefix, links, links.output)};",
+        f"for (int joint = 0; joint < {joints}; joint++) {{",
+        *(
+            f"torque_of[{number}][joint][threadIdx.x] = {links.output}.{name}[joint];"
+            for number, name in enumerate(names)
+        ),
+        "}",
+        "}",
+        "unsigned returned = 0;",
+        "#pragma unroll 1",
+        f"for (int joint = 0; joint < {joints}; joint++) {{",
+        f"{prefix}_{of_torques.name} torques;",
+        *(
+            f"torques.{name}[0] = torque_of[{number}][joint][threadIdx.x];"
+            for number, name in enumerate(names)
+        ),
+        f"{prefix}_{of_command.name} command;",
+        *(
+            f"load(command.{array.name}, at_row(command_{array.name}, joint), n);"
+            for array in of_command.arrays
+        ),
+        f"{prefix}_{actuation.functions[0].result.name} {inverse.output};",
+        *_choose_function(prefix, actuation, inverse.output),
+        *store_arrays(inverse.result, inverse.output, joint="joint"),
+        "}",
+        "entry(flags, n) |= returned;",
+    )
+    return Kernel(inverse.name, inverse.arguments, inverse.result, inverse.output, lines)
+
+
+def _choose_function(prefix: str, actuation: Actuation, result: str) -> Iterator[str]:
+    """Yield the statements that call the function of a joint with its constants."""
+    yield "switch (structure_of[joint]) {"
+    for number, function in enumerate(actuation.functions):
+        call = call_text(prefix, function, result)
+        table = f"{CONSTANTS}_{number}_of[constants_of[joint]]"
+        yield f"case {number}: returned |= {call.replace(f'&{CONSTANTS}', f'&{table}')}; break;"
+    yield "}"
+
+
+def actuation_tables(prefix: str, actuation: Actuation, dialect: Dialect) -> Iterator[str]:
+    """Yield the tables of the structure of each joint, and of the constants of each structure."""
+    of_joint = actuation.of_joint
+    ranks = [of_joint[:joint].count(number) for joint, number in enumerate(of_joint)]
+    for name, numbers in (("structure_of", of_joint), ("constants_of", ranks)):
+        yield f"__constant__ const int {name}[] = {{{', '.join(map(str, numbers))}}};"
+    for number, function in enumerate(actuation.functions):
+        members = [actuation.constants[joint] for joint, own in enumerate(of_joint) if own == number]
+        if members[0]:
+            rows = (f"    {{{{{', '.join(map(dialect.real, row))}}}}}," for row in members)
+            type_name = f"{prefix}_{function.arguments[-1][1].name}"
+            yield f"__constant__ const {type_name} {CONSTANTS}_{number}_of[] = {{\n{chr(10).join(rows)}\n}};"
 
 
 def rollout_kernel(prefix: str, step: Step) -> Kernel:
@@ -123,10 +202,16 @@ def load_lines(name: str, structure: Structure) -> Iterator[str]:
 
 def store_result(structure: Structure, name: str, output: str = "") -> Iterator[str]:
     """Yield the statements that store the arrays of a result that are wanted, and add the flags."""
-    for bit, array in enumerate(structure.arrays):
-        yield f"if (STORED({bit}))"
-        yield f"    store({name}.{array.name}, {output or name}_{array.name}, n);"
+    yield from store_arrays(structure, name, output)
     yield "entry(flags, n) |= returned;"
+
+
+def store_arrays(structure: Structure, name: str, output: str = "", joint: str = "") -> Iterator[str]:
+    """Yield the statements that store the arrays of a result that are wanted; of one joint if it is given."""
+    for bit, array in enumerate(structure.arrays):
+        place = f"{output or name}_{array.name}"
+        yield f"if (STORED({bit}))"
+        yield f"    store({name}.{array.name}, {f'at_row({place}, {joint})' if joint else place}, n);"
 
 
 def kernel_text(prefix: str, number: int, kernel: Kernel) -> str:
