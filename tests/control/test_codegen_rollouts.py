@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import re
+import sys
 import warnings
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from samples.host_gpu import HostProject, contiguous, host_project, record_of
+from samples.command_line import REPOSITORY
+from samples.generated_code import write_files
+from samples.host_gpu import HostProject, contiguous, host_cupy, host_project, record_of
 from samples.marks import needs, needs_compiler, slow_but
-from samples.shipped import shipped_run
+from samples.shipped import shipped_robot, shipped_run
 
 from vsacli import Gains, State, inverse_dynamics, state_derivative
 from vsacli.base.arrays import FloatArray
+from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.self_test import Arrays
 
 pytestmark = [needs_compiler, needs("g++", "g++"), pytest.mark.filterwarnings("ignore:dt = ")]
@@ -255,3 +261,27 @@ def fastest_vibration(name: str, state: Arrays, acting: Arrays, sample: int) -> 
 
     columns = [(rates(at + 1e-6 * unit) - rates(at - 1e-6 * unit)) / 2e-6 for unit in np.eye(len(at))]
     return float(np.abs(np.linalg.eigvals(np.nan_to_num(np.transpose(columns)))).max())
+
+
+@pytest.mark.slow
+def test_the_million_arms_of_the_page(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With fewer arms, and the arrays of the host."""
+    page = (REPOSITORY / "docs" / "million-arms.md").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"^```text\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    (count,) = re.findall(r"`ARMS = (\d+)`", page)
+    source = (REPOSITORY / "docs" / "examples" / "million_arms.py").read_text(encoding="utf-8")
+    assert "1_000_000" in source
+    project = generate(shipped_robot("vsa_3r"), patterns=("joints.*.link.mass",))
+    (tmp_path / "arms").mkdir()
+    write_files(project, tmp_path / "arms")
+    cupy: Any = host_cupy()
+    cupy.abs, cupy.percentile = np.abs, np.percentile
+    monkeypatch.setitem(sys.modules, "cupy", cupy)
+    for name in ("robots", "trajectories"):
+        (tmp_path / name).symlink_to(REPOSITORY / name)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    exec(compile(source.replace("1_000_000", count), "million_arms.py", "exec"), {"__name__": "arms"})
+    assert capsys.readouterr().out == shown

@@ -54,7 +54,7 @@ class SharedFunction(Function):
         return self.body
 
 
-class Actuation(NamedTuple):
+class JointFunctions(NamedTuple):
     """The functions of all joints.
 
     Attributes:
@@ -68,7 +68,7 @@ class Actuation(NamedTuple):
     constants: list[list[float]]
 
 
-def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> Actuation | None:
+def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> JointFunctions | None:
     """Return the functions of the actuation of the joints; None for one joint, or if the loop does not pay.
 
     It does not where springs are solved by iteration, which takes most of the time, and where a damped
@@ -92,7 +92,7 @@ def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> A
         _shared_function(number, functions[of_joint.index(number)], body.program, len(body.constants))
         for number, body in enumerate(distinct.values())
     ]
-    return Actuation(shared, of_joint, [body.constants for body in bodies])
+    return JointFunctions(shared, of_joint, [body.constants for body in bodies])
 
 
 def _is_straight(program: Program) -> bool:

@@ -15,13 +15,13 @@ from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.tracing import is_of_calls
 from vsacli.compute.tracing.c_code import Dialect
 from vsacli.compute.tracing.program import operation_count
-from vsacli.control.codegen.actuation_functions import Actuation, actuation
+from vsacli.control.codegen.actuation_functions import JointFunctions, actuation
 from vsacli.control.codegen.feedback_function import law_in_parts, link_motion_function
 from vsacli.control.codegen.interface import Function, Rows, Step, Structure, structures
 from vsacli.control.codegen.kernels import (
     BLOCKS,
     THREADS,
-    Kernel,
+    DeviceKernel,
     actuated_kernel,
     actuation_tables,
     evaluation_kernel,
@@ -60,7 +60,7 @@ MOST_OF_LAW = 4_000
 
 @dataclass
 class DeviceCode:
-    """What the source file lacks.
+    """Functions and kernels beyond those of the source file.
 
     Attributes:
         functions: Further functions.
@@ -70,7 +70,7 @@ class DeviceCode:
     """
 
     functions: list[Function] = field(default_factory=list)
-    kernels: dict[str, Kernel] = field(default_factory=dict)
+    kernels: dict[str, DeviceKernel] = field(default_factory=dict)
     before: dict[str, tuple[str, ...]] = field(default_factory=dict)
     tables: list[str] = field(default_factory=list)
 
@@ -121,7 +121,11 @@ def gpu_files(
 
 
 def _add_actuation(
-    code: DeviceCode, prefix: str, by_name: Mapping[str, Function], of_joints: Actuation, dialect: Dialect
+    code: DeviceCode,
+    prefix: str,
+    by_name: Mapping[str, Function],
+    of_joints: JointFunctions,
+    dialect: Dialect,
 ) -> None:
     """Let the kernel of inverse dynamics run the recursion, then the joints in a loop."""
     inverse, links = by_name["inverse_dynamics"], by_name["link_torques"]
@@ -204,16 +208,16 @@ def _loader(
         real=NUMPY_TYPES[precision],
         convert=_CONVERSIONS[precision],
         threads=THREADS,
-        structures=_entries(shapes),
-        nominal=f"\n{_entries(nominal)}\n" if nominal else "",
-        kernels=_entries(tables),
-        before=f"\n{_entries(code.before)}\n" if code.before else "",
+        structures=_dictionary_lines(shapes),
+        nominal=f"\n{_dictionary_lines(nominal)}\n" if nominal else "",
+        kernels=_dictionary_lines(tables),
+        before=f"\n{_dictionary_lines(code.before)}\n" if code.before else "",
         functions="\n\n\n".join(public),
         rollouts="".join(_rollout(prefix, kernel, by_name) for kernel in kernels if kernel.name in ROLLOUTS),
     )
 
 
-def _entries(table: Mapping[str, Any]) -> str:
+def _dictionary_lines(table: Mapping[str, Any]) -> str:
     """Return the entries of a dictionary in Python, one below the other; no line ends with a key."""
     lines = (
         f'"{name}": {value!r},'.replace("'", '"').replace(": ", f":{_GLUE}") for name, value in table.items()
@@ -242,7 +246,7 @@ def _argument(name: str, structure: Structure, key: str = "") -> str:
     return f'"{key or name}": ("{structure.name}", {key or name}),'
 
 
-def _rollout(prefix: str, kernel: Kernel, by_name: Mapping[str, Function]) -> str:
+def _rollout(prefix: str, kernel: DeviceKernel, by_name: Mapping[str, Function]) -> str:
     """Return the Python function that launches a kernel of rollouts, with the further arguments it has."""
     plant, law = by_name["step"], by_name.get("feedback_linearization")
     further = [(name, each, name) for name, each in plant.arguments if name in ("wrench", PARAMETERS)]

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from vsacli.compute.tracing.c_code import Dialect
-from vsacli.control.codegen.actuation_functions import CONSTANTS, Actuation
+from vsacli.control.codegen.actuation_functions import CONSTANTS, JointFunctions
 from vsacli.control.codegen.interface import Arguments, Function, Step, Structure
 from vsacli.control.codegen.scalar import indented
 
@@ -25,7 +25,7 @@ VALUES = "values"
 
 
 @dataclass(frozen=True)
-class Kernel:
+class DeviceKernel:
     """A kernel of the generated project.
 
     Attributes:
@@ -45,7 +45,7 @@ class Kernel:
     scalars: tuple[str, ...] = ()
 
 
-def evaluation_kernel(prefix: str, function: Function, name: str = "") -> Kernel:
+def evaluation_kernel(prefix: str, function: Function, name: str = "") -> DeviceKernel:
     """Return the kernel that evaluates a function for each sample, with the function's name by default."""
     lines = (
         *load_arguments(prefix, function.arguments),
@@ -53,10 +53,12 @@ def evaluation_kernel(prefix: str, function: Function, name: str = "") -> Kernel
         f"const unsigned returned = {call_text(prefix, function, function.output)};",
         *store_result(function.result, function.output),
     )
-    return Kernel(name or function.name, function.arguments, function.result, function.output, lines)
+    return DeviceKernel(name or function.name, function.arguments, function.result, function.output, lines)
 
 
-def actuated_kernel(prefix: str, inverse: Function, links: Function, actuation: Actuation) -> Kernel:
+def actuated_kernel(
+    prefix: str, inverse: Function, links: Function, actuation: JointFunctions
+) -> DeviceKernel:
     """Return the kernel of inverse dynamics that runs the recursion, then the actuation joint by joint.
 
     The threads of a block are at the same joint at the same time, so that the branch costs nothing.
@@ -106,10 +108,10 @@ def actuated_kernel(prefix: str, inverse: Function, links: Function, actuation: 
         "}",
         "entry(flags, n) |= returned;",
     )
-    return Kernel(inverse.name, inverse.arguments, inverse.result, inverse.output, lines)
+    return DeviceKernel(inverse.name, inverse.arguments, inverse.result, inverse.output, lines)
 
 
-def _choose_function(prefix: str, actuation: Actuation, result: str) -> Iterator[str]:
+def _choose_function(prefix: str, actuation: JointFunctions, result: str) -> Iterator[str]:
     """Yield the statements that call the function of a joint with its constants."""
     yield "switch (structure_of[joint]) {"
     for number, function in enumerate(actuation.functions):
@@ -119,7 +121,7 @@ def _choose_function(prefix: str, actuation: Actuation, result: str) -> Iterator
     yield "}"
 
 
-def actuation_tables(prefix: str, actuation: Actuation, dialect: Dialect) -> Iterator[str]:
+def actuation_tables(prefix: str, actuation: JointFunctions, dialect: Dialect) -> Iterator[str]:
     """Yield the tables of the structure of each joint, and of the constants of each structure."""
     of_joint = actuation.of_joint
     ranks = [of_joint[:joint].count(number) for joint, number in enumerate(of_joint)]
@@ -133,7 +135,7 @@ def actuation_tables(prefix: str, actuation: Actuation, dialect: Dialect) -> Ite
             yield f"__constant__ const {type_name} {CONSTANTS}_{number}_of[] = {{\n{chr(10).join(rows)}\n}};"
 
 
-def rollout_kernel(prefix: str, step: Step) -> Kernel:
+def rollout_kernel(prefix: str, step: Step) -> DeviceKernel:
     """Return the kernel of many steps of the plant, during which its state stays in registers."""
     arguments = tuple((name, structure) for name, structure in step.arguments if not structure.by_value)
     (state, of_state), *held = arguments
@@ -148,10 +150,10 @@ def rollout_kernel(prefix: str, step: Step) -> Kernel:
         "}",
         *store_result(of_state, state, step.output),
     )
-    return Kernel("rollout", arguments, of_state, step.output, lines, ("Real dt", "Index steps"))
+    return DeviceKernel("rollout", arguments, of_state, step.output, lines, ("Real dt", "Index steps"))
 
 
-def integration_kernel(prefix: str, law: Function, stiffness: Function) -> Kernel:
+def integration_kernel(prefix: str, law: Function, stiffness: Function) -> DeviceKernel:
     """Return the kernel that advances the integrals of a law's errors over a control period.
 
     Args:
@@ -173,7 +175,7 @@ def integration_kernel(prefix: str, law: Function, stiffness: Function) -> Kerne
         "}",
         *store_result(integral, "integral", "next"),
     )
-    return Kernel("integrate", arguments, integral, "next", lines, ("Real duration",))
+    return DeviceKernel("integrate", arguments, integral, "next", lines, ("Real duration",))
 
 
 def call_text(prefix: str, function: Function, result: str) -> str:
@@ -214,7 +216,7 @@ def store_arrays(structure: Structure, name: str, output: str = "", joint: str =
         yield f"    store({name}.{array.name}, {f'at_row({place}, {joint})' if joint else place}, n);"
 
 
-def kernel_text(prefix: str, number: int, kernel: Kernel) -> str:
+def kernel_text(prefix: str, number: int, kernel: DeviceKernel) -> str:
     """Return the definition of a kernel, which is compiled alone if KERNEL is its number."""
     parameters = ["Index samples", *kernel.scalars]
     parameters += [f"Input {name}_{array}" for name, array in _array_names(kernel.arguments)]
