@@ -19,13 +19,15 @@ from samples.host_gpu import (
     contiguous,
     host_cupy,
     host_project,
+    jax_arrays,
     load_gpu_module,
 )
-from samples.marks import needs, needs_compiler, slow_but
+from samples.marks import needs, needs_compiler, slow, slow_but
 from samples.shipped import shipped_robot
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.wrench import WrenchFrame
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.plant_functions import state_derivative_function
@@ -52,21 +54,23 @@ BUNDLED = sorted(
 )
 
 
-def functions_of(robot: Robot) -> list[Function]:
+def functions_of(robot: Robot, wrench: WrenchFrame | None) -> list[Function]:
     """The functions of a robot's project that are evaluated sample by sample."""
     functions = []
     for make in MAKERS:
         try:
-            functions.append(make(robot))
+            functions.append(make(robot, wrench))
         except InputError:  # no law for it
             continue
     return functions
 
 
-def samples_of(robot: Robot, function: Function, precision: str = "double") -> list[Arrays]:
+def samples_of(
+    robot: Robot, function: Function, precision: str = "double", wrench: WrenchFrame | None = None
+) -> list[Arrays]:
     """Arguments, (samples, ...): those of the self-test, and the first one with a number that is none."""
     real = np.dtype("f4" if precision == "float" else "f8")
-    arguments = ReferenceResults(robot).inputs(function)
+    arguments = ReferenceResults(robot, (), wrench).inputs(function)
     spoilt = [
         {name: np.concatenate([array, array[:3]]) for name, array in each.items()} for each in arguments
     ]
@@ -78,10 +82,10 @@ def samples_of(robot: Robot, function: Function, precision: str = "double") -> l
         return [{name: array.astype(real) for name, array in each.items()} for each in spoilt]
 
 
-def check_functions(name: str, precision: str = "double") -> None:
-    robot, project = shipped_robot(name), host_project(name, precision)
-    for function in functions_of(robot):
-        arguments = samples_of(robot, function, precision)
+def check_functions(name: str, precision: str = "double", wrench: WrenchFrame | None = None) -> None:
+    robot, project = shipped_robot(name), host_project(name, precision, wrench=wrench)
+    for function in functions_of(robot, wrench):
+        arguments = samples_of(robot, function, precision, wrench)
         structures = [structure.name for _, structure in function.arguments]
         expected, expected_flags = by_c(project, function.name, list(zip(structures, arguments, strict=True)))
         found, flags = getattr(project.gpu, function.name)(*map(contiguous, arguments))
@@ -100,6 +104,15 @@ def test_kernels_are_the_functions_to_the_bit(name: str) -> None:
 @pytest.mark.parametrize("name", slow_but({"tendon_1r"}, ["tendon_1r", "vsa_3r", "maccepa_vd_1r"]))
 def test_kernels_in_single_precision(name: str) -> None:
     check_functions(name, "float")
+
+
+@pytest.mark.cases(1)
+@pytest.mark.parametrize(
+    ("name", "wrench"),
+    [("tendon_1r", "base"), slow("lwr_7r_vsa", "end_effector"), slow("torso_2x3r", ("base", "end_effector"))],
+)
+def test_kernels_with_a_wrench(name: str, wrench: WrenchFrame) -> None:
+    check_functions(name, wrench=wrench)
 
 
 def command() -> tuple[Arrays, Arrays, Any]:
@@ -310,8 +323,10 @@ def test_arrays_of_other_libraries(library: str) -> None:
     arrays, expected, _ = command()
     if library == "jax":
         jax = pytest.importorskip("jax")
-        with jax.experimental.enable_x64():
-            given = {name: jax.numpy.asarray(array) for name, array in contiguous(arrays).items()}
+        given = jax_arrays(jax, contiguous(arrays))
+        single = {name: array.astype("float32") for name, array in given.items()}
+        with pytest.raises(TypeError, match=r"is float32, .* in JAX by jax_enable_x64"):
+            host_project(SMALL).gpu.inverse_dynamics(single)
     elif library == "torch":
         torch = pytest.importorskip("torch")
         given = {name: torch.from_numpy(array) for name, array in contiguous(arrays).items()}

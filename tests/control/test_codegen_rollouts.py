@@ -101,6 +101,22 @@ def test_torques_over_time_shared_or_one_a_sample() -> None:
         assert_states(found, expected)
 
 
+def test_a_wrench_over_time() -> None:
+    project, (state, acting) = host_project(SMALL, wrench="base"), start(SMALL)
+    drawn = np.random.default_rng(2).uniform(-1, 1, (STEPS, 6))
+    zero = np.zeros((SAMPLES, 6))
+    current, flags = record_of(project, "state", state), np.zeros(SAMPLES, np.uint32)
+    torques = record_of(project, "input", acting)
+    for wrench in drawn:
+        arrays = {"wrench": wrench[None].repeat(SAMPLES, 0), "dwrench": zero, "ddwrench": zero}
+        current, of_step = project.cpu.step(current, torques, DT, record_of(project, "wrench", arrays))
+        flags |= of_step
+    given = {"wrench": drawn[..., None], "dwrench": 0, "ddwrench": 0}
+    found, found_flags = project.gpu.rollout(contiguous(state), contiguous(acting), DT, STEPS, wrench=given)
+    assert_states(found, [current])
+    np.testing.assert_array_equal(found_flags, flags)
+
+
 def reference(name: str, controls: int, period: float) -> Arrays:
     """Commands over time, (controls, joints), of which all joints have a stiffness."""
     robot, trajectory = shipped_run(name, RUNS[name])

@@ -18,6 +18,7 @@ import numpy as np
 from samples.generated_code import Compiled, write_files
 from samples.shipped import shipped_robot
 from vsacli.base.arrays import FloatArray
+from vsacli.base.wrench import WrenchFrame
 from vsacli.control.codegen.project import Project, generate, prefix_of
 from vsacli.control.codegen.self_test import Arrays
 
@@ -180,11 +181,13 @@ def load_gpu_module(folder: Path, prefix: str, cupy: ModuleType | None) -> Any:
 
 
 @cache
-def host_project(name: str, precision: str = "double", patterns: tuple[str, ...] = ()) -> HostProject:
+def host_project(
+    name: str, precision: str = "double", patterns: tuple[str, ...] = (), wrench: WrenchFrame | None = None
+) -> HostProject:
     """A bundled robot's project, compiled once for all tests."""
     robot = shipped_robot(name)
     folder = Path(tempfile.mkdtemp(prefix="vsacli-gpu-"))
-    return HostProject(folder, generate(robot, precision, None, patterns), prefix_of(robot))
+    return HostProject(folder, generate(robot, precision, wrench, patterns), prefix_of(robot))
 
 
 def by_c(
@@ -215,3 +218,13 @@ def assert_equal(found: Arrays, expected: Arrays) -> None:
 def contiguous(arrays: Arrays) -> Arrays:
     """The fast layout, (..., samples), from (samples, ...)."""
     return {name: np.ascontiguousarray(np.moveaxis(array, 0, -1)) for name, array in arrays.items()}
+
+
+def jax_arrays(jax: Any, arrays: Arrays) -> dict[str, Any]:
+    """Arrays of JAX in double precision."""
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    try:
+        return {name: jax.numpy.asarray(values) for name, values in arrays.items()}
+    finally:
+        jax.config.update("jax_enable_x64", before)

@@ -89,10 +89,9 @@ def link_motion_function(robot: Robot, frame: WrenchFrame | None = None) -> Func
         arrays = arrays_by_argument(arguments, rows)
         wrench = None if frame is None else wrench_on_tools(robot, frame, arrays["wrench"])
         state = arrays["state"]
+        theta, dtheta = _of_springs(plant.drivetrain, state)
         law = Decoupling(plant, cast("Gains", None))
-        link = law.link_motion(
-            state["q"], state["dq"], *_of_springs(plant.drivetrain, state), wrench, arrays["reference"]
-        )
+        link = law.link_motion(state["q"], state["dq"], theta, dtheta, wrench, arrays["reference"])
         return [*link.ddq, *link.d3q]
 
     return Function(

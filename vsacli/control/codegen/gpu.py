@@ -222,8 +222,10 @@ def _dictionary_lines(table: Mapping[str, Any]) -> str:
     lines = (
         f'"{name}": {value!r},'.replace("'", '"').replace(": ", f":{_GLUE}") for name, value in table.items()
     )
-    indents = {"initial_indent": "    ", "subsequent_indent": "        "}
-    return "\n".join(textwrap.fill(line, WIDTH, **indents).replace(_GLUE, " ") for line in lines)
+    wrapped = (
+        textwrap.fill(line, WIDTH, initial_indent="    ", subsequent_indent="        ") for line in lines
+    )
+    return "\n".join(wrapped).replace(_GLUE, " ")
 
 
 def _evaluation(function: Function) -> str:
