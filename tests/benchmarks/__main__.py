@@ -1,7 +1,8 @@
 """Measure vsacli beside its peers, all in one run: `python tests/benchmarks`.
 
-Needs the extra `bench`, gcc, and the Debian packages of the tests on a Cortex-M7. `--write` puts each
-part, as soon as it is there, into one of the `PAGES` of docs; `--only growth,startup` measures parts.
+Needs the extra `bench`, gcc, and the Debian packages of the tests on a Cortex-M7; the part `gpu` is there
+where CuPy finds a device. `--write` puts each part, as soon as it is there, into one of the `PAGES` of docs;
+`--only growth,startup` measures parts.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import actuation
 import commands
 import compiled
 import controllers
+import device
 import growth
 import kernel
 import one_sample
@@ -39,7 +41,8 @@ from subjects import ROOT
 from vsacli.compute.engine.engines import SAMPLES_PER_PASS
 
 PAGES = tuple(
-    ROOT / "docs" / name for name in ("performance.md", "performance-notes.md", "codegen-performance.md")
+    ROOT / "docs" / name
+    for name in ("performance.md", "performance-notes.md", "codegen-performance.md", "gpu.md")
 )
 FIGURE = ROOT / "docs" / "images" / "performance-growth.png"
 PART = re.compile(r"(<!-- measured: (?P<name>\S+) -->\n).*?(<!-- end of measured part -->)", re.DOTALL)
@@ -61,7 +64,10 @@ def measured(repeats: int, figure: Path) -> dict[str, Callable[[], str]]:
     def staged() -> str:
         return page.stage_table(*(stages.split(SAMPLES, repeats, engine) for engine in ("numpy", "c")))
 
+    gpu = device.device_name()
+    on_device = {"gpu": lambda: device.device_part(gpu, device.measure())} if gpu else {}
     return {
+        **on_device,
         "machine": lambda: description() + "\n",
         "kernel": lambda: page.kernel_table(kernel.compare(SAMPLES, PYTHON_SAMPLES, repeats)),
         "batches": lambda: page.batch_table(compiled.batches(SAMPLES, repeats)),

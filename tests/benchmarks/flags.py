@@ -16,7 +16,7 @@ import numpy as np
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # the samples of the tests
 
-from page import table
+from markdown import table
 from samples.engines import demands
 from subjects import ROBOTS
 

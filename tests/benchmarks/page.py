@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 from actuation import JOINTS, Actuation
 from commands import Taken
@@ -10,6 +10,7 @@ from compiled import Cost
 from controllers import Controller
 from growth import SAMPLES_OF_CHAIN, Growth
 from kernel import CASADI, Kernel
+from markdown import table
 from one_sample import PEER
 from optimizations import PEER as IPOPT
 from optimizations import VSACLI, Optimized
@@ -23,12 +24,6 @@ from timing import Seconds
 from variants import VariantTime
 from waits import Wait
 from whole_runs import WholeRun
-
-
-def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A Markdown table."""
-    lines = [header, ["---"] * len(header), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def micro(seconds: float) -> str:

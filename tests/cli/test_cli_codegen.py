@@ -17,7 +17,10 @@ from vsacli.robot.model import Robot
 
 Run = Callable[..., Outcome]
 
-FILES = {"vsa_3r.c", "vsa_3r.h", "vsa_3r_test.c", "vsa_3r.py", "Makefile", "CMakeLists.txt", "README.md"}
+FILES = {
+    *("vsa_3r.c", "vsa_3r.h", "vsa_3r_test.c", "vsa_3r.py", "vsa_3r_gpu.cu", "vsa_3r_gpu.py"),
+    *("Makefile", "CMakeLists.txt", "README.md"),
+}
 
 
 def test_it_writes_the_files_and_says_so(vsacli: Run, tmp_path: Path) -> None:

@@ -245,8 +245,9 @@ def test_the_header_says_what_it_is_about() -> None:
 
 
 def test_the_files() -> None:
-    sources = {"vsa_3r.c", "vsa_3r.h", "vsa_3r_test.c"}
-    assert set(project("3R").files) == {*sources, "vsa_3r.py", "Makefile", "CMakeLists.txt", "README.md"}
+    sources = {"vsa_3r.c", "vsa_3r.h", "vsa_3r_test.c", "vsa_3r_gpu.cu"}
+    modules, build = {"vsa_3r.py", "vsa_3r_gpu.py"}, {"Makefile", "CMakeLists.txt", "README.md"}
+    assert set(project("3R").files) == sources | modules | build
     readme = project("3R").files["README.md"]
     assert "vsa_3r_inverse_dynamics(&" in readme or "vsa_3r_inverse_dynamics(command" in readme
     assert "0 base, 1 shoulder, 2 elbow" in readme

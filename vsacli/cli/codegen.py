@@ -95,8 +95,8 @@ def codegen(
     """Generate C code of ROBOT: link torques, inverse dynamics, feedback linearization, and the plant.
 
     The code is C99 and requires only math.h: no memory allocation, no state between calls, a bounded number
-    of operations. The folder also contains a test program with reference values, a Makefile, a CMake file, a
-    Python module that calls the code, and a README.
+    of operations. The folder also contains a test program with reference values, a Makefile, a CMake file,
+    Python modules that call the code on the processor and for batches on a GPU, and a README.
     """
     from vsacli.control.codegen.project import generate, write
     from vsacli.robot.parameters import parameters

@@ -121,28 +121,41 @@ class _Common(NamedTuple):
     places: list[Place]
 
 
+class SharedBody(NamedTuple):
+    """A program that similar ones share, and the constants of one of them, its last inputs."""
+
+    program: Program
+    constants: list[float]
+
+
 def with_shared_bodies(program: Program) -> Program:
     """Return the program with fewer bodies: constants in which similar bodies differ become arguments."""
     calls: list[Call] = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]
     programs = {id(call.body): call.body for call in calls}
-    bodies = {identity: _read(body) for identity, body in programs.items()}
-    alike: dict[Hashable, list[int]] = defaultdict(list)
-    for identity, body in bodies.items():
-        alike[body.shape].append(identity)
-    common = {
-        shape: _common(programs[group[0]], [bodies[identity].constants for identity in group])
-        for shape, group in alike.items()
-    }
+    shared = dict(zip(programs, share_bodies(list(programs.values())), strict=True))
 
-    def shared(symbol: Symbol) -> Symbol:
+    def of_shared_body(symbol: Symbol) -> Symbol:
         if symbol.operation != "call":
             return symbol
         (body, numbers), *given = symbol.operands
-        shape, constants = bodies[id(body)]
-        new, places = common[shape]
-        return symbol.with_operands([Call(new, numbers), *given, *(constants[place] for place in places)])
+        common, constants = shared[id(body)]
+        return symbol.with_operands([Call(common, numbers), *given, *constants])
 
-    return program._replace(operations=tuple(map(shared, program.operations)))
+    return program._replace(operations=tuple(map(of_shared_body, program.operations)))
+
+
+def share_bodies(programs: Sequence[Program]) -> list[SharedBody]:
+    """Return the body of each program, the same object for those that differ only in constants."""
+    bodies = list(map(_read, programs))
+    alike: dict[Hashable, list[int]] = defaultdict(list)
+    for number, body in enumerate(bodies):
+        alike[body.shape].append(number)
+    shared: dict[int, SharedBody] = {}
+    for group in alike.values():
+        common, places = _common(programs[group[0]], [bodies[number].constants for number in group])
+        for number in group:
+            shared[number] = SharedBody(common, [bodies[number].constants[place] for place in places])
+    return [shared[number] for number in range(len(programs))]
 
 
 def _read(program: Program) -> _Body:

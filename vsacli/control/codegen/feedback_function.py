@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from vsacli.actuators.drivetrain import Drivetrain, DrivetrainState
 from vsacli.base.flags import Flag, finite, marked, not_finite_flags
 from vsacli.base.wrench import WrenchFrame
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure, arrays_by_argument
@@ -18,7 +20,7 @@ from vsacli.control.codegen.robot_functions import (
     wrench_on_tools,
 )
 from vsacli.control.gains import STIFFNESS_ORDER, Gains, Integral
-from vsacli.control.linearization import control_law, position_order
+from vsacli.control.linearization import Decoupling, LinkMotion, control_law, position_order
 from vsacli.dynamics.forward import Plant
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Robot
@@ -64,6 +66,68 @@ def feedback_linearization_function(robot: Robot, frame: WrenchFrame | None = No
     )
 
 
+def law_in_parts(robot: Robot, frame: WrenchFrame | None = None) -> Function:
+    """Return the second part of feedback linearization, which takes what `link_motion_function` computes.
+
+    The two have fewer values at once than the law in one text; for arguments see there.
+    """
+    law = _Law(robot, frame, in_parts=True)
+    whole = feedback_linearization_function(robot, frame)
+    return dataclasses.replace(whole, name="feedback_of_links", arguments=law.arguments, compute=law)
+
+
+def link_motion_function(robot: Robot, frame: WrenchFrame | None = None) -> Function:
+    """Return the first part of feedback linearization of a robot with springs: (34) and (35)."""
+    plant = Plant(robot, frame)
+    arguments = (
+        ("state", state_structure(robot)),
+        ("reference", command_structure(robot)),
+        *wrench_argument(robot, frame),
+    )
+
+    def compute(rows: Rows) -> Rows:
+        arrays = arrays_by_argument(arguments, rows)
+        wrench = None if frame is None else wrench_on_tools(robot, frame, arrays["wrench"])
+        state = arrays["state"]
+        theta, dtheta = _of_springs(plant.drivetrain, state)
+        law = Decoupling(plant, cast("Gains", None))
+        link = law.link_motion(state["q"], state["dq"], theta, dtheta, wrench, arrays["reference"])
+        return [*link.ddq, *link.d3q]
+
+    return Function(
+        name="move_links",
+        meaning="Acceleration and jerk of the joints at a state.",
+        arguments=arguments,
+        result=_link_motion_structure(robot),
+        compute=compute,
+    )
+
+
+def _link_motion_structure(robot: Robot) -> Structure:
+    joints = (len(robot.joints),)
+    arrays = (
+        Array("ddq", joints, "joint acceleration, rad/s^2 (m/s^2)"),
+        Array("d3q", joints, "joint jerk, rad/s^3 (m/s^3)"),
+    )
+    return Structure("link_motion", "Motion of the links that follows from the state.", arrays)
+
+
+def _of_springs(drivetrain: Drivetrain, state: Arrays) -> Iterator[Any]:
+    """Yield position and velocity of the motors with springs at a state, (springs,)."""
+    return (drivetrain.of_motors(state[name])[..., drivetrain.sprung] for name in ("theta", "dtheta"))
+
+
+class _OnLinkMotion(Decoupling):
+    """The control law where the motion of the links is known."""
+
+    def __init__(self, plant: Plant, gains: Gains, ddq: Any, d3q: Any) -> None:
+        super().__init__(plant, gains)
+        self._motion = ddq, d3q
+
+    def _link_motion(self, _q: Any, _dq: Any, springs: DrivetrainState, *_: Any) -> LinkMotion:
+        return LinkMotion(springs.tau_e, springs.dtau_e, *self._motion, springs.stiffness, springs.dstiffness)
+
+
 class _Law:
     """The control law as a function of rows of all its arguments.
 
@@ -71,7 +135,7 @@ class _Law:
         arguments: arguments of the generated function.
     """
 
-    def __init__(self, robot: Robot, frame: WrenchFrame | None) -> None:
+    def __init__(self, robot: Robot, frame: WrenchFrame | None, *, in_parts: bool = False) -> None:
         self._robot = robot
         self._frame = frame
         self._plant = Plant(robot, frame)
@@ -103,19 +167,21 @@ class _Law:
                 ),
             ),
             *wrench_argument(robot, frame),
+            *([("link_motion", _link_motion_structure(robot))] if in_parts else []),
         )
 
     def __call__(self, rows: Rows) -> list[Any]:
         """Return the rows of the motor torques, then those of the flags."""
-        state, reference, gains, integral, *wrench = arrays_by_argument(self.arguments, rows).values()
+        state, reference, gain_arrays, integral, *further = arrays_by_argument(self.arguments, rows).values()
         drivetrain = self._plant.drivetrain
-        law: Any = control_law(self._plant, cast("Gains", _GainInputs(**gains)))
-        theta, dtheta = (
-            drivetrain.of_motors(state[name])[..., drivetrain.sprung] for name in ("theta", "dtheta")
-        )
+        gains = cast("Gains", _GainInputs(**gain_arrays))
         acting = None
         if self._frame is not None:
-            acting = wrench_on_tools(self._robot, self._frame, wrench[0])
+            acting = wrench_on_tools(self._robot, self._frame, further.pop(0))
+        law: Any = (
+            _OnLinkMotion(self._plant, gains, **further[0]) if further else control_law(self._plant, gains)
+        )
+        theta, dtheta = _of_springs(drivetrain, state)
         command = Motion.of(np.zeros(1), reference, acting)
         torque = law.torque(state["q"], state["dq"], theta, dtheta, command, Integral(**integral))
         tau_motor = drivetrain.of_joints(torque)

@@ -16,6 +16,7 @@ from vsacli.base.version import __version__
 from vsacli.base.wrench import WrenchFrame, check_wrench_frame
 from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
+from vsacli.control.codegen.gpu import gpu_files
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.parameters import Maker, check_parameters, with_parameters
 from vsacli.control.codegen.plant_functions import state_derivative_function, step_function
@@ -97,6 +98,8 @@ def generate(
     except NotImplementedError as error:
         raise InputError.one(f"no C code can be made of {robot.name}: {error}") from error
     digest = hashlib.sha256("".join(files.values()).encode()).hexdigest()
+    files |= gpu_files(robot, prefix, functions, precision, about, wrench, chosen)
+    files["README.md"] += filled("gpu.md", prefix)
     sealed = {name: text.replace(DIGEST, f"0x{digest[:8]}u") for name, text in files.items()}
     return Project(sealed, omitted, robot.warnings)
 

@@ -167,14 +167,11 @@ def inverse_dynamics_function(robot: Robot, frame: WrenchFrame | None = None) ->
         deflections = values.get(INTERNAL[0], ())
         values[INTERNAL[0]] = [deflections[SIDES * index + side] for index in damped for side in range(SIDES)]
         computed = kernel.results.unpack(kernel(kernel.arguments.pack(values)))
-        drive = [row for name in DRIVE_NAMES for row in computed[name]]
-        corridor = (values["stiffness"], computed["stiffness_min"], computed["stiffness_max"])
-        drive += [*map(margin, *corridor), *computed["flags"]]
+        drive = drive_rows(values, computed)
         if inside is None:
             return drive
         return [*drive, *_inside(robot, computed, "phi"), *_inside(robot, computed, "dphi")]
 
-    gap = "relative distance of the stiffness to the nearer end of the attainable range, negative outside it"
     rates = _internal_array(robot, "dinternal_phi", "their rates")
     further = () if inside is None else (*inside.arrays, rates)
     return Function(
@@ -184,17 +181,30 @@ def inverse_dynamics_function(robot: Robot, frame: WrenchFrame | None = None) ->
             + (" Between calls integrate internal_phi by dinternal_phi." if inside else "")
         ),
         arguments=arguments,
-        result=Structure(
-            "drive",
-            "What the motors have to do; NaN where a flag says it cannot be.",
-            (
-                *_arrays(robot, DRIVE_NAMES),
-                Array("margin", (len(robot.joints),), gap),
-                variable_array(robot, "flags"),
-                *further,
-            ),
-        ),
+        result=drive_structure(robot, "drive", further),
         compute=compute,
+    )
+
+
+def drive_rows(values: Mapping[str, Any], computed: Mapping[str, Sequence[Scalar]]) -> list[Scalar]:
+    """Return the rows of a `drive_structure` without further arrays, from inputs and results of a kernel."""
+    corridor = (values["stiffness"], computed["stiffness_min"], computed["stiffness_max"])
+    rows = [row for name in DRIVE_NAMES for row in computed[name]]
+    return [*rows, *map(margin, *corridor), *computed["flags"]]
+
+
+def drive_structure(robot: Robot, name: str, further: tuple[Array, ...] = ()) -> Structure:
+    """Return the structure of motions and torques of the motors, with the attainable range."""
+    gap = "relative distance of the stiffness to the nearer end of the attainable range, negative outside it"
+    return Structure(
+        name,
+        "What the motors have to do; NaN where a flag says it cannot be.",
+        (
+            *_arrays(robot, DRIVE_NAMES),
+            Array("margin", (len(robot.joints),), gap),
+            variable_array(robot, "flags"),
+            *further,
+        ),
     )
 
 

@@ -148,6 +148,15 @@ def definitions(prefix: str, functions: Sequence[Function], precision: str) -> I
     yield from bodies
 
 
+def further_definitions(
+    prefix: str, declared: Sequence[Function], functions: Sequence[Function], precision: str
+) -> Iterator[str]:
+    """Yield the definitions of functions for a file that includes the source file of others."""
+    earlier = set(definitions(prefix, declared, precision))
+    whole = definitions(prefix, [*declared, *functions], precision)
+    yield from (text for text in whole if text not in earlier)
+
+
 def _constant(prefix: str, structure: Structure, dialect: Dialect) -> str:
     """Return the definition of the constant with the nominal values of a structure."""
     values = zip(structure.entries, structure.nominal, strict=True)

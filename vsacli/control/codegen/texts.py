@@ -66,7 +66,7 @@ def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precis
         about=comment(_conventions(robot, functions)),
         joints=len(robot.joints),
         flags="\n".join(f"    {upper}_{flag.name} = {flag.value}, /* {flag.meaning} */" for flag in Flag),
-        structures="\n\n".join(_structure(prefix, each, precision) for each in structures(functions)),
+        structures="\n\n".join(structure_text(prefix, each, precision) for each in structures(functions)),
         functions="\n\n".join(
             f"{comment(each.meaning)}\n{signature(prefix, each, precision)};" for each in functions
         ),
@@ -88,7 +88,7 @@ def _conventions(robot: Robot, functions: Sequence[Function]) -> str:
     )
 
 
-def _structure(prefix: str, structure: Structure, precision: str) -> str:
+def structure_text(prefix: str, structure: Structure, precision: str) -> str:
     """Return the C type of a structure, and the declaration of its constant if it has nominal values."""
     name = f"{prefix}_{structure.name}"
     lines = [comment(structure.meaning), "typedef struct {"]
@@ -203,7 +203,7 @@ def binding_text(prefix: str, functions: Sequence[Function], precision: str, abo
         prefix,
         head=textwrap.fill(one_line(about), WIDTH, initial_indent="# ", subsequent_indent="# "),
         call=f"{loop.name}({_names(loop)})",
-        real=_NUMPY_TYPES[precision],
+        real=NUMPY_TYPES[precision],
         flags="\n".join(f"    {flag.name} = {flag.value}  # {flag.meaning}" for flag in Flag),
         data_types="\n\n".join(_data_type(each, precision) for each in used),
         functions="\n\n\n".join(called),
@@ -218,13 +218,13 @@ def _type(structure: Structure) -> str:
     return structure.name.capitalize()
 
 
-_NUMPY_TYPES = {"double": "np.float64", "float": "np.float32"}
+NUMPY_TYPES = {"double": "np.float64", "float": "np.float32"}
 """Types of numbers in Python."""
 
 
 def _data_type(structure: Structure, precision: str) -> str:
     """Return the NumPy data type of a structure, with the memory layout of C."""
-    number = _NUMPY_TYPES[precision]
+    number = NUMPY_TYPES[precision]
     members = "".join(
         f'        ("{array.name}", {"np.uintc" if array.bits else number}, {array.shape}),\n'
         for array in structure.arrays
