@@ -16,7 +16,7 @@ from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.rows import RowLayout
 from vsacli.compute.tracing import Program
 from vsacli.compute.tracing.calls import share_bodies
-from vsacli.compute.tracing.program import NESTED, Table
+from vsacli.compute.tracing.program import NESTED, SelectionTable
 from vsacli.compute.vector import Scalar
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure, unpacked
 from vsacli.control.codegen.parameters import with_parameters
@@ -98,7 +98,7 @@ def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> J
 def _is_straight(program: Program) -> bool:
     """Return whether a program has no loops, branches, calls, and tables."""
     return not any(
-        symbol.operation in NESTED or any(isinstance(operand, Table) for operand in symbol.operands)
+        symbol.operation in NESTED or any(isinstance(operand, SelectionTable) for operand in symbol.operands)
         for symbol in program.operations
     )
 

@@ -35,11 +35,13 @@ class Quantization:
         differences: divided differences of fourth order, (samples - 4,), scaled so that noise keeps its
             standard deviation; a motion that is sampled fast enough contributes little.
         quantum: step of the numbers, of an encoder or of printed digits.
+        noise: standard deviation near each `BLOCK` of differences, (blocks,).
         noticeable: smallest changes that exceed noise and quantum near each sample, (samples,).
     """
 
     differences: FloatArray
     quantum: float
+    noise: FloatArray
     noticeable: FloatArray
 
     @classmethod
@@ -49,7 +51,7 @@ class Quantization:
         blocks = np.maximum(np.arange(len(values)) - ORDER // 2, 0) // BLOCK
         noise = _noise_of_blocks(differences)
         near = noise[np.minimum(blocks, len(noise) - 1)]
-        return cls(differences, quantum, np.maximum(NOISE_DEVIATIONS * near, QUANTA * quantum))
+        return cls(differences, quantum, noise, np.maximum(NOISE_DEVIATIONS * near, QUANTA * quantum))
 
 
 def _noise_of_blocks(differences: FloatArray) -> FloatArray:
