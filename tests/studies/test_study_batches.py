@@ -76,3 +76,10 @@ def test_a_run_that_fails_in_a_batch_costs_no_other(tmp_path: Path, monkeypatch:
     assert f"joints.base.actuator.spring.k={third}" in errors[2]
     others = [0, 1, 3, 4, 5]
     assert np.array_equal(column(tmp_path / "broken.h5", "margin")[others], column(whole, "margin")[others])
+
+
+def test_runs_are_a_batch_even_if_the_first_one_cannot_be_built(tmp_path: Path) -> None:
+    text = "method: random\nsamples: 6\nseed: {}\nvary: {{joints.base.link.mass: {{normal: 100 %}}}}\n"
+    drawn = (load_study(study(tmp_path, text.format(seed))) for seed in range(20))
+    read = next(each for each in drawn if each.point(0).values["joints.base.link.mass"] < 0)
+    assert [str(number) for number in read.varied] == ["joints.base.link.mass"]

@@ -132,13 +132,13 @@ class Study:
 
     @cached_property
     def _first_run(self) -> PreparedRun | None:
-        """Robot and trajectory of the first run, if runs can be computed together."""
+        """Robot and trajectory of the first run, or of the files if that fails; None if runs are alone."""
         changes = self.point(0).changes
         try:
             robot = self.read.robot(changes.robot)
             trajectory = declared_trajectory(self.trajectories[0], robot, changes.trajectory)
         except InputError:
-            return None
+            robot, trajectory = self.robot, declared_trajectory(self.trajectories[0], self.robot)
         alone = self.file.optimize is not None or is_alone(robot, trajectory)
         return None if alone else PreparedRun(robot, trajectory)
 
