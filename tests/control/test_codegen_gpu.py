@@ -14,6 +14,7 @@ from samples.host_gpu import (
     CUDARuntimeError,
     Foreign,
     HostEvent,
+    HostProject,
     assert_equal,
     by_c,
     contiguous,
@@ -23,7 +24,9 @@ from samples.host_gpu import (
     load_gpu_module,
 )
 from samples.marks import needs, needs_compiler, slow, slow_but
+from samples.plants import all_rigid
 from samples.shipped import shipped_robot
+from samples.trees import random_tree
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
@@ -31,7 +34,7 @@ from vsacli.base.wrench import WrenchFrame
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.plant_functions import state_derivative_function
-from vsacli.control.codegen.project import generate
+from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import Arrays, ReferenceResults
 from vsacli.robot.model import Robot
@@ -83,7 +86,13 @@ def samples_of(
 
 
 def check_functions(name: str, precision: str = "double", wrench: WrenchFrame | None = None) -> None:
-    robot, project = shipped_robot(name), host_project(name, precision, wrench=wrench)
+    check_robot(shipped_robot(name), host_project(name, precision, wrench=wrench), precision, wrench)
+
+
+def check_robot(
+    robot: Robot, project: HostProject, precision: str = "double", wrench: WrenchFrame | None = None
+) -> None:
+    """Compare all functions of a robot."""
     for function in functions_of(robot, wrench):
         arguments = samples_of(robot, function, precision, wrench)
         structures = [structure.name for _, structure in function.arguments]
@@ -98,6 +107,15 @@ def check_functions(name: str, precision: str = "double", wrench: WrenchFrame | 
 @pytest.mark.parametrize("name", slow_but({SMALL}, BUNDLED))
 def test_kernels_are_the_functions_to_the_bit(name: str) -> None:
     check_functions(name)
+
+
+@pytest.mark.slow
+@pytest.mark.cases(3)
+@pytest.mark.parametrize("seed", range(21))
+def test_kernels_of_random_robots(seed: int, tmp_path: Path) -> None:
+    """Without springs, and with branches and every kind of actuator."""
+    robot = random_tree(seed) if seed else all_rigid("RRR", seed=1)
+    check_robot(robot, HostProject(tmp_path / "project", generate(robot), prefix_of(robot)))
 
 
 @pytest.mark.cases(2)
