@@ -18,9 +18,9 @@ from samples.host_gpu import (
     assert_equal,
     by_c,
     contiguous,
+    exported,
     host_cupy,
     host_project,
-    jax_arrays,
     load_gpu_module,
 )
 from samples.marks import needs, needs_compiler, slow, slow_but
@@ -335,25 +335,31 @@ def test_without_a_device_the_call_says_so(folder: Path) -> None:
         module.inverse_dynamics(wrong())
 
 
-@pytest.mark.parametrize("library", ["numpy", "cupy", "jax", "torch"])
-def test_arrays_of_other_libraries(library: str) -> None:
-    """Those of the host are copied to the device; a GPU has what CuPy has here."""
+@pytest.mark.parametrize("library", ["numpy", "jax", "torch"])
+def test_arrays_of_other_libraries_and_back(library: str) -> None:
+    """Those of the host are copied to the device; here both are the same."""
     arrays, expected, _ = command()
-    if library == "jax":
-        jax = pytest.importorskip("jax")
-        given = jax_arrays(jax, contiguous(arrays))
-        single = {name: array.astype("float32") for name, array in given.items()}
-        with pytest.raises(TypeError, match=r"is float32, .* in JAX by jax_enable_x64"):
-            host_project(SMALL).gpu.inverse_dynamics(single)
-    elif library == "torch":
-        torch = pytest.importorskip("torch")
-        given = {name: torch.from_numpy(array) for name, array in contiguous(arrays).items()}
-    elif library == "cupy":
-        given = {name: host_cupy().asarray(array) for name, array in contiguous(arrays).items()}
-    else:
-        given = {**contiguous(arrays), "q": contiguous(arrays)["q"].tolist()}
+    given = {name: exported(library, array) for name, array in contiguous(arrays).items()}
     found, _ = host_project(SMALL).gpu.inverse_dynamics(given)
     assert_equal(found, expected)
+    back = exported(library, found["tau_motor"])
+    np.testing.assert_array_equal(np.asarray(back), found["tau_motor"])
+
+
+def test_lists_and_arrays_of_cupy() -> None:
+    arrays, expected, _ = command()
+    given = {name: host_cupy().asarray(array) for name, array in contiguous(arrays).items()}
+    found, _ = host_project(SMALL).gpu.inverse_dynamics({**given, "q": np.asarray(given["q"]).tolist()})
+    assert_equal(found, expected)
+
+
+def test_single_precision_of_jax_is_refused() -> None:
+    jax = pytest.importorskip("jax")
+    single = {
+        name: jax.numpy.zeros(array.shape, "float32") for name, array in contiguous(command()[0]).items()
+    }
+    with pytest.raises(TypeError, match=r"is float32, .* in JAX by jax_enable_x64"):
+        host_project(SMALL).gpu.inverse_dynamics(single)
 
 
 def test_arrays_on_the_device_are_read_in_place_and_kept_until_they_are_read() -> None:
