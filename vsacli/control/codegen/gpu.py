@@ -106,7 +106,11 @@ def gpu_files(
     if of_joints is not None:
         _add_actuation(code, prefix, by_name, of_joints, scalar_dialect(precision))
     law, step = by_name.get("feedback_linearization"), by_name.get("step")
-    if law is not None and _is_long(law.program) and all(joint.actuator.sprung for joint in robot.joints):
+    if (
+        law is not None
+        and _needs_two_parts(law.program)
+        and all(joint.actuator.sprung for joint in robot.joints)
+    ):
         _add_law_in_parts(code, prefix, law.name, make_function)
     if isinstance(step, Step):
         code.kernels["rollout"] = rollout_kernel(prefix, step)
@@ -119,7 +123,7 @@ def gpu_files(
     }
 
 
-def _is_long(law: Program) -> bool:
+def _needs_two_parts(law: Program) -> bool:
     """Return whether a law is computed in two parts; laws of calls are too long for a GPU anyway."""
     return operation_count(law) > MOST_OF_LAW and not is_of_calls(law)
 
