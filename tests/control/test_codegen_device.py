@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.generated_code import Compiled, write_files
-from samples.host_gpu import contiguous, jax_arrays, load_gpu_module
+from samples.host_gpu import contiguous, exported, load_gpu_module
 from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
 
@@ -17,7 +17,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.codegen.self_test import Arrays, ReferenceResults
+from vsacli.control.codegen.self_test import ReferenceResults
 
 pytestmark = [needs_compiler, pytest.mark.slow]
 
@@ -74,13 +74,9 @@ def test_arrays_of_other_libraries_on_the_device(library: str, tmp_path: Path) -
     function = inverse_dynamics_function(robot)
     (command,) = map(contiguous, ReferenceResults(robot).inputs(function))
     expected, _ = gpu.inverse_dynamics(command)
-    found, _ = gpu.inverse_dynamics(_on_device_of(library, command))
+    given = {name: exported(library, cupy.asarray(values)) for name, values in command.items()}
+    found, _ = gpu.inverse_dynamics(given)
     for member, values in found.items():
         np.testing.assert_array_equal(values.get(), expected[member].get())
-
-
-def _on_device_of(library: str, arrays: Arrays) -> dict[str, Any]:
-    module = pytest.importorskip(library)
-    if library == "torch":
-        return {name: module.from_numpy(values).cuda() for name, values in arrays.items()}
-    return jax_arrays(module, arrays)
+    back = cupy.from_dlpack(exported(library, found["tau_motor"]))
+    assert back.data.ptr == found["tau_motor"].data.ptr

@@ -14,16 +14,19 @@ from samples.host_gpu import (
     CUDARuntimeError,
     Foreign,
     HostEvent,
+    HostProject,
     assert_equal,
     by_c,
     contiguous,
+    exported,
     host_cupy,
     host_project,
-    jax_arrays,
     load_gpu_module,
 )
 from samples.marks import needs, needs_compiler, slow, slow_but
+from samples.plants import all_rigid
 from samples.shipped import shipped_robot
+from samples.trees import random_tree
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
@@ -31,7 +34,7 @@ from vsacli.base.wrench import WrenchFrame
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.plant_functions import state_derivative_function
-from vsacli.control.codegen.project import generate
+from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import Arrays, ReferenceResults
 from vsacli.robot.model import Robot
@@ -83,7 +86,13 @@ def samples_of(
 
 
 def check_functions(name: str, precision: str = "double", wrench: WrenchFrame | None = None) -> None:
-    robot, project = shipped_robot(name), host_project(name, precision, wrench=wrench)
+    check_robot(shipped_robot(name), host_project(name, precision, wrench=wrench), precision, wrench)
+
+
+def check_robot(
+    robot: Robot, project: HostProject, precision: str = "double", wrench: WrenchFrame | None = None
+) -> None:
+    """Compare all functions of a robot."""
     for function in functions_of(robot, wrench):
         arguments = samples_of(robot, function, precision, wrench)
         structures = [structure.name for _, structure in function.arguments]
@@ -98,6 +107,15 @@ def check_functions(name: str, precision: str = "double", wrench: WrenchFrame | 
 @pytest.mark.parametrize("name", slow_but({SMALL}, BUNDLED))
 def test_kernels_are_the_functions_to_the_bit(name: str) -> None:
     check_functions(name)
+
+
+@pytest.mark.slow
+@pytest.mark.cases(3)
+@pytest.mark.parametrize("seed", range(21))
+def test_kernels_of_random_robots(seed: int, tmp_path: Path) -> None:
+    """Without springs, and with branches and every kind of actuator."""
+    robot = random_tree(seed) if seed else all_rigid("RRR", seed=1)
+    check_robot(robot, HostProject(tmp_path / "project", generate(robot), prefix_of(robot)))
 
 
 @pytest.mark.cases(2)
@@ -317,25 +335,31 @@ def test_without_a_device_the_call_says_so(folder: Path) -> None:
         module.inverse_dynamics(wrong())
 
 
-@pytest.mark.parametrize("library", ["numpy", "cupy", "jax", "torch"])
-def test_arrays_of_other_libraries(library: str) -> None:
-    """Those of the host are copied to the device; a GPU has what CuPy has here."""
+@pytest.mark.parametrize("library", ["numpy", "jax", "torch"])
+def test_arrays_of_other_libraries_and_back(library: str) -> None:
+    """Those of the host are copied to the device; here both are the same."""
     arrays, expected, _ = command()
-    if library == "jax":
-        jax = pytest.importorskip("jax")
-        given = jax_arrays(jax, contiguous(arrays))
-        single = {name: array.astype("float32") for name, array in given.items()}
-        with pytest.raises(TypeError, match=r"is float32, .* in JAX by jax_enable_x64"):
-            host_project(SMALL).gpu.inverse_dynamics(single)
-    elif library == "torch":
-        torch = pytest.importorskip("torch")
-        given = {name: torch.from_numpy(array) for name, array in contiguous(arrays).items()}
-    elif library == "cupy":
-        given = {name: host_cupy().asarray(array) for name, array in contiguous(arrays).items()}
-    else:
-        given = {**contiguous(arrays), "q": contiguous(arrays)["q"].tolist()}
+    given = {name: exported(library, array) for name, array in contiguous(arrays).items()}
     found, _ = host_project(SMALL).gpu.inverse_dynamics(given)
     assert_equal(found, expected)
+    back = exported(library, found["tau_motor"])
+    np.testing.assert_array_equal(np.asarray(back), found["tau_motor"])
+
+
+def test_lists_and_arrays_of_cupy() -> None:
+    arrays, expected, _ = command()
+    given = {name: host_cupy().asarray(array) for name, array in contiguous(arrays).items()}
+    found, _ = host_project(SMALL).gpu.inverse_dynamics({**given, "q": np.asarray(given["q"]).tolist()})
+    assert_equal(found, expected)
+
+
+def test_single_precision_of_jax_is_refused() -> None:
+    jax = pytest.importorskip("jax")
+    single = {
+        name: jax.numpy.zeros(array.shape, "float32") for name, array in contiguous(command()[0]).items()
+    }
+    with pytest.raises(TypeError, match=r"is float32, .* in JAX by jax_enable_x64"):
+        host_project(SMALL).gpu.inverse_dynamics(single)
 
 
 def test_arrays_on_the_device_are_read_in_place_and_kept_until_they_are_read() -> None:

@@ -245,6 +245,12 @@ def test_wrong_steps(changes: dict[str, Any], message: str) -> None:
         host_project(SMALL).gpu.rollout(contiguous(state), given.pop("torques"), DT, **given)
 
 
+def test_controls_are_at_least_a_step_apart() -> None:
+    state, _ = start(SMALL)
+    with pytest.raises(ValueError, match="control_every is 0, expected 1 or more"):
+        host_project(SMALL).gpu.rollout_law(contiguous(state), {}, {}, DT, STEPS, control_every=0)
+
+
 def test_a_step_that_is_long_for_the_plant_is_told_once() -> None:
     """The fastest vibration is that of the linearized plant in NumPy."""
     project, (state, acting) = host_project(SMALL), start(SMALL)

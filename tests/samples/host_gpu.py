@@ -7,13 +7,15 @@ import importlib.util
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from samples.generated_code import Compiled, write_files
 from samples.shipped import shipped_robot
@@ -220,11 +222,21 @@ def contiguous(arrays: Arrays) -> Arrays:
     return {name: np.ascontiguousarray(np.moveaxis(array, 0, -1)) for name, array in arrays.items()}
 
 
-def jax_arrays(jax: Any, arrays: Arrays) -> dict[str, Any]:
+@contextmanager
+def double_precision(jax: Any) -> Iterator[None]:
     """Arrays of JAX in double precision."""
     before = jax.config.jax_enable_x64
     jax.config.update("jax_enable_x64", True)
     try:
-        return {name: jax.numpy.asarray(values) for name, values in arrays.items()}
+        yield
     finally:
         jax.config.update("jax_enable_x64", before)
+
+
+def exported(library: str, array: Any) -> Any:
+    """An array as one of another library, by DLPack."""
+    if library == "jax":
+        jax = pytest.importorskip("jax")
+        with double_precision(jax):
+            return jax.numpy.from_dlpack(array)
+    return pytest.importorskip(library).from_dlpack(array)

@@ -71,8 +71,8 @@ class JointFunctions(NamedTuple):
 def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> JointFunctions | None:
     """Return the functions of the actuation of the joints; None for one joint, or if the loop does not pay.
 
-    It does not where springs are solved by iteration, which takes most of the time, and where a damped
-    transmission has a state.
+    It does not where springs are solved by iteration, which takes most of the time, where a damped
+    transmission has a state, and where no joint has springs, which need derivatives of the recursion.
 
     Args:
         robot: Robot.
@@ -80,7 +80,9 @@ def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> J
         chosen: Parameters that are an argument.
     """
     damped = any(joint.damper_at("transmission") for joint in robot.joints)
-    if not 1 < len(robot.joints) <= MOST_JOINTS or damped or not _is_straight(inverse.program):
+    sprung = any(joint.actuator.sprung for joint in robot.joints)
+    several = 1 < len(robot.joints) <= MOST_JOINTS
+    if not (several and sprung) or damped or not _is_straight(inverse.program):
         return None
     makers = (partial(_joint_function, index=index) for index in range(len(robot.joints)))
     functions = [with_parameters(make, robot, None, chosen) for make in makers]

@@ -12,7 +12,7 @@ import numpy as np
 
 from vsacli.base.texts import one_line
 from vsacli.base.wrench import WrenchFrame
-from vsacli.compute.tracing import is_of_calls
+from vsacli.compute.tracing import Program, is_of_calls
 from vsacli.compute.tracing.c_code import Dialect
 from vsacli.compute.tracing.program import operation_count
 from vsacli.control.codegen.actuation_functions import JointFunctions, actuation
@@ -52,7 +52,6 @@ _CONVERSIONS = {
     "float": "give float32, in PyTorch by .float(), or generate it without --precision float",
 }
 """Ways out of arrays of the other precision."""
-
 
 MOST_OF_LAW = 4_000
 """Largest number of operations of a law in one kernel; two kernels write and read less than one spills."""
@@ -107,7 +106,11 @@ def gpu_files(
     if of_joints is not None:
         _add_actuation(code, prefix, by_name, of_joints, scalar_dialect(precision))
     law, step = by_name.get("feedback_linearization"), by_name.get("step")
-    if law is not None and operation_count(law.program) > MOST_OF_LAW and not is_of_calls(law.program):
+    if (
+        law is not None
+        and _needs_two_parts(law.program)
+        and all(joint.actuator.sprung for joint in robot.joints)
+    ):
         _add_law_in_parts(code, prefix, law.name, make_function)
     if isinstance(step, Step):
         code.kernels["rollout"] = rollout_kernel(prefix, step)
@@ -118,6 +121,11 @@ def gpu_files(
         f"{prefix}_gpu.cu": _kernel_file(prefix, functions, code, precision, about),
         f"{prefix}_gpu.py": _loader(prefix, by_name, code, precision, about),
     }
+
+
+def _needs_two_parts(law: Program) -> bool:
+    """Return whether a law is computed in two parts; laws of calls are too long for a GPU anyway."""
+    return operation_count(law) > MOST_OF_LAW and not is_of_calls(law)
 
 
 def _add_actuation(
@@ -259,5 +267,5 @@ def _rollout(prefix: str, kernel: DeviceKernel, by_name: Mapping[str, Function])
         ROLLOUTS[kernel.name],
         prefix,
         keywords="".join(f"{keyword}, " for keyword in keywords),
-        arguments="\n            ".join(_argument(*each) for each in further),
+        arguments="".join(f"\n            {_argument(*each)}" for each in further),
     )
