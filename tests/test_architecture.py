@@ -33,7 +33,7 @@ HOMES = {
 
 HEAVY = ("numpy", "scipy", "matplotlib", "h5py", "hashlib")
 
-MOST_FILES, MOST_STATEMENTS, MOST_SHARED_NAMES, MOST_HEADLESS = 493, 54_000, 19, 1
+MOST_FILES, MOST_STATEMENTS, MOST_SHARED_NAMES, MOST_HEADLESS = 496, 54_500, 19, 1
 """How many files and statements of Python the package has at most, names of files that several folders
 have, and docstrings that begin without a verb or a noun. A change that needs more raises these, with its
 reason in its message; one that needs less lowers them."""
