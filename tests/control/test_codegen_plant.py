@@ -139,6 +139,7 @@ def smooth_tree(seed: int) -> Robot:
 
 
 @pytest.mark.slow
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("seed", range(20))
 def test_random_trees_with_wrenches_on_their_tools(seed: int, tmp_path: Path) -> None:
     robot = smooth_tree(seed)
