@@ -68,7 +68,7 @@ def checked_shape(name: str, array: ArrayLike, *shape: int) -> FloatArray:
         values = np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError.one(f"{name} must be an array of numbers: {error}") from None
-    if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1:
+    if values.shape != shape and (values.ndim != len(shape) + 1 or values.shape[1:] != shape):
         expected = ", ".join(map(str, shape))
         raise InputError.one(
             f"{name} must have the shape ({expected}) or (samples, {expected}), not {values.shape}"
