@@ -39,10 +39,9 @@ def by_joint(array: ArrayLike) -> FloatArray:
     return np.ascontiguousarray(values.transpose(*range(1, values.ndim), 0))
 
 
-def contiguous_rows(array: FloatArray) -> list[FloatArray]:
-    """Return the rows (samples,) of an array over time, contiguous; copy only where they are not."""
-    rows = np.moveaxis(array, 0, -1).reshape(-1, len(array))
-    return list(map(np.ascontiguousarray, rows))
+def contiguous_rows(rows: FloatArray) -> FloatArray:
+    """Return rows, (rows, samples), each of which is contiguous; copy only where they are not."""
+    return rows if rows.strides[-1] == rows.itemsize else np.ascontiguousarray(rows)
 
 
 def stack_constants(constants: Sequence[Any]) -> AnyArray:
