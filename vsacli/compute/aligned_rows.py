@@ -31,7 +31,7 @@ def address(array: AnyArray) -> int:
     read-only, empty or not contiguous.
     """
     try:
-        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+        return ctypes.addressof(ctypes.c_char.from_buffer(array.data))
     except (TypeError, ValueError):
         first: int = array.__array_interface__["data"][0]
         return first
