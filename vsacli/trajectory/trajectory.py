@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -244,7 +245,7 @@ class Trajectory:
 
     def _motion(self, time: FloatArray, rows: Callable[[Profile], FloatArray]) -> Motion:
         """Return the motion at times, (samples,) or (), from a function that gives the rows of a profile."""
-        shaped = over_time if time.ndim else _first_samples
+        shaped: Callable[[FloatArray], FloatArray] = over_time if time.ndim else itemgetter((..., 0))
         commanded = {
             name: shaped(row)
             for key, profile in self.commanded.items()
@@ -344,10 +345,6 @@ class Trajectory:
         left, right = starts[piece][which], stops[piece][which]
         time = left + (right - left) * (rank + 0.5) / hits[which]
         return time, np.minimum(time - left, right - time)
-
-
-def _first_samples(rows: FloatArray) -> FloatArray:
-    return rows[:, 0]
 
 
 def _wrenches_by_tool(

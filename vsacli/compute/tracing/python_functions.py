@@ -111,8 +111,8 @@ def function_text(program: Program, name: str, arguments: Mapping[str, int], nes
     return "\n".join([*constants, head, *_indented([*lines, f"return [{', '.join(results)}]"]), ""])
 
 
-class _Expression(NamedTuple):
-    """The text of a value that is used once, its depth, and the names in it, as often as they are there."""
+class _NestedText(NamedTuple):
+    """Expression of a value that is used once, its depth, and the names in it, as often as they occur."""
 
     text: str
     depth: int
@@ -172,7 +172,7 @@ class _Writer:
             for operand in operands
             if isinstance(operand, Symbol)
         )
-        nested: dict[int, _Expression] = {}
+        nested: dict[int, _NestedText] = {}
         reused, used = _ReusedNames(prefix), list[str]()
 
         def value(operand: Any) -> str:
@@ -203,7 +203,7 @@ class _Writer:
                 depth = 1 + max(deep, default=0)
                 text = self._expression(symbol, list(map(value, self._operands(symbol))))
                 if uses[symbol.index] == 1 and depth <= self._nesting:
-                    nested[symbol.index] = _Expression(f"({text})", depth, tuple(used))
+                    nested[symbol.index] = _NestedText(f"({text})", depth, tuple(used))
                 else:
                     reused.count(used)
                     names[symbol.index] = reused.take(uses[symbol.index]) if self._nesting else own
