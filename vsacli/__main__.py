@@ -3,7 +3,7 @@
 import gc
 import signal
 
-COLLECTED_AT = 50_000
+COLLECTED_AT = 100_000
 """New objects after which Python looks for cycles among them. A short run makes fewer, nearly all of them by
 imports and to stay, so that the usual searches after 700 take 3 % of its time and find nothing."""
 

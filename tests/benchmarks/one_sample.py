@@ -27,8 +27,11 @@ CALLS = 1000
 """Calls between two looks at the clock."""
 
 
-def compare(repeats: int) -> tuple[Seconds, float]:
-    """Processor seconds of each call by its name, and those of the call that records the robot."""
+def compare(repeats: int) -> tuple[Seconds, float, float]:
+    """Processor seconds of each call by its name, and of two calls that record the robot.
+
+    These are that of `motor_torques` at which it is recorded, and the first of `FeedbackLinearization`.
+    """
     robot = seven_joints()
     trajectory = load_trajectory(SEVEN_JOINTS[1], robot)
     motion = trajectory.at(1.0)
@@ -46,11 +49,13 @@ def compare(repeats: int) -> tuple[Seconds, float]:
         "`Trajectory.at`": lambda: trajectory.at(1.0),
     }
     recording = max(map(_seconds, [ways["`motor_torques`"]] * RECORDED_FROM))
+    first = _seconds(ways["`FeedbackLinearization`"])
     for way in ways.values():
         for _ in range(RECORDED_FROM):
             way()
     agree(derivatives, flat, peer, robot)
-    return medians({name: cpu_seconds(way, CALLS) for name, way in ways.items()}, repeats), recording
+    taken = medians({name: cpu_seconds(way, CALLS) for name, way in ways.items()}, repeats)
+    return taken, recording, first
 
 
 def agree(derivatives: list[FloatArray], flat: FloatArray, peer: Callable, robot: object) -> None:

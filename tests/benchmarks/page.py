@@ -10,6 +10,7 @@ from compiled import Cost
 from controllers import Controller
 from growth import SAMPLES_OF_CHAIN, Growth
 from kernel import CASADI, Kernel
+from machine import processor
 from markdown import table
 from one_sample import PEER
 from optimizations import PEER as IPOPT
@@ -71,14 +72,22 @@ def subnormal_table(ratios: Mapping[str, Seconds]) -> str:
     return table(header, ([size, *(f"{taken[size]:.2f}" for taken in ratios.values())] for size in sizes))
 
 
-def sample_part(seconds: Seconds, recording: float) -> str:
-    """What single samples cost from Python, and recording a robot."""
+def sample_part(seconds: Seconds, recording: float, first: float) -> str:
+    """What single samples cost from Python, and recording a robot; `first` is that of the control law."""
     peer = seconds[PEER]
     rows = table(
         ("one sample, 7R arm", "ms", "ratio"),
         ([name, f"{1e3 * taken:.2g}", f"{taken / peer:.2g}"] for name, taken in seconds.items()),
     )
-    return f"{rows}\n\nThe call that records the robot takes {recording:.2g} s."
+    return (
+        f"{rows}\n\nThe call of `motor_torques` that records the robot takes {recording:.2g} s, the first of "
+        f"`FeedbackLinearization` {first:.2g} s. {measured_on()}"
+    )
+
+
+def measured_on() -> str:
+    """The processor, for parts that are not measured together with the others."""
+    return f"Measured on {processor()}."
 
 
 def call_sentence(calls: Calls) -> str:
@@ -185,7 +194,7 @@ def whole_table(runs: Iterable[WholeRun]) -> str:
         ]
         for run in runs
     )
-    return table(header, rows)
+    return f"{table(header, rows)}\n\n{measured_on()}"
 
 
 def sensitivity_part(found: Sensitivities) -> str:
@@ -250,7 +259,7 @@ def startup_table(taken: Seconds) -> str:
         ]
         for name, seconds in taken.items()
     )
-    return table(("command", "ms", "ratio"), rows)
+    return f"{table(('command', 'ms', 'ratio'), rows)}\n\n{measured_on()}"
 
 
 def memory_sentence(samples: int, memory: int) -> str:

@@ -58,6 +58,13 @@ def test_rows_are_used_again():
     assert sum(function.rows.values()) < len(program.operations) / 10
 
 
+@pytest.mark.parametrize("array", [np.ones(3), np.ones((4, 5))[1, :-1], np.ones((4, 5))[:, 2], np.empty(0)])
+def test_the_address_is_that_of_the_first_entry_also_where_nothing_may_be_written(array):
+    assert address(array) == array.ctypes.data
+    array.flags.writeable = False
+    assert address(array) == array.ctypes.data
+
+
 @pytest.mark.parametrize("samples", [1, 7, 64, 12288, 20000])
 @pytest.mark.parametrize("dtype", [np.float64, np.uint32, np.bool_])
 def test_rows_of_the_workspace_begin_at_whole_vectors_in_different_sets_of_a_cache(samples, dtype):

@@ -200,3 +200,28 @@ def test_a_program_computes_numbers_rows_and_becomes_part_of_another() -> None:
     found = carry_out(program, [rows[:, 0], rows[:, 1]])
     expected = function(np.column_stack([rows.sum(axis=1), rows[:, 1]])).T
     np.testing.assert_array_equal(np.stack(np.broadcast_arrays(*found)), expected)
+
+
+def test_a_name_is_free_only_when_no_expression_reads_it_any_more() -> None:
+    tape = Tape()
+    x, y = tape.inputs(2)
+    product = x * y  # has a name, as it is used twice
+    later = product + x  # is written where it is used, behind what follows
+    other = product * y
+    square = other * other
+    function = StateFunction(tape.program([square * later - other]))
+    np.testing.assert_array_equal(function(np.array([2.0, 3.0])), [18.0**2 * 8 - 18])
+
+
+def test_many_values_with_few_names_are_those_of_numbers() -> None:
+    def combine(*inputs: Any) -> list[Any]:
+        draw, values = np.random.default_rng(0), list(inputs)
+        for _ in range(300):
+            first, second = (values[-place] for place in draw.integers(1, min(len(values), 40) + 1, 2))
+            values.append((first + second, first - 2 * second, np.sin(first) * second)[draw.integers(3)])
+        return values[-5:]
+
+    tape, numbers = Tape(), [0.3, -1.2, 0.7, 2.1]
+    function = StateFunction(tape.program(combine(*tape.inputs(4))))
+    # The sine of Python's module may differ from NumPy's by a rounding error.
+    np.testing.assert_allclose(function(np.array(numbers)), combine(*numbers), rtol=1e-12)

@@ -109,6 +109,14 @@ def test_shape_is_orders_joints_samples_with_contiguous_samples(signal, orders):
         np.testing.assert_array_equal(profile.samples(1, 3, time[1:3]), rows[:, :, 1:3])
 
 
+@pytest.mark.parametrize("degree", DEGREES)
+def test_a_single_time_has_the_values_of_one_of_many(degree):
+    profile, times = rest_to_rest(degree), np.linspace(*SPAN, 23)
+    one_by_one = [profile.at(times[[index]]) for index in range(len(times))]
+    np.testing.assert_array_equal(np.concatenate(one_by_one, axis=2), profile.at(times))
+    assert profile.at(times[:0]).shape == (5, 3, 0)
+
+
 def test_constant_has_no_derivatives():
     rows = ConstantProfile(signal=STIFFNESS, span=SPAN, value=(850.0, 900.0)).at(np.linspace(*SPAN, 3))
     np.testing.assert_array_equal(rows[0], [[850.0] * 3, [900.0] * 3])

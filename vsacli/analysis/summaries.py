@@ -84,7 +84,7 @@ class JointSummary:
         stiffness = block.stiffness[:, index]
         corridor = block.stiffness_min[:, index], block.stiffness_max[:, index]
         # A sample whose torque cannot be carried at all is worse than any margin.
-        gap = np.nan_to_num(margin(stiffness, *corridor), nan=-np.inf)
+        gap = np.nan_to_num(margin(stiffness, *corridor), copy=False, nan=-np.inf)
         self._record_margin(gap, block.time, corridor)
         if flagged:
             self._record_reach(flags, gap, block)

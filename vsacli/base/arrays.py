@@ -39,10 +39,9 @@ def by_joint(array: ArrayLike) -> FloatArray:
     return np.ascontiguousarray(values.transpose(*range(1, values.ndim), 0))
 
 
-def contiguous_rows(array: FloatArray) -> list[FloatArray]:
-    """Return the rows (samples,) of an array over time, contiguous; copy only where they are not."""
-    rows = np.moveaxis(array, 0, -1).reshape(-1, len(array))
-    return list(map(np.ascontiguousarray, rows))
+def contiguous_rows(rows: FloatArray) -> FloatArray:
+    """Return rows, (rows, samples), each of which is contiguous; copy only where they are not."""
+    return rows if rows.strides[-1] == rows.itemsize else np.ascontiguousarray(rows)
 
 
 def stack_constants(constants: Sequence[Any]) -> AnyArray:
@@ -68,7 +67,7 @@ def checked_shape(name: str, array: ArrayLike, *shape: int) -> FloatArray:
         values = np.asarray(array, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError.one(f"{name} must be an array of numbers: {error}") from None
-    if values.shape[-len(shape) :] != shape or values.ndim > len(shape) + 1:
+    if values.shape != shape and (values.ndim != len(shape) + 1 or values.shape[1:] != shape):
         expected = ", ".join(map(str, shape))
         raise InputError.one(
             f"{name} must have the shape ({expected}) or (samples, {expected}), not {values.shape}"

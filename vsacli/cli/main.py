@@ -124,13 +124,9 @@ def vsacli() -> None:
 FIRST_OWN = 3
 """Lowest file descriptor that is not a standard stream."""
 
-SELDOM = 100_000
-"""Allocations between garbage collections: a short run creates hardly any garbage."""
-
 
 def main() -> NoReturn:
     """Run the command `vsacli` and exit."""
-    gc.set_threshold(SELDOM)
     _hold_closed_streams()
     if not sys.warnoptions:  # NumPy's warnings are for developers, who can set `python -W`
         warnings.simplefilter("ignore", RuntimeWarning)

@@ -193,7 +193,10 @@ class FeedbackLinearization:
         self.law = control_law(self.plant, gains)
 
     def __call__(self, state: State, reference: Motion, integral: Integral | None = None) -> FloatArray:
-        """Return motor torques, ([samples,] joints, 2), N m (N); see `feedback_linearization`."""
+        """Return motor torques, ([samples,] joints, 2), N m (N); see `feedback_linearization`.
+
+        The first call for a robot traces its links: 0.3 s with seven joints.
+        """
         unpacked = self.plant.unpacked(state)
         zero = np.zeros_like(unpacked[0])
         torque = self.law.torque(*unpacked, reference, integral or Integral(zero, zero))

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from itertools import chain
@@ -269,12 +269,11 @@ def link_torques(
     check_robot(robot)
     if wrench is not None:
         check_wrench(wrench, robot.tool_names)
-    motion_arrays = _check_motion_arrays(
-        robot, dict(zip(POSITION.names, (q, dq, ddq, d3q, d4q), strict=True))
-    )
+    motion_arrays = _check_motion_arrays(robot, (q, dq, ddq, d3q, d4q))
     shape = motion_arrays[0].shape
     motion = list(map(_rows_over_samples, motion_arrays))
-    motion += [np.zeros_like(motion[0])] * (len(POSITION.names) - len(motion))
+    while len(motion) < len(POSITION.names):
+        motion.append(np.zeros_like(motion[0]))
 
     kernel = _recursion_kernel(robot, None if wrench is None else wrench.frame)
     damped = DAMPING.key in kernel.arguments.shapes
@@ -282,8 +281,8 @@ def link_torques(
     inputs = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
     chosen = engine_of_call(engine, kernel, motion[0].shape[1])
     rows: Any = np.concatenate(inputs) if chosen is NUMBERS else [row for each in inputs for row in each]
-    computed = kernel.results.arrays(chosen.run(kernel, rows))
-    tau_e, dtau_e, ddtau_e = (computed[name].T.reshape(shape) for name in TORQUES)
+    computed = chosen.run(kernel, rows).reshape(len(TORQUES), *motion[0].shape)
+    tau_e, dtau_e, ddtau_e = computed.transpose(0, 2, 1).reshape(len(TORQUES), *shape)
     return ElasticTorques(
         tau_e, dtau_e if len(motion_arrays) > 3 else None, ddtau_e if len(motion_arrays) > 4 else None
     )
@@ -294,22 +293,20 @@ def _recursion_kernel(robot: Robot, frame: WrenchFrame | None) -> LinkTorques:
     return LinkTorques(robot, frame)
 
 
-def _check_motion_arrays(robot: Robot, motion: Mapping[str, ArrayLike | None]) -> list[FloatArray]:
-    """Return the given arrays, checked: of one shape, without a missing derivative before the last."""
-    arrays = [
-        checked_shape(name, array, len(robot.joints)) for name, array in motion.items() if array is not None
-    ]
-    names = [name for name, array in motion.items() if array is not None]
-    missing = [name for name in POSITION.names[: max(len(names), 3)] if name not in names]
-    if missing and names != ["q"]:
+def _check_motion_arrays(robot: Robot, motion: Iterable[ArrayLike | None]) -> list[FloatArray]:
+    """Return the given arrays of q, dq, ..., checked: of one shape, none missing before the last."""
+    joints, by_name = len(robot.joints), zip(POSITION.names, motion, strict=True)
+    arrays = {name: checked_shape(name, array, joints) for name, array in by_name if array is not None}
+    missing = [name for name in POSITION.names[: max(len(arrays), 3)] if name not in arrays]
+    if missing and list(arrays) != ["q"]:
         raise InputError.one(
-            f"{names[-1]} is given without {' and '.join(missing)}; give q alone if the robot holds still, "
-            "else q, dq and ddq, then d3q for dtau_e, then d4q for ddtau_e"
+            f"{list(arrays)[-1]} is given without {' and '.join(missing)}; give q alone if the robot holds "
+            "still, else q, dq and ddq, then d3q for dtau_e, then d4q for ddtau_e"
         )
-    if any(array.shape != arrays[0].shape for array in arrays):
-        shapes = ", ".join(str(array.shape) for array in arrays)
-        raise InputError.one(f"{', '.join(names)} must have one shape, not {shapes}")
-    return arrays
+    if len({array.shape for array in arrays.values()}) > 1:
+        shapes = ", ".join(str(array.shape) for array in arrays.values())
+        raise InputError.one(f"{', '.join(arrays)} must have one shape, not {shapes}")
+    return list(arrays.values())
 
 
 def _rows_over_samples(array: FloatArray) -> FloatArray:

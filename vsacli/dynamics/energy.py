@@ -297,26 +297,26 @@ class RunEnergy:
         of_base = IntervalEnergy(robot, rubbing=lossy)
         self._at_steps, self._kernel = of_base.at_steps, variants.kernel(of_base)
         self._meter = EnergyMeter()
-        self._last: dict[str, list[FloatArray]] = {}
+        self._last: dict[str, FloatArray] = {}
 
     def add(self, block: Block) -> FloatArray:
         """Add a block of `BalancedDynamics`; return `motor_energy` at its samples, (samples, joints, 2).
 
         The block has the samples of one variant after the other.
         """
-        by_variant = len(self._variants), -1
+        by_variant = -1, len(self._variants), len(block.time) // len(self._variants)
         steps = {
-            name: [row.reshape(by_variant) for row in contiguous_rows(getattr(block, name))]
+            name: np.moveaxis(getattr(block, name), 0, -1).reshape(by_variant)
             for name in ("time", *self._at_steps)
         }
         lost = self._add_losses(block)
         first = _select_samples(steps, slice(1))
         before = self._last or first
         # Copies, since views would keep the whole block in memory.
-        self._last = {name: [row[:, -1:].copy() for row in rows] for name, rows in steps.items()}
+        self._last = {name: values.copy() for name, values in _select_samples(steps, slice(-1, None)).items()}
         self._meter.add_stored(_by_variant(np.moveaxis(block.elastic_energy, 0, -1), len(self._variants)))
         works = [self._add_flow(before, first, lost and lost.during(slice(1)))]
-        if steps["time"][0].shape[1] > 1:
+        if by_variant[-1] > 1:
             earlier, later = _select_samples(steps, slice(-1)), _select_samples(steps, slice(1, None))
             works.append(self._add_flow(earlier, later, lost and lost.during(slice(1, None))))
         work = np.concatenate(works, axis=-1)
@@ -337,11 +337,13 @@ class RunEnergy:
     def _add_flow(self, before: _Steps, after: _Steps, lost: LostEnergy | None) -> FloatArray:
         """Add the flow from samples to the next ones; return the work of motors until these."""
         interval = after["time"][0] - before["time"][0]
-        rows = {name: _flat_rows([*before[name], *after[name]]) for name in self._at_steps}
+        rows: dict[str, Iterable[FloatArray]] = {
+            name: [*_flat_rows(before[name]), *_flat_rows(after[name])] for name in self._at_steps
+        }
         if lost is not None:
             rows["friction"] = _flat_rows(lost.motor_friction.reshape(-1, *interval.shape))
         variant = np.repeat(np.arange(len(interval)), interval.shape[1])
-        rows |= {"interval": _flat_rows([interval]), **self._variants.inputs(variant)}
+        rows |= {"interval": _flat_rows(interval[None]), **self._variants.inputs(variant)}
         results = self._kernel.results.arrays(
             self._engine.run(self._kernel, self._kernel.arguments.pack(rows))
         )
@@ -355,17 +357,17 @@ class RunEnergy:
         return self._meter.report(self._variants.robots[variant], variant)
 
 
-_Steps = Mapping[str, Sequence[FloatArray]]
-"""Rows (variants, samples) of variables at consecutive samples, by name."""
+_Steps = Mapping[str, FloatArray]
+"""Rows of variables at consecutive samples, (rows, variants, samples), by name."""
 
 
-def _select_samples(steps: _Steps, part: slice) -> dict[str, list[FloatArray]]:
-    return {name: [row[:, part] for row in rows] for name, rows in steps.items()}
+def _select_samples(steps: _Steps, part: slice) -> dict[str, FloatArray]:
+    return {name: values[..., part] for name, values in steps.items()}
 
 
-def _flat_rows(rows: Iterable[FloatArray]) -> Sequence[FloatArray]:
-    """Return rows (variants, intervals) as contiguous rows of one variant after the other."""
-    return [np.ascontiguousarray(row).reshape(-1) for row in rows]
+def _flat_rows(values: FloatArray) -> FloatArray:
+    """Return values (rows, variants, intervals) as contiguous rows of one variant after the other."""
+    return contiguous_rows(values.reshape(len(values), -1))
 
 
 def _by_variant(values: FloatArray, variants: int) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -240,20 +241,21 @@ class Trajectory:
         """
         times = np.asarray(time, dtype=np.float64)
         elapsed = np.atleast_1d(times) - self.start
-        motion = self._motion(np.atleast_1d(times), lambda profile: profile.at(elapsed))
-        return motion if times.ndim else motion.mapped(times, lambda rows, _: rows[0])
+        return self._motion(times, lambda profile: profile.at(elapsed))
 
     def _motion(self, time: FloatArray, rows: Callable[[Profile], FloatArray]) -> Motion:
-        signals = {POSITION: self.position, **{COMMANDED[key]: each for key, each in self.commanded.items()}}
-        arrays = {
-            name: over_time(row)
-            for signal, profile in signals.items()
-            for name, row in zip(signal.names, rows(profile), strict=True)
+        """Return the motion at times, (samples,) or (), from a function that gives the rows of a profile."""
+        shaped: Callable[[FloatArray], FloatArray] = over_time if time.ndim else itemgetter((..., 0))
+        commanded = {
+            name: shaped(row)
+            for key, profile in self.commanded.items()
+            for name, row in zip(COMMANDED[key].names, rows(profile), strict=True)
         }
         wrench = None
         if self.wrench is not None:
-            wrench = Wrench(*map(over_time, self.wrench.rows(rows)), frame=self.wrench.frame)
-        return Motion.of(time, arrays, wrench)
+            wrench = Wrench(*map(shaped, self.wrench.rows(rows)), frame=self.wrench.frame)
+        q, dq, ddq, d3q, d4q = map(shaped, rows(self.position))
+        return Motion(time, q, dq, ddq, d3q, d4q, commanded, wrench=wrench)
 
     @property
     def fits(self) -> tuple[dict[str, Any], ...]:

@@ -28,14 +28,12 @@ typedef double unaligned __attribute__((vector_size(8 * LANES), aligned(8), may_
 
 static inline reals load(const double *from) { return *(const unaligned *)from; }
 
-/* Results are more than the caches hold: they go past them, to rows that begin at whole vectors. */
+/* Results are more than the caches hold: whole lines go past them, to rows that begin at whole vectors, in half the
+   time. Half a line, a vector of AVX2, does not: of the rows of a run, memory would write each half by itself, which
+   takes twice as long as a line that the caches collect. */
 #if LANES == 8
 #include <immintrin.h>
 static inline void store(double *to, reals x) { _mm512_stream_pd(to, (__m512d)x); }
-static inline void finish(void) { _mm_sfence(); }
-#elif LANES == 4
-#include <immintrin.h>
-static inline void store(double *to, reals x) { _mm256_stream_pd(to, (__m256d)x); }
 static inline void finish(void) { _mm_sfence(); }
 #else
 static inline void store(double *to, reals x) { *(reals *)to = x; }

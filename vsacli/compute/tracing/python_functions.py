@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from heapq import heappop, heappush
 from types import CodeType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -110,6 +111,41 @@ def function_text(program: Program, name: str, arguments: Mapping[str, int], nes
     return "\n".join([*constants, head, *_indented([*lines, f"return [{', '.join(results)}]"]), ""])
 
 
+class _NestedText(NamedTuple):
+    """Expression of a value that is used once, its depth, and the names in it, as often as they occur."""
+
+    text: str
+    depth: int
+    names: tuple[str, ...]
+
+
+class _ReusedNames:
+    """Names for values; a name is taken again once its value is not used any more, the first ones first.
+
+    Python loads the first 256 names of a function by one instruction, others by two. Of the 633 values with
+    names in the link torques of seven joints, at most 325 are in use at a time.
+    """
+
+    def __init__(self, prefix: str) -> None:
+        self._prefix = prefix
+        self._uses: dict[str, int] = {}
+        self._free: list[tuple[int, str]] = []
+
+    def take(self, uses: int) -> str:
+        """Return a name for a value with a number of uses."""
+        name = heappop(self._free)[1] if self._free else f"{self._prefix}_{len(self._uses)}"
+        self._uses[name] = uses
+        return name
+
+    def count(self, used: Iterable[str]) -> None:
+        """Count uses of names; those that were not taken here are ignored."""
+        for name in used:
+            if name in self._uses:
+                self._uses[name] -= 1
+                if not self._uses[name]:
+                    heappush(self._free, (len(name), name))
+
+
 class _PythonWriter:
     """Writes the statements of programs in Python.
 
@@ -136,12 +172,18 @@ class _PythonWriter:
             for operand in operands
             if isinstance(operand, Symbol)
         )
-        nested: dict[int, tuple[str, int]] = {}
+        nested: dict[int, _NestedText] = {}
+        reused, used = _ReusedNames(prefix), list[str]()
 
         def value(operand: Any) -> str:
-            if isinstance(operand, Symbol) and operand.index in nested:
-                return nested.pop(operand.index)[0]
-            return self._value(operand, names)
+            if not isinstance(operand, Symbol):
+                return self._value(operand, names)
+            if operand.index in nested:
+                inner = nested.pop(operand.index)
+                used.extend(inner.names)
+                return inner.text
+            used.append(names[operand.index])
+            return names[operand.index]
 
         for symbol in program.operations:
             own = f"{prefix}{symbol.index}"
@@ -151,19 +193,22 @@ class _PythonWriter:
                 names[symbol.index] = own
                 write = self._loop if symbol.operation == "loop" else self._branch
                 write(symbol.operands[0], own, list(map(value, symbol.operands[1:])), lines)
+                reused.count(used)
             else:
                 deep = [
-                    nested[each.index][1]
+                    nested[each.index].depth
                     for each in symbol.operands
                     if isinstance(each, Symbol) and each.index in nested
                 ]
                 depth = 1 + max(deep, default=0)
-                text = self._expression(symbol, list(map(value, _exact_operands(symbol))))
+                text = self._expression(symbol, list(map(value, self._operands(symbol))))
                 if uses[symbol.index] == 1 and depth <= self._nesting:
-                    nested[symbol.index] = f"({text})", depth
+                    nested[symbol.index] = _NestedText(f"({text})", depth, tuple(used))
                 else:
-                    names[symbol.index] = own
-                    lines.append(f"{own} = {text}")
+                    reused.count(used)
+                    names[symbol.index] = reused.take(uses[symbol.index]) if self._nesting else own
+                    lines.append(f"{names[symbol.index]} = {text}")
+            used.clear()
         return list(map(value, program.outputs))
 
     def _loop(self, loop: Loop, own: str, given: list[str], lines: list[str]) -> None:
@@ -202,6 +247,20 @@ class _PythonWriter:
         side = ", 'right'" if operation == "searchsorted" else ""
         return f"{operation}({', '.join(operands)}{side})"
 
+    def _operands(self, symbol: Symbol) -> list[Any]:
+        """Return the operands of an operation; constants among bits as integers.
+
+        Where a single sample counts, integers among real numbers become floats, with which Python multiplies
+        faster.
+        """
+        if isinstance(symbol.operands[0], SelectionTable) or symbol.operation == "item":
+            return list(symbol.operands)
+        types = {Kind.BITS: int, **({Kind.REAL: float} if self._nesting else {})}
+        return [
+            operand if isinstance(operand, Symbol) or kind not in types else types[kind](operand)
+            for operand, kind in zip(symbol.operands, kinds_of_operands(symbol), strict=True)
+        ]
+
     def _value(self, operand: Any, names: Mapping[int, str]) -> str:
         """Return a name, or a constant exactly."""
         if isinstance(operand, SelectionTable):
@@ -209,16 +268,6 @@ class _PythonWriter:
         if isinstance(operand, Symbol):
             return names[operand.index]
         return f"({operand!r})" if operand < 0 else repr(operand)  # nan and inf are names of NumPy
-
-
-def _exact_operands(symbol: Symbol) -> list[Any]:
-    """Return the operands of an operation; constants among bits as integers."""
-    if isinstance(symbol.operands[0], SelectionTable) or symbol.operation == "item":
-        return list(symbol.operands)
-    return [
-        int(operand) if kind is Kind.BITS and not isinstance(operand, Symbol) else operand
-        for operand, kind in zip(symbol.operands, kinds_of_operands(symbol), strict=True)
-    ]
 
 
 def _named(body: Program, names: Sequence[str]) -> dict[int, str]:

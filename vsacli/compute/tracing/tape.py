@@ -10,7 +10,6 @@ from vsacli.compute.rounding import OfRounding
 from vsacli.compute.tracing.calls import with_outlined_runs, with_shared_bodies
 from vsacli.compute.tracing.program import (
     COMMUTATIVE,
-    NESTED,
     Branch,
     Call,
     Kind,
@@ -83,8 +82,9 @@ class Tape:
         known = folded(operation, arguments)
         if known is not None:
             return known
-        common = self._symbols.get(_key(operation, arguments))
-        return common or self._new(operation, arguments, result_kind(operation, arguments))
+        key = _key(operation, arguments)
+        common = self._symbols.get(key)
+        return common or self._new(operation, arguments, result_kind(operation, arguments), key)
 
     def emit_loop(
         self, body: Program, limit: int, state: Sequence[Operand], constants: Sequence[Operand]
@@ -121,7 +121,10 @@ class Tape:
         nested = self._new(operation, operands, Kind.REAL)
         return [self._new("item", (nested, number), kind_of(output)) for number, output in enumerate(outputs)]
 
-    def _new(self, operation: str, operands: tuple[Any, ...], kind: Kind) -> Symbol:
+    def _new(
+        self, operation: str, operands: tuple[Any, ...], kind: Kind, key: Hashable | None = None
+    ) -> Symbol:
+        """Return a new symbol; without a key it is never a common subexpression."""
         if any(isinstance(operand, Symbol) and operand.tape is not self for operand in operands):
             message = "a value of another program cannot be used in this one; pass it as an argument"
             raise NotImplementedError(message)
@@ -130,8 +133,7 @@ class Tape:
         if len(self._symbols) + self._nested >= self._most:
             raise TooLongError(f"a step takes more than {self._most} operations")
         symbol = Symbol(self, len(self._symbols), operation, operands, kind)
-        fresh = operation in {"input", "item"} or operation in NESTED
-        self._symbols[symbol if fresh else _key(operation, operands)] = symbol
+        self._symbols[symbol if key is None else key] = symbol
         return symbol
 
     def program(self, outputs: Sequence[Operand]) -> Program:
