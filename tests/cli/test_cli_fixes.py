@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from samples.command_line import ROBOT, contents, edited, without_hint
@@ -20,7 +21,7 @@ def test_fixes_follow_the_report(vsacli, too_soft):
     assert (done.code, done.err) == (3, "")
     report = without_hint(plain.out)
     assert done.out.startswith(report)
-    blank, *causes, heading, profile, offset, springs = done.out[len(report) :].splitlines()
+    blank, *causes, heading, profile, gentle, offset, rough, springs = done.out[len(report) :].splitlines()
     assert blank == ""
     assert (
         heading
@@ -33,6 +34,10 @@ def test_fixes_follow_the_report(vsacli, too_soft):
     )
     assert offset.startswith("2. raise the stiffness of base by 18.0")
     assert profile.startswith("1. reshape the stiffness of base by up to +18.")
+    torques = re.compile(
+        r"   peak motor torque [\d.]+ N m \(shoulder\), initial torque discontinuity [\d.]+ N m \(\w+\)"
+    )
+    assert all(map(torques.fullmatch, (gentle, rough)))
     assert springs.startswith("to keep the commanded stiffness, change the springs: vsacli sensitivity ")
 
 

@@ -110,7 +110,9 @@ def check_alone(found, robot, trajectory, motion, joints):
     constants = scanned([robot], motion, joints, factors=(1.0,), offsets=FINE_OFFSETS)
     if math.isfinite(constants):
         assert found["stiffness_offset"]["possible"]
-    sizes = [each["size"] for each in found["fixes"] if set(each) == {"size", "stiffness_offset", "text"}]
+    sizes = [
+        each["size"] for each in found["fixes"] if set(each) == {"size", "motors", "stiffness_offset", "text"}
+    ]
     # whole steps of the grid, of which the search has finer ones
     assert all(size <= CLOSE * constants for size in sizes[:1])
     slower = slower_by_whole_steps(robot, trajectory, motion, joints)

@@ -31,9 +31,9 @@ from vsacli.analysis.run import Run
 from vsacli.robot.joint import Limits
 from vsacli.studies.search import fixes
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.cutting_planes import smallest_offset
 from vsacli.studies.search.fix_report import NotPossible, StiffnessOffset
 from vsacli.studies.search.loads import joint_loads
-from vsacli.studies.search.scans import smallest_offset
 from vsacli.trajectory.trajectory import Trajectory
 
 MARGIN = 0.01

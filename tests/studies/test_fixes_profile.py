@@ -65,14 +65,18 @@ def bump(time, height, at, width):
 
 
 def test_spline_through_one_point_is_the_green_function():
-    """Least integral of x^2 + T^4 x''^2 with x(0) = 1: x = e^-s (cos s + sin s), s = |t|/(sqrt(2) T)."""
+    """Least integral of x^2 + T^6 x'''^2 with x(0) = 1, for s = |t|/T and c = sqrt(3)/2.
+
+    2 x = e^-s + e^(-s/2) (cos c s + 2 c sin c s), with x' = x''' = 0 at 0, of x - T^6 x^(6) = 0.
+    """
     smoothing = 0.1
     time = np.linspace(-3, 3, 6001)
     low = np.where(time == 0, 1.0, -10.0)
     spline = nearest_spline(Bounds(time, low, np.full_like(time, np.inf)), smoothing)
-    s = np.abs(time) / np.sqrt(2) / smoothing
-    # The third derivative jumps at 0, where a knot need not be; pieces of T/3 leave (1/3)^3/6 of it, shared.
-    np.testing.assert_allclose(spline(time), np.exp(-s) * (np.cos(s) + np.sin(s)), atol=2e-3)
+    s, c = np.abs(time) / smoothing, np.sqrt(3) / 2
+    expected = (np.exp(-s) + np.exp(-s / 2) * (np.cos(c * s) + 2 * c * np.sin(c * s))) / 2
+    # The fifth derivative jumps at 0, where a knot need not be; pieces of T/2 leave (1/2)^5/120 of it.
+    np.testing.assert_allclose(spline(time), expected, atol=2e-3)
 
 
 def test_no_other_function_between_the_bounds_is_smaller():
@@ -81,16 +85,16 @@ def test_no_other_function_between_the_bounds_is_smaller():
     bounds = Bounds(time, bump(time, 30.0, center, 0.4), np.full_like(time, np.inf))
 
     def size(values, bend):
-        return trapezoid(values**2 + smoothing**4 * bend**2, time)
+        return trapezoid(values**2 + smoothing**6 * bend**2, time)
 
     spline = nearest_spline(bounds, smoothing)
-    least = size(spline(time), spline(time, nu=2))
+    least = size(spline(time), spline(time, nu=3))
     others = []
     for height, width in product(np.linspace(30, 40, 11), np.linspace(0.2, 0.6, 41)):
         u = (time - center) / width
         bell = height * np.exp(-u * u)
         if bounds.missed_by(bell).max() <= 0:
-            others.append(size(bell, bell * (4 * u * u - 2) / width**2))
+            others.append(size(bell, bell * (12 * u - 8 * u**3) / width**3))
     assert least < min(others) < 1.2 * least  # a bell is not far from the best
 
 

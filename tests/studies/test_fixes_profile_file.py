@@ -18,6 +18,7 @@ from vsacli.studies.search import Fix, check_fixed_target
 from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.changed_motion import with_changed_stiffness
 from vsacli.studies.search.task import AS_IT_IS, Task
+from vsacli.studies.search.verification import verify_fixes
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.curves.via_points import ViaPoints
@@ -66,7 +67,7 @@ def fixed(trajectory):
     task = Task(Acceptance(vsa_3r(), 0.01), trajectory)
     for _ in range(4):
         fix = task.with_profiles(AS_IT_IS)
-        short = task.falls_short(fix)
+        ((_, short),) = verify_fixes(task.acceptance, [fix])
         if short is None:
             break
         task = replace(

@@ -30,13 +30,13 @@ STEP = 1 / 400
 """The grid of factors: a slower recording lasts a whole number of its own periods."""
 
 
-def recorded_swing(seed: int) -> Trajectory:
+def recorded_swing(seed: int, stiffness: float = 1500.0, noise: float = NOISE) -> Trajectory:
     """Two sines in white noise, 2 s at 200 Hz."""
     rng, time = np.random.default_rng(seed), np.linspace(0.0, 2.0, 401)
     rate = 2 * np.pi * rng.uniform(0.5, 0.9)
     swing = 0.4 * np.sin(rate * time + rng.uniform(0, 6)) + 0.15 * np.sin(2 * rate * time)
-    q = swing + NOISE * rng.standard_normal(len(time))
-    return Trajectory.from_samples(time + 5.0, q[:, None], np.full((len(time), 1), 1500.0), name="swing")
+    q = swing + noise * rng.standard_normal(len(time))
+    return Trajectory.from_samples(time + 5.0, q[:, None], np.full((len(time), 1), stiffness), name="swing")
 
 
 def limited(robot: Robot, trajectory: Trajectory, limit: str, deviations: float) -> Robot:
@@ -84,6 +84,22 @@ def test_what_a_run_calls_ok_needs_no_fix_and_fixes_are_ok_in_a_run(tmp_path: Pa
         if fix.kinds == {"slow_down"}:  # and not more than is needed
             faster = trajectory.stretched(fix.slow_down.factor - STEP)
             assert inverse_dynamics(beyond, faster).report.verdict == "over_limit"
+
+
+@pytest.mark.slow
+def test_a_slow_down_with_another_stiffness_allows_for_the_noise_at_its_own_speed() -> None:
+    """Noise of velocities falls with the speed; limits count beyond two standard deviations of it.
+
+    At two thirds of the speed they differ by more than a step of the grid from those at the full speed.
+    """
+    trajectory = recorded_swing(3, stiffness=790.0, noise=10 * NOISE)
+    robot = limited(pendulum(), trajectory, "velocity", 250.0)
+    fix = fixes(robot, trajectory).fixes[0]
+    assert fix.kinds >= {"slow_down", "stiffness_offset"}
+    assert inverse_dynamics(robot, fix.trajectory).report.verdict == "ok"
+    faster = trajectory.stretched(fix.slow_down.factor - STEP)
+    (joint,) = inverse_dynamics(robot, faster).report.joints
+    assert joint.shows("over_limit")
 
 
 @pytest.mark.slow

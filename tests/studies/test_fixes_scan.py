@@ -1,67 +1,76 @@
-"""Scan, bisection and confirmation on whole numbers."""
+"""The smallest accepted whole number, found at few samples and checked at all."""
 
-from dataclasses import dataclass, field
-
+import numpy as np
 import pytest
 
-from vsacli.studies.search.scans import smallest_confirmed
+from vsacli.studies.search.cutting_planes import first_accepted, scanned_numbers, smallest_accepted
+
+STRIDES = range(0, 100, 10)
 
 
-@dataclass
-class Numbers:
-    """Candidates judged by two rules: one for the watched steps, one for all."""
+def first(rule, numbers=(*STRIDES, 99)):
+    """The first accepted number, and the numbers that were asked for."""
+    asked = []
 
-    watched: object
-    everywhere: object = None
-    step: int = 10
-    asked: list[int] = field(default_factory=list)
+    def accepts(tried):
+        for number in tried:
+            asked.append(number)
+            yield rule(number)
 
-    def stride(self, number):
-        assert number >= 0
-        return self.step
-
-    def accepts(self, number):
-        self.asked.append(number)
-        return self.watched(number)
-
-    def confirms(self, number):
-        rule = self.everywhere or self.watched
-        if rule(number):
-            return True
-        self.watched = rule
-        return False
+    return first_accepted(accepts, numbers), asked
 
 
-@pytest.mark.parametrize("threshold", [0, 1, 9, 10, 11, 57, 99, 100])
+def smallest(thresholds, numbers=(*STRIDES, 99)):
+    """The smallest number that is at least the threshold of each sample, if it is below their end."""
+    low, high = np.array(thresholds).T
+
+    def refuse(tried, samples):
+        for number in tried:
+            yield ((number < low[samples]) | (number > high[samples]))[None]
+
+    return smallest_accepted(refuse, len(low), numbers)
+
+
+@pytest.mark.parametrize("threshold", [0, 1, 9, 10, 11, 57, 98, 99])
 def test_smallest_of_a_monotone_rule_is_found(threshold):
-    assert smallest_confirmed(Numbers(lambda n: n >= threshold), 0, 100) == threshold
+    assert first(lambda n: n >= threshold)[0] == threshold
 
 
 def test_first_number_is_taken_if_it_is_accepted():
-    numbers = Numbers(lambda _: True)
-    assert smallest_confirmed(numbers, 7, 100) == 7
-    assert numbers.asked == [7]
+    assert first(lambda _: True, [7, 20]) == (7, [7])
 
 
-@pytest.mark.parametrize(("start", "stop"), [(0, 100), (0, 0), (5, 4)])
-def test_none_is_accepted(start, stop):
-    numbers = Numbers(lambda _: False)
-    assert smallest_confirmed(numbers, start, stop) is None
-    assert max(numbers.asked, default=None) == (stop if start <= stop else None)
+@pytest.mark.parametrize("numbers", [range(0, 100, 10), [0], []])
+def test_none_is_accepted(numbers):
+    assert first(lambda _: False, numbers) == (None, list(numbers))
 
 
 def test_first_accepted_window_wins_over_later_ones():
-    assert smallest_confirmed(Numbers(lambda n: 33 <= n <= 45 or n >= 70), 0, 100) == 33
+    assert first(lambda n: 33 <= n <= 45 or n >= 70)[0] == 33
 
 
-def test_last_stride_ends_at_the_last_number():
-    assert smallest_confirmed(Numbers(lambda n: n >= 98), 0, 99) == 98
+def test_what_few_samples_miss_is_scanned_again():
+    everywhere = [(20, 200)] * 1000
+    assert smallest(everywhere) == 20
+    assert smallest([*everywhere[:501], (47, 200), *everywhere[:498]]) == 47
 
 
-def test_what_the_watched_steps_miss_is_scanned_again():
-    numbers = Numbers(lambda n: n >= 20, everywhere=lambda n: 47 <= n <= 60)
-    assert smallest_confirmed(numbers, 0, 100) == 47
+def test_a_check_at_all_samples_may_leave_nothing():
+    everywhere = [(20, 200)] * 1000
+    assert smallest([*everywhere[:501], (0, 10), *everywhere[:498]]) is None
 
 
-def test_confirmation_may_leave_nothing():
-    assert smallest_confirmed(Numbers(lambda n: n >= 20, everywhere=lambda _: False), 0, 100) is None
+@pytest.mark.parametrize("base", [0, 5000, -5000])
+def test_scanned_numbers_differ_by_a_share_of_their_sums_with_the_base(base):
+    numbers = np.array(scanned_numbers(100, 4900, 0.01, base))
+    assert (numbers[0], numbers[-1]) == (100, 4900)
+    sums = np.abs(base + numbers)
+    ratios = np.maximum(sums[1:] / sums[:-1], sums[:-1] / sums[1:])
+    assert np.all(np.diff(sums[:-1]) * np.sign(base + 1) > 0)
+    assert np.all(np.abs(np.diff(sums)) <= 0.01 * sums[:-1] + 1)  # whole numbers
+    assert ratios.max() < 1.03
+
+
+def test_no_numbers_are_scanned_below_the_first():
+    assert scanned_numbers(5, 4, 0.01) == []
+    assert scanned_numbers(5, 5, 0.01) == [5]

@@ -23,7 +23,8 @@ from samples.robots import vsa_3r
 from vsacli.actuators.laws.sinh import Sinh
 from vsacli.robot.joint import Limits
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.search.scans import Factors, smallest_slow_down
+from vsacli.studies.search.combined import Factors, smallest_slow_down
+from vsacli.studies.search.task import Task
 from vsacli.trajectory.trajectory import Trajectory
 
 
@@ -33,7 +34,7 @@ def step_of(trajectory):
 
 
 def slow_down(robot, trajectory, min_margin=0.01):
-    return smallest_slow_down(Acceptance(robot, min_margin), trajectory)
+    return smallest_slow_down(Task(Acceptance(robot, min_margin), trajectory)).factor
 
 
 def check_smallest(robot, trajectory, factor, min_margin=0.01):

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
+from samples.fixes import CUBIC, K_C, K, pendulum, rest_to_rest
 from samples.marks import slow
 
 from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
@@ -17,7 +18,7 @@ from vsacli.actuators.friction import Friction
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.drive import drive
 from vsacli.studies.search.acceptance import Acceptance, admissible_stiffness
-from vsacli.studies.search.criteria import CRITERIA
+from vsacli.studies.search.criteria import CRITERIA, Scale
 from vsacli.studies.search.loads import joint_loads
 from vsacli.studies.search.splines import SplineSpace
 from vsacli.studies.search.stiffness import StiffnessSearch
@@ -248,3 +249,31 @@ def test_sharp_friction_leaves_an_optimum(arm, load):
     assert found.agreeing == found.starts
     before, after = (costs(robot, load, "torque", each.rows[:, None])[0] for each in (without, found))
     assert after < before
+
+
+def test_a_motion_has_the_torque_cost_1_in_its_own_scale(arm, load):
+    """On this scale the accuracy counts by which an optimum is said to be one."""
+    criterion, joint, steps = CRITERIA["torque"](), arm.joints[SHOULDER], load.at(load.steps)
+    motors = drive(joint, steps.command)
+    scale = Scale(criterion.size(joint, motors, steps.time), float(steps.time[-1]))
+    (integrand,) = criterion.integrands(joint, motors, None, scale)
+    assert criterion.weights(steps.time)[0] @ integrand == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.slow
+def test_least_torque_of_a_weak_joint_is_a_local_optimum_too():
+    """Its masses, inertia and springs are a thousandth: so are all torques, and nothing else changes."""
+    optima = [optimize(*weakened(share), "torque").joints["swing"] for share in (1.0, 1e-3)]
+    assert all((each.found, each.agreeing) == (True, each.starts) for each in optima)
+    strong, weak = ((each.before, each.after) for each in optima)
+    assert weak == pytest.approx(np.multiply(1e-3, strong), rel=1e-6)  # stops at 1e-7 of its scale
+
+
+def weakened(share):
+    """A pendulum with a share of its masses and stiffness, and its motion."""
+    spring = replace(CUBIC, k=share * K, k_c=share * K_C)
+    (joint,) = pendulum(spring, mass=share * 5.0).joints
+    motors = tuple(replace(motor, inertia=share * motor.inertia) for motor in joint.actuator.motor)
+    actuator = replace(joint.actuator, motor=motors)
+    robot = replace(pendulum(), joints=(replace(joint, actuator=actuator),))
+    return robot, rest_to_rest(1.0, share * 1000.0, start=(0.0,), end=(1.0,), rate=100)

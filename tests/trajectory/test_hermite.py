@@ -59,6 +59,18 @@ def test_derivatives_that_do_not_belong_together_say_nothing_between_samples(tra
     assert not trajectory.known_between
 
 
+def test_a_constant_is_one_function_although_its_derivatives_are_rounding():
+    """A profile along a limit: a spline takes back the polynomial that was commanded."""
+    time, rng = np.arange(1001) / 500, np.random.default_rng(0)
+    columns = {name: sine(time, order) for order, name in enumerate(("q", *GIVEN[:4]))}
+    # less than the spacing of doubles at 8100, 9e-13, over the square of the interval of 2 ms
+    noise = [share * rng.standard_normal((1001, 1)) for share in (1e-10, 1e-7)]
+    trajectory = Trajectory.from_samples(
+        time, stiffness=np.full((1001, 1), 8100.0), dstiffness=noise[0], ddstiffness=noise[1], **columns
+    )
+    assert trajectory.known_between
+
+
 def test_uneven_samples_are_met_at_both_ends():
     time = np.sort(np.random.default_rng(0).uniform(0, 1, 200))
     rows = np.stack([sine(time, order).T for order in range(5)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Self
 
@@ -185,6 +186,14 @@ class JointReport(Stored):
         if math.isnan(upper) and not math.isnan(lower):
             return replace(joint, attainable=(lower, math.inf))
         return joint
+
+
+def largest_of_motors(
+    joints: Iterable[JointReport], values: Callable[[JointReport], Iterable[float]]
+) -> tuple[float, JointReport] | None:
+    """Return the largest of the values of all motors, with its joint; None if all are NaN."""
+    entries = [(value, joint) for joint in joints for value in values(joint) if not math.isnan(value)]
+    return max(entries, key=lambda entry: entry[0], default=None)
 
 
 @dataclass(frozen=True)

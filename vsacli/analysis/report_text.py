@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.analysis.joint_report import DETERMINED, JointDrift, JointReport
+from vsacli.analysis.joint_report import DETERMINED, JointDrift, JointReport, largest_of_motors
 from vsacli.analysis.self_check import SHAFT_BOUND, SelfCheck
 from vsacli.base.texts import EXPONENT, counted, significant, together
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, VELOCITY, time_text, units_of
@@ -149,10 +149,8 @@ def initial_motor_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     yield from _motor_position_lines("initial", joints, [joint.start_theta for joint in joints], "first")
     deviations = [None if (each := joint.uncertainty) is None else each.start_dtheta for joint in joints]
     yield from _motor_velocity_lines("initial", joints, [joint.start_dtheta for joint in joints], deviations)
-    jumps = [(max(values_of_motors(joint, joint.torque_discontinuity)), joint) for joint in joints]
-    defined = [entry for entry in jumps if not math.isnan(entry[0])]
-    if defined:
-        jump, joint = max(defined, key=lambda entry: entry[0])
+    if largest := largest_of_motors(joints, lambda joint: joint.torque_discontinuity):
+        jump, joint = largest
         peak = max((peak for each in joints for peak in each.peak_tau_motor if peak > 0), default=0.0)
         if jump > ROUNDING_SHARE * peak:
             yield f"initial torque discontinuity: {jump:.3g} {TORQUE.unit(joint.type)} ({joint.name})"

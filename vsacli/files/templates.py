@@ -27,8 +27,9 @@ from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.combined import smallest_slow_down
 from vsacli.studies.search.loads import TaskSamples
-from vsacli.studies.search.scans import smallest_slow_down
+from vsacli.studies.search.task import Task
 from vsacli.trajectory import file as trajectory_file
 from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
@@ -46,17 +47,21 @@ def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str
         StorageError: the disk has no room for a temporary file.
     """
     acceptance, trajectory = Acceptance(robot, MIN_MARGIN), _read(text, robot)
-    if not acceptance.refused_joints(trajectory).any():
+    reasons = "; ".join(_refusal_reasons(acceptance, trajectory))
+    if not reasons:
         return usual, ""
-    reasons = "; ".join(acceptance.reasons(TaskSamples.of(trajectory, 0, trajectory.samples)))
     try:
-        duration = usual * smallest_slow_down(acceptance, trajectory)
+        duration = usual * smallest_slow_down(Task(acceptance, trajectory)).factor
     except ImpossibleError as error:
         return usual, f"This robot cannot execute it, nor more slowly: {error}."
     rounded = _rounded_up(duration)
-    if not acceptance.refused_joints(trajectory.stretched(rounded / usual)).any():
+    if not _refusal_reasons(acceptance, trajectory.stretched(rounded / usual)):
         duration = rounded
     return duration, f"It does not take {usual:g} s, since then {reasons}."
+
+
+def _refusal_reasons(acceptance: Acceptance, trajectory: Trajectory) -> tuple[str, ...]:
+    return acceptance.reasons(TaskSamples.of(trajectory, 0, trajectory.samples))
 
 
 def _read(text: str, robot: Robot) -> Trajectory:

@@ -17,7 +17,7 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.reach import OfJoint, margin
 from vsacli.actuators.transmission import Command
 from vsacli.base import units
-from vsacli.base.arrays import FLAG_TYPE, BoolArray, FloatArray
+from vsacli.base.arrays import FLAG_TYPE, BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import VsacliError
 from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.dynamics.drive import drive
@@ -36,6 +36,9 @@ RESERVED = ("dq", "dtheta", "tau_motor", "current", "voltage")
 STRICTER = (0.0, 0.0, 0.0, 1e-6, 1e-4, 0.01)
 """Relative tightening of the rule in successive searches. A result that is accepted at its samples can be
 refused between them; the refused instants count in the next search, so that two searches usually suffice."""
+
+RESTING = 1000
+"""Number of samples at which it is seen whether a motion is refused even at rest."""
 
 _Found = TypeVar("_Found")
 
@@ -94,6 +97,11 @@ class Acceptance:
             between = np.union1d(between, short)
         return found, False
 
+    @property
+    def counted(self) -> list[int]:
+        """Indices of the joints that count."""
+        return sorted({*range(len(self.robot.joints))} - self.ignored)
+
     def refused(self, part: TaskSamples) -> BoolArray:
         """Return a mask of the samples that are not accepted, (samples, joints)."""
         block = compute_block(self.robot, part.motion, self.min_margin)
@@ -121,27 +129,17 @@ class Acceptance:
             parts.append(TaskSamples.between(trajectory, self.between))
         return concatenate_task_samples(parts)
 
-    def refused_joints(self, trajectory: Trajectory, factor: float = 1.0) -> BoolArray:
-        """Return a mask of the joints with a sample that is not accepted, (joints,)."""
-        joints: BoolArray = np.any(
-            [np.any(self.refused(part), axis=0) for part in self.parts(trajectory, factor)], axis=0
-        )
-        return joints
+    def watched_at_rest(self, trajectory: Trajectory) -> TaskSamples:
+        """Return at most `RESTING` samples of a motion, held, and all of `between`."""
+        return self.watched(trajectory, RESTING).slowed(math.inf)
 
     def refused_steps(self, joint: Joint, load: Load) -> BoolArray:
         """Return a mask of the samples of one joint that are not accepted, (samples,)."""
         return self._refused(joint, self._driven(joint, load), load.instants)
 
-    def beyond_position(self, trajectory: Trajectory) -> dict[int, Finding]:
-        """Return the violation of a position limit, which no timing changes, by index of the joint."""
-        found: dict[int, Finding] = {}
-        for part in self.parts(trajectory):
-            for index, joint in enumerate(self.robot.joints):
-                values = {"q": part.motion.q[:, index]}
-                worst = self._beyond_limit(joint, values, part.motion.time, part.instants)
-                if worst is not None:
-                    found.setdefault(index, worst)
-        return found
+    def beyond_position(self, joint: Joint, load: Load) -> Finding | None:
+        """Return the worst violation of the position limit of one joint, which no timing changes."""
+        return self._beyond_limit(joint, {"q": load.command.q}, load.time, load.instants)
 
     def reasons(self, part: TaskSamples) -> tuple[str, ...]:
         """Return the worst violation of each joint with a refused sample, as clauses."""
@@ -162,9 +160,13 @@ class Acceptance:
 
     def path_reason(self, joint: Joint, load: Load) -> str:
         """Return a position or velocity limit that the motion exceeds, as a clause; "" if there is none."""
-        values = {"q": load.command.q, "dq": load.command.dq}
-        worst = self._beyond_limit(joint, values, load.time, load.instants)
+        worst = self._beyond_limit(joint, _path(load), load.time, load.instants)
         return "" if worst is None else worst.clause
+
+    def beyond_path(self, joint: Joint, load: Load) -> BoolArray:
+        """Return a mask of the samples that exceed a limit of position or velocity, (samples,)."""
+        beyond: BoolArray = self._limit_flags(joint, _path(load), load.instants) != 0
+        return beyond
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
         """Return all variables of one joint, by name."""
@@ -215,12 +217,22 @@ class Acceptance:
         self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
     ) -> Finding | None:
         """Return the worst violation of the first limit that the given variables exceed, if there is one."""
-        flags = limit_flags(joint, values, np.zeros(len(time), dtype=FLAG_TYPE))
-        if self.recorded is not None:
-            flags = self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
+        flags = self._limit_flags(joint, values, instants)
         checks = (check for check in limit_checks(joint) if check.variable in values)
         worst = (worst_excess(joint, check, values, time, has_flag(flags, check.flag)) for check in checks)
         return next(filter(None, worst), None)
+
+    def _limit_flags(self, joint: Joint, values: OfJoint, instants: Instants) -> FlagArray:
+        """Return the flags of the limits that the given variables exceed, (samples,)."""
+        flags = limit_flags(joint, values, np.zeros(len(instants.time), dtype=FLAG_TYPE))
+        if self.recorded is None:
+            return flags
+        return self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
+
+
+def _path(load: Load) -> OfJoint:
+    """Return the variables of a load on which neither stiffness nor branch has an effect."""
+    return {"q": load.command.q, "dq": load.command.dq}
 
 
 BISECTIONS = 50

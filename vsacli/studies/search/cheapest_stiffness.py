@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vsacli.analysis.variant_groups import PreparedRun
 from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
@@ -20,12 +21,11 @@ from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.changed_motion import as_one_function, with_changed_stiffness
 from vsacli.studies.search.criteria import CRITERIA, Criterion, run_costs
-from vsacli.studies.search.fix_report import Fix
 from vsacli.studies.search.loads import Load, joint_loads, periods, rests
 from vsacli.studies.search.optimum import JointOptimum, Optimum
 from vsacli.studies.search.splines import SplineSpace
 from vsacli.studies.search.stiffness import OptimizedStiffness, StiffnessSearch
-from vsacli.studies.search.task import Task
+from vsacli.studies.search.verification import verify
 from vsacli.trajectory.trajectory import Trajectory
 
 SEARCHES = 10
@@ -87,8 +87,9 @@ def falls_short(what: Optimum, trajectory: Trajectory) -> FloatArray | None:
 
     None means that it keeps them; an empty array means that only the self-check fails.
     """
-    task = Task(Acceptance(what.robot, what.min_margin), trajectory)
-    return task.falls_short(Fix(0.0, what.robot, trajectory))
+    run = PreparedRun(what.robot, trajectory)
+    (verification,) = verify(Acceptance(what.robot, what.min_margin), [run])
+    return verification.refused
 
 
 HALVES = 2

@@ -1,379 +1,264 @@
-"""Search over slow-down, stiffness and branch together, for the combination of least cost.
+"""Search over slow-down, stiffness and branch together, for the combination of least size.
 
 The factor of the slow-down determines the link torques, and with these the attainable range and the limits of
 a joint do not depend on the other joints. So the search is one-dimensional, over the factor; at each factor,
-joints are fixed one by one.
+joints are fixed one by one, at few samples. Some of those that refuse the smallest combination join these.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FLAG_TYPE, BoolArray, FloatArray, evenly
-from vsacli.base.signals import STIFFNESS
-from vsacli.dynamics.limits import limit_flags
-from vsacli.robot.joint import Joint
-from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffness
-from vsacli.studies.search.loads import Instants, Load, TaskSamples, concatenate_task_samples
-from vsacli.studies.search.path_commands import PathCommands, Speeds
-from vsacli.studies.search.scans import FACTORS_AT_ONCE, FIRST_STEPS, LARGEST_FACTOR, WATCHED_STEPS, Factors
-from vsacli.studies.search.task import Combination, Form, Task, branch_path, constant_change
+from vsacli.base.arrays import FloatArray, evenly
+from vsacli.studies.search.acceptance import ImpossibleError
+from vsacli.studies.search.changed_motion import rate_of
+from vsacli.studies.search.cutting_planes import first_accepted, scanned_numbers
+from vsacli.studies.search.few_samples import FEW, SAME_RANGE, Required
+from vsacli.studies.search.loads import TaskSamples
+from vsacli.studies.search.task import Combination, Task
+from vsacli.trajectory.trajectory import Trajectory
 
-STRIDES = ((1.3, 0.01), (3.0, 0.02), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
+FACTOR_DENOMINATOR = 10_000
+"""Grid of the factors, in units of 1/FACTOR_DENOMINATOR, if recorded time stamps are uneven."""
+
+WHOLE = 1e-9
+"""Relative difference up to which a number of sampling intervals is an integer but for rounding."""
+
+LARGEST_FACTOR = 1000
+"""Largest factor that is tried; beyond it, wrong units in the trajectory are more likely."""
+
+STRIDES = ((3.0, 0.01), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
 """Pairs of a factor and the relative stride of the scan up to it: fine strides for small slow-downs."""
 
-BOUNDING_STEPS = 40
-"""Samples from which the lower bounds of costs follow."""
+FINER = 7
+"""Number of factors that are tried at once between the neighbors of the best one."""
 
 MOST_ROUNDS = 20
-"""Limit on rounds that add samples refusing a change that watched ones accept; two or three are usual."""
-
-SAME_CORRIDOR = 1e-6
-"""Relative difference up to which the ends of attainable ranges are equal but for rounding."""
+"""Limit on rounds that add samples refusing a combination that the few accept; two or three are usual."""
 
 BRANCH_GAIN = 0.9
-"""Share of a joint's cost below which the other branch must bring it to be preferred."""
+"""Share of a joint's size below which the other branch must bring it to be preferred."""
+
+
+class Factors(NamedTuple):
+    """The factors of slow-downs: those with an integer number of sampling intervals at the rate of the task.
+
+    A controller has one rate; a motion of 577.74 of its periods would end between two of them.
+
+    Attributes:
+        denominator: sampling intervals of the task, not necessarily an integer; number n stands for the
+            factor n/denominator.
+    """
+
+    denominator: float
+
+    @classmethod
+    def of(cls, trajectory: Trajectory) -> Factors:
+        """Return the factors of a task."""
+        rate = rate_of(trajectory)
+        return cls(float(FACTOR_DENOMINATOR) if rate is None else trajectory.duration * rate)
+
+    @property
+    def first(self) -> int:
+        """Number that stands for no slow-down."""
+        return round(self.denominator) if self._whole else math.floor(self.denominator)
+
+    @property
+    def _whole(self) -> bool:
+        return math.isclose(self.denominator, round(self.denominator), rel_tol=WHOLE)
+
+    def factor(self, number: int) -> float:
+        """Return the factor that a number stands for."""
+        denominator = round(self.denominator) if self._whole else self.denominator
+        return 1.0 if number == self.first else number / denominator
+
+    def scanned(self) -> list[int]:
+        """Return the numbers of the factors that a search tries first."""
+        ends = [self.first, *(math.floor(factor * self.denominator) for factor, _ in STRIDES)]
+        pieces = zip(ends, ends[1:], STRIDES, strict=False)
+        return sorted({n for low, high, (_, share) in pieces for n in scanned_numbers(low, high, share)})
+
+
+Form = Callable[[Required], FloatArray]
+"""Change of a joint's stiffness that margin, stiffness and deflection limits require, (factors, samples);
+infinite where none suffices."""
+
+
+def unchanged(required: Required) -> FloatArray:
+    """Return an impossible change, since the stiffness is kept."""
+    return np.full_like(required.asked, np.inf)
+
+
+def constant_change(required: Required) -> FloatArray:
+    """Return the smallest constant addition."""
+    (low, high), asked = required.admissible, required.asked
+    rise = np.max(low - asked, axis=1, keepdims=True)
+    fall = np.min(high - asked, axis=1, keepdims=True)
+    possible = rise <= fall + SAME_RANGE * np.abs(asked).max()
+    return np.where(possible, np.clip(0.0, rise, fall), np.inf) + np.zeros_like(asked)
+
+
+def least_change(required: Required) -> FloatArray:
+    """Return the smallest addition at each sample separately, a lower bound for every smooth profile."""
+    (low, high), asked = required.admissible, required.asked
+    return np.where(low <= high, np.clip(0.0, low - asked, high - asked), np.inf)
+
+
+class _Scan(NamedTuple):
+    """Least changes at several factors.
+
+    Attributes:
+        factors: factors of the slow-down.
+        joints: sizes of the changes of each joint that counts, (factors,), by its index and by branch; limits
+            of motors add to them.
+        sizes: sizes of the combinations, (factors,).
+    """
+
+    factors: tuple[float, ...]
+    joints: Mapping[int, Mapping[str, FloatArray]]
+    sizes: FloatArray
 
 
 class CombinedSearch:
     """A search for the combination of changes that fixes a motion.
 
-    Some samples are watched; others that refuse a result join them. Results are cached by factor.
-
     Args:
-        task: motion to fix, acceptance rule, and cost.
-        form: search for the stiffness change of a joint.
+        task: motion to fix, and acceptance rule.
+        form: change of the stiffness of a joint.
         branches: whether joints may change to the other branch.
     """
 
     def __init__(self, task: Task, form: Form = constant_change, *, branches: bool = False) -> None:
-        self.task, self.form = task, form
-        watched = task.acceptance.watched(task.trajectory, WATCHED_STEPS)
-        self._choices = _branch_variants(task.acceptance.robot, watched if branches else None)
+        self._task, self._form, self._exchanging = task, form, branches
         self._factors = Factors.of(task.trajectory)
-        self._watch(watched)
-        self._impossible = task.impossible.setdefault((form, branches), set())
-        self._impossible_paths = task.impossible.setdefault(None, set())
+        self._few = task.few_samples
 
     @property
     def exchangeable(self) -> bool:
         """Whether the other branch of some joint makes a difference."""
-        return any(len(choices) > 1 for choices in self._choices)
+        return any(len(choices) > 1 for choices in self._few.branches)
 
     def smallest(self) -> Combination | None:
-        """Return the combination of least cost, confirmed at all samples if its changes are constants."""
+        """Return the combination of least size, confirmed at all samples if its changes are constants."""
         return self._confirmed(self._smallest)
 
     def fastest(self) -> Combination | None:
         """Return the combination with the least slow-down, confirmed in the same way."""
         return self._confirmed(self._fastest)
 
-    def possible(self) -> bool:
-        """Return whether there is any combination, confirmed in the same way."""
-        return self._confirmed(self._first) is not None
-
     def _confirmed(self, choose: Callable[[], Combination | None]) -> Combination | None:
-        # limits allow for the noise of a recording, which the quick test in `_ruled_out` does not know
-        if not self._impossible and not self.task.trajectory.estimates:
-            self._impossible |= self._ruled_out()
         for _ in range(MOST_ROUNDS):
-            found = choose()
-            refused = None if found is None or self.form is not constant_change else self._refused(found)
+            chosen = choose()
+            refused = None if chosen is None or self._form is least_change else self._refused(chosen)
             if refused is None:
-                return found
-            self._watch(concatenate_task_samples([self._watched, refused]))
+                return chosen
+            self._few = self._few.with_further(refused)
         return None
 
-    def _watch(self, part: TaskSamples) -> None:
-        """Watch these samples from now on, and discard results that were found for others."""
-        self._watched, self._path = part, PathCommands(self.task.acceptance.robot, part.motion)
-        self._found: dict[int, Combination] = {}
-
-    def _refused(self, found: Combination) -> TaskSamples | None:
-        """Return samples that refuse constant changes, from the first block with any, as commanded."""
-        acceptance = self.task.acceptance_with(found)
-        change = np.zeros(self.task.trajectory.joints)
-        change[list(found.constants)] = list(found.constants.values())
-        for part in acceptance.parts(self.task.trajectory.stretched(found.factor), found.factor):
+    def _refused(self, combination: Combination) -> TaskSamples | None:
+        """Return samples that refuse a combination, from the first block with any, as commanded."""
+        factor, change = combination.factor, np.zeros(self._task.trajectory.joints)
+        change[list(combination.constants)] = list(combination.constants.values())
+        acceptance = self._task.acceptance_with(combination)
+        for part in acceptance.parts(self._task.trajectory.stretched(factor), factor):
             steps = np.flatnonzero(np.any(acceptance.refused(part.stiffened(change)), axis=1))
             if steps.size:
-                return part.select(steps[evenly(len(steps), WATCHED_STEPS)]).slowed(1 / found.factor)
+                return part.select(steps[evenly(len(steps), FEW)]).slowed(1 / factor)
         return None
 
-    def _first(self) -> Combination | None:
-        """Return the first combination that is found, in the order of `_smallest`."""
-        bounds = self._lower_bounds()
-        numbers = sorted(bounds, key=lambda each: (bounds[each], each))
-        return next((found for number in numbers if (found := self._at(number)) is not None), None)
-
     def _fastest(self) -> Combination | None:
-        """Return the combination with the smallest factor found by scan and bisection."""
-        refused = self._factors.first - 1
-        for number in self._scanned():
-            if self._at(number) is not None:
-                break
-            refused = number
-        else:
-            return None
-        while number - refused > 1:
-            middle = (number + refused) // 2
-            number, refused = (number, middle) if self._at(middle) is None else (middle, refused)
-        return self._at(number)
+        """Return the combination with the first factor that has one."""
+
+        def accepts(numbers: Sequence[int]) -> Iterator[bool]:
+            scan = self._scan(numbers)
+            return (self._at(scan, place) is not None for place in range(len(numbers)))
+
+        number = first_accepted(accepts, self._factors.scanned())
+        return None if number is None else self._at(self._scan([number]), 0)
 
     def _smallest(self) -> Combination | None:
-        """Return the combination of least cost, by a scan and then ever shorter steps to either side.
+        """Return the combination of least size, by a scan, and ever finer ones around its best factor."""
+        numbers = self._factors.scanned()
+        while True:
+            place, best = self._best(self._scan(numbers))
+            around = numbers[max(place - 1, 0) : place + 2]
+            if best is None or around[-1] - around[0] < len(around):
+                return best
+            finer = np.linspace(around[0], around[-1], FINER).round().astype(np.intp)
+            numbers = np.union1d(finer, around).tolist()
 
-        The scan takes factors in the order of a lower bound of their cost, until that exceeds the best cost.
-        """
-        best, at, cost = None, 0, self.task.cost
-        bounds = self._lower_bounds()
-        for number in sorted(bounds, key=lambda each: (bounds[each], each)):
-            if best is not None and bounds[number] >= best.size:
+    def _best(self, scan: _Scan) -> tuple[int, Combination | None]:
+        """Return the place of the smallest combination of a scan, and this combination."""
+        best, at = None, 0
+        for place in np.argsort(scan.sizes, kind="stable").tolist():
+            if best is not None and scan.sizes[place] >= best.size:
                 break
-            found = self._at(number, math.inf if best is None else best.size)
-            if found is not None and (best is None or (found.size, number) < (best.size, at)):
-                best, at = found, number
-        if best is None:
-            return None
-        step = self._stride(at)
-        within = range(self._factors.first, self._factors.last + 1)
-        while step:
-            sides = {
-                side: self._at(side, best.size)
-                for side in (at - step, at + step)
-                if side in within and cost.of_factor(self._factors.factor(side)) < best.size
+            combination = self._at(scan, place)
+            if combination is not None and (best is None or combination.size < best.size):
+                best, at = combination, place
+        return at, best
+
+    def _scan(self, numbers: Sequence[int]) -> _Scan:
+        """Return the least changes at the factors of numbers."""
+        factors = tuple(map(self._factors.factor, numbers))
+        joints: dict[int, dict[str, FloatArray]] = {}
+        squares = np.square(np.subtract(factors, 1))
+        for index in self._task.acceptance.counted:
+            joints[index] = {
+                branch: self._least_sizes(index, self._few.required(index, branch, factors))
+                for branch in (self._few.branches[index] if self._exchanging else ("",))
             }
-            found, side = min(
-                ((each, side) for side, each in sides.items() if each is not None),
-                key=lambda pair: pair[0].size,
-                default=(best, at),
-            )
-            if found.size < best.size:
-                best, at = found, side
-            else:
-                step //= 2
-        return best
+            squares += np.min([*joints[index].values()], axis=0) ** 2
+        return _Scan(factors, joints, np.sqrt(squares))
 
-    def _at(self, number: int, below: float = math.inf) -> Combination | None:
-        """Return the combination that fixes every joint at the factor of a number; None if there is none.
+    def _least_sizes(self, index: int, required: Required) -> FloatArray:
+        return np.where(required.refused, self._task.relative_size(index, self._form(required)), 0.0)
 
-        None may also mean that its cost is not below a limit.
-        """
-        if number in self._impossible or number in self._impossible_paths:
+    def _at(self, scan: _Scan, place: int) -> Combination | None:
+        """Return the combination that the few samples accept at one of the factors, or None."""
+        sizes, constants, branches = [scan.factors[place] - 1], dict[int, float](), dict[int, str]()
+        for index, choices in scan.joints.items() if scan.sizes[place] < math.inf else ():
+            best = math.inf
+            for branch, least in choices.items():
+                size, constant = self._change(index, branch, scan.factors, place, float(least[place]))
+                if size < BRANCH_GAIN * best:
+                    best, constants[index], branches[index] = size, constant, branch
+                if not size:
+                    break
+            sizes.append(best)
+            if best == math.inf:
+                break
+        size = math.hypot(*sizes)
+        if not math.hypot(size, scan.sizes[place]) < math.inf:
             return None
-        if number not in self._found:
-            try:
-                found = self._fixed(self._factors.factor(number), below)
-            except ImpossibleError:
-                self._impossible.add(number)
-                return None
-            if found is None:
-                return None
-            self._found[number] = found
-        return self._found[number]
+        changed = {index: constant for index, constant in constants.items() if constant}
+        exchanged = {index: branch for index, branch in branches.items() if branch}
+        return Combination(scan.factors[place], changed, exchanged, size)
 
-    def _lower_bounds(self) -> dict[int, float]:
-        """Return a lower bound of the cost at each scanned factor that is not known to be impossible.
-
-        The bound of the constants is that of a few samples at all factors at once.
-        """
-        self._rule_out_paths()
-        ruled_out = self._impossible | self._impossible_paths
-        numbers = [number for number in self._scanned() if number not in ruled_out]
-        least = [self.task.cost.of_factor(self._factors.factor(number)) for number in numbers]
-        # limits allow for the noise of a recording, which the admissible range does not know
-        if self.form is constant_change and not self.task.trajectory.estimates and numbers:
-            few = self._watched.select(evenly(len(self._watched.factor), BOUNDING_STEPS))
-            part = concatenate_task_samples(few.slowed(self._factors.factor(each)) for each in numbers)
-            of_joints = self._least_of_joints(part.loads(self.task.acceptance.robot), len(numbers))
-            least = [math.hypot(own, *of_joint) for own, of_joint in zip(least, of_joints.T, strict=True)]
-        return {number: bound for number, bound in zip(numbers, least, strict=True) if bound < math.inf}
-
-    def _least_of_joints(self, loads: Sequence[Load], factors: int) -> FloatArray:
-        """Return a lower bound of the cost of the constant of each joint, (joints, factors); 0 if unknown."""
-        acceptance, least = self.task.acceptance, np.zeros((len(loads), factors))
-        for index, (choices, load) in enumerate(zip(self._choices, loads, strict=True)):
-            joint = choices[""]
-            if index in acceptance.ignored or len(choices) > 1 or STIFFNESS.key not in joint.commanded:
-                continue
-            asked = self._watched.motion.commanded[STIFFNESS.key][:, index]
-            for place, offset in enumerate(_least_offsets(joint, load, acceptance.min_margin, factors)):
-                if offset:
-                    size = math.inf
-                    if offset < math.inf:
-                        size = self.task.cost.of_stiffness(asked, np.full(len(asked), offset))
-                    least[index, place] = (1 - SAME_CORRIDOR) * size
-        return least
-
-    def _ruled_out(self) -> set[int]:
-        """Return numbers of scanned factors at which a few samples already exclude every stiffness.
-
-        Many factors are evaluated in one call, which costs hardly more than a single one.
-        """
-        few = self._watched.select(evenly(len(self._watched.factor), FIRST_STEPS))
-        numbers, found = list(self._scanned()), set[int]()
-        for start in range(0, len(numbers), FACTORS_AT_ONCE):
-            tried = numbers[start : start + FACTORS_AT_ONCE]
-            impossible = self._refusing(
-                concatenate_task_samples(few.slowed(self._factors.factor(each)) for each in tried)
-            )
-            of_factors = impossible.reshape(len(tried), -1).any(axis=1)
-            found.update(tried[index] for index in np.flatnonzero(of_factors).tolist())
-            if not of_factors.all():
-                break
-        return found
-
-    def _refusing(self, part: TaskSamples) -> BoolArray:
-        """Return a mask of the samples at which some joint is refused at any stiffness, (samples,)."""
-        acceptance = self.task.acceptance
-        impossible = np.zeros(len(part.factor), dtype=np.bool_)
-        loads = part.loads(acceptance.robot)
-        for index, (choices, load) in enumerate(zip(self._choices, loads, strict=True)):
-            joint = choices[""]
-            if index in acceptance.ignored:
-                continue
-            path = {"q": load.command.q, "dq": load.command.dq}
-            impossible |= limit_flags(joint, path, np.zeros(len(impossible), dtype=FLAG_TYPE)) != 0
-            if STIFFNESS.key not in joint.actuator.commanded:
-                impossible |= acceptance.refused_steps(joint, load)
-            elif len(choices) == 1:
-                low, high = admissible_stiffness(joint, load.command, acceptance.min_margin)
-                impossible |= np.isnan(low) | (low > (1 + SAME_CORRIDOR) * high)
-        return impossible
-
-    def _loads(self, factor: float) -> list[Load]:
-        """Return the load of each joint at the watched samples, slowed down by a factor.
-
-        Raises:
-            ImpossibleError: a joint exceeds a limit of position or velocity.
-        """
-        watched, acceptance = self._watched, self.task.acceptance
-        instants = Instants(watched.motion.time, watched.factor * factor)
-        commands = self._path.at(Speeds.even(factor, len(instants.time)))
-        loads = [Load(instants.time, command, instants) for command in commands]
-        for index, (choices, load) in enumerate(zip(self._choices, loads, strict=True)):
-            if index not in acceptance.ignored and (reason := acceptance.path_reason(choices[""], load)):
-                raise ImpossibleError(reason)
-        return loads
-
-    def _rule_out_paths(self) -> None:
-        """Note the scanned factors at which the path is too fast; faster ones than such a factor are, too."""
-        numbers = [number for number in self._scanned() if number not in self._impossible_paths]
-        refused, accepted = -1, len(numbers)
-        middle = 0  # mostly, no factor is refused
-        while accepted - refused > 1:
-            try:
-                self._loads(self._factors.factor(numbers[middle]))
-                accepted = middle
-            except ImpossibleError:
-                refused = middle
-            middle = (accepted + refused) // 2
-        self._impossible_paths |= set(numbers[: refused + 1])
-
-    def _fixed(self, factor: float, below: float) -> Combination | None:
-        """Return the changes of all joints at a factor, or None if their cost is not below a limit.
-
-        Raises:
-            ImpossibleError: some joint is refused at any stiffness.
-        """
-        joints = list(enumerate(zip(self._choices, self._loads(factor), strict=True)))
-        sizes, found = [self.task.cost.of_factor(factor)], []
-        for index, (choices, load) in joints:
-            found.append(self._of_joint(index, choices, load))
-            sizes.append(found[-1][0])
-            if math.hypot(*sizes) > below:
-                return None
-        return Combination(
-            factor,
-            changes={index: change for index, (_, _, change) in enumerate(found) if change.any()},
-            branches={index: branch for index, (_, branch, _) in enumerate(found) if branch},
-            size=math.hypot(*sizes),
-        )
-
-    def _of_joint(self, index: int, choices: dict[str, Joint], load: Load) -> tuple[float, str, FloatArray]:
-        """Return cost, branch ("" if unchanged) and change of stiffness of one joint."""
-        if index in self.task.acceptance.ignored:
-            return 0.0, "", np.zeros(len(load.time))
-        asked, best, reason = load.command.commanded["stiffness"], None, ImpossibleError()
-        for branch, joint in choices.items():
-            try:
-                change = self._change(joint, load)
-            except ImpossibleError as error:
-                reason = error
-                continue
-            size = self.task.cost.of_stiffness(asked, change) if change.any() else 0.0
-            if best is None or size < BRANCH_GAIN * best[0]:
-                best = size, branch, change
-            if not size:
-                break
-        if best is None:
-            raise reason
-        return best
-
-    def _change(self, joint: Joint, load: Load) -> FloatArray:
-        acceptance = self.task.acceptance
-        if not acceptance.refused_steps(joint, load).any():
-            return np.zeros(len(load.time))
-        return self.form(acceptance, joint, load)
-
-    def _scanned(self) -> Iterator[int]:
-        """Yield the numbers of the scanned factors."""
-        number = self._factors.first
-        while number < self._factors.last:
-            yield number
-            number += self._stride(number)
-        yield self._factors.last
-
-    def _stride(self, number: int) -> int:
-        factor = self._factors.factor(number)
-        share = next(share for limit, share in STRIDES if factor <= limit)
-        return math.ceil(number * share)
+    def _change(
+        self, index: int, branch: str, factors: tuple[float, ...], place: int, least: float
+    ) -> tuple[float, float]:
+        """Return size and constant of the change of a joint at one of the factors; infinite if impossible."""
+        kept = not self._few.required(index, branch, factors).refused[place]
+        if least == math.inf or self._form is least_change or kept:
+            return least, 0.0
+        constant = self._few.constant(index, branch, factors, place)
+        return float(self._task.relative_size(index, np.array([constant]))), constant
 
 
-def _least_offsets(joint: Joint, load: Load, min_margin: float, parts: int) -> FloatArray:
-    """Return the size of the least constant that every sample of a part of a load requires, (parts,).
+def smallest_slow_down(task: Task) -> Combination:
+    """Return the smallest slow-down, of position, stiffness and wrench together, that fixes a task alone.
 
-    Margin, stiffness limits and deflection limits count; infinite if no stiffness keeps them.
+    Raises:
+        ImpossibleError: no factor is accepted; the error has the reason.
     """
-    low, high = admissible_stiffness(joint, load.command, min_margin)
-    asked = load.command.commanded[STIFFNESS.key]
-    rise = np.max((low - asked).reshape(parts, -1), axis=1)
-    fall = np.min((high - asked).reshape(parts, -1), axis=1)
-    impossible = np.isnan(rise) | np.isnan(fall) | (rise > fall + SAME_CORRIDOR * np.abs(asked).max())
-    return np.where(impossible, np.inf, np.maximum(np.maximum(rise, -fall), 0.0))
-
-
-def _branch_variants(robot: Robot, watched: TaskSamples | None) -> list[dict[str, Joint]]:
-    """Return the variants of each joint by branch; the key "" is the unchanged joint.
-
-    Args:
-        robot: robot with the joints.
-        watched: samples at which the other branch must make a difference to be a variant; None for no
-            other branch.
-    """
-    choices = [{"": joint} for joint in robot.joints]
-    if watched is None:
-        return choices
-    for index, (joint, load) in enumerate(zip(robot.joints, watched.loads(robot), strict=True)):
-        branch = joint.actuator.opposite_branch
-        if branch is not None:
-            exchanged = robot.replace(branch_path(robot, index), branch).joints[index]
-            if not _alike(joint.actuator, exchanged.actuator, load.command):
-                choices[index][branch] = exchanged
-    return choices
-
-
-def _alike(one: Actuator, other: Actuator, command: Command) -> bool:
-    """Return whether the branches of an actuator are mirror images, as those of equal springs are."""
-    if len(set(one.motors)) > 1 or len(set(one.max_deflections)) > 1:
-        return False
-    asked = command.tau_e, command.commanded["stiffness"], command.q
-    first, second = one.solve(*asked), other.solve(*asked)
-    pairs = (first.lower, second.lower), (first.upper, second.upper)
-    return all(np.allclose(here, there, rtol=SAME_CORRIDOR, equal_nan=True) for here, there in pairs)
+    slower = CombinedSearch(task, unchanged).fastest()
+    if slower is not None:
+        return slower
+    if reasons := task.acceptance.reasons(task.acceptance.watched_at_rest(task.trajectory)):
+        raise ImpossibleError(f"even at rest, under gravity alone, {'; '.join(reasons)}")
+    raise ImpossibleError(f"not even one by a factor {LARGEST_FACTOR} does")

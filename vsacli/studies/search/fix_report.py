@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from vsacli.analysis.joint_report import JointReport, largest_of_motors
 from vsacli.base.json_records import Published, named
 from vsacli.base.texts import joined, significant
+from vsacli.base.units import TORQUE
 from vsacli.dynamics.limits import Finding
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
@@ -18,6 +20,9 @@ _OTHER_SPRINGS = (
     "effect on the margin"
 )
 
+
+SIMILAR = 1.05
+"""Ratio of sizes up to which the simpler of two fixes, or else the gentler one, is preferred."""
 
 NOT_CONFIRMED = "a change within all limits at the samples exceeds one between them"
 """Reason why a fix that its samples accept is none."""
@@ -189,6 +194,11 @@ class OtherBranch(Published):
         return "change the branch of " + ", ".join(f"{joint} to {to}" for joint, to in self.branches.items())
 
 
+def branch_path(robot: Robot, index: int) -> str:
+    """Return the path of a joint's branch in the robot file."""
+    return f"joints.{index}.actuator.{robot.joints[index].actuator.branch_field}"
+
+
 @dataclass(frozen=True)
 class Fix(Published):
     """A fix: changes that together make a task feasible, confirmed by a run over all samples.
@@ -200,6 +210,7 @@ class Fix(Published):
         declared: trajectory with the changes, except for a slow-down that follows a fit.
         factor: factor of that slow-down; 1 if `declared` is stretched already, see `Task`.
         asked: trajectory without the changes.
+        joints: findings at each joint of the run that confirmed it.
     """
 
     size: float
@@ -207,6 +218,7 @@ class Fix(Published):
     declared: Trajectory = field(repr=False, compare=False)
     factor: float = field(default=1.0, repr=False, compare=False, kw_only=True)
     asked: Trajectory | None = field(default=None, repr=False, compare=False, kw_only=True)
+    joints: Sequence[JointReport] = field(default=(), repr=False, compare=False, kw_only=True)
     slow_down: SlowDown | None = None
     stiffness_offset: StiffnessOffset | None = None
     transition: LongerTransition | None = None
@@ -218,7 +230,7 @@ class Fix(Published):
         *("slow_down", "branch", "transition"),
         *("stiffness_offset", "stiffness_profile", "stiffness_factor"),
     )
-    shape: ClassVar = {"size": "size", **{f"{part}?": part for part in PARTS}, "text": "sentence"}
+    shape: ClassVar = {**named("size", "motors"), **{f"{part}?": part for part in PARTS}, "text": "sentence"}
 
     @property
     def trajectory(self) -> Trajectory:
@@ -229,6 +241,41 @@ class Fix(Published):
     def longer(self) -> float:
         """Growth of the duration, relative to the commanded duration."""
         return 0.0 if self.slow_down is None else self.slow_down.factor - 1
+
+    @property
+    def motors(self) -> dict[str, dict[str, tuple[float, float]]]:
+        """Peak torque and initial torque discontinuity of both motors, by name of the joint."""
+        return {
+            joint.name: {
+                "peak_tau_motor": joint.peak_tau_motor,
+                "torque_discontinuity": joint.torque_discontinuity,
+            }
+            for joint in self.joints
+        }
+
+    @property
+    def gentleness(self) -> tuple[float, ...]:
+        """Largest peak torque of a motor, and largest initial discontinuity; the smaller, the gentler."""
+        return tuple(value for value, _ in filter(None, self._largest_torques.values()))
+
+    @property
+    def _largest_torques(self) -> dict[str, tuple[float, JointReport] | None]:
+        """Largest torques of the run of the fix by their names, with their joints."""
+        return {
+            "peak motor torque": largest_of_motors(self.joints, lambda joint: joint.peak_tau_motor),
+            "initial torque discontinuity": largest_of_motors(
+                self.joints, lambda joint: joint.torque_discontinuity
+            ),
+        }
+
+    @property
+    def torques(self) -> str:
+        """Largest torques of the run of the fix, in words."""
+        return ", ".join(
+            f"{name} {significant(largest[0])} {TORQUE.unit(largest[1].type)} ({largest[1].name})"
+            for name, largest in self._largest_torques.items()
+            if largest is not None
+        )
 
     @property
     def stiffens(self) -> bool:
@@ -248,6 +295,18 @@ class Fix(Published):
         """Advice as a sentence, without a full stop."""
         parts = [getattr(self, part) for part in self.PARTS]
         return ", and ".join(part.sentence for part in parts if part is not None)
+
+
+def in_order(fixes: Iterable[Fix]) -> Iterator[Fix]:
+    """Yield the smallest fix first, or the gentlest of about its size; another branch comes last."""
+    rest = sorted(fixes, key=lambda fix: (fix.branch is not None, fix.size))
+    while rest:
+        (branch, size), gentlest = (rest[0].branch, rest[0].size), rest[0]
+        for fix in rest:
+            if (fix.branch is None) == (branch is None) and fix.size <= SIMILAR * size:
+                gentlest = min(gentlest, fix, key=lambda each: each.gentleness)
+        rest.remove(gentlest)
+        yield gentlest
 
 
 @dataclass(frozen=True)
@@ -310,6 +369,8 @@ class Fixes(Published):
             yield f"fixes; with any of them every sample{but} has {margin} and is within all limits:"
         else:
             yield f"no fix that was tried gives every sample {margin} within all limits"
-        yield from (f"{number}. {fix.sentence}" for number, fix in enumerate(self.fixes, 1))
+        for number, fix in enumerate(self.fixes, 1):
+            yield f"{number}. {fix.sentence}"
+            yield f"   {fix.torques}"
         if any(fix.stiffens for fix in self.fixes):
             yield _OTHER_SPRINGS

@@ -7,14 +7,15 @@ samples of the next search.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from vsacli.analysis.variant_groups import PreparedRun
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin
 from vsacli.base.progress import Countdown, Progress, unseen
@@ -26,23 +27,15 @@ from vsacli.dynamics.limits import Finding
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
-from vsacli.studies.search.combined import CombinedSearch
-from vsacli.studies.search.fix_report import NOT_CONFIRMED, Fix, Fixes, NotPossible
-from vsacli.studies.search.loads import Load, joint_loads
+from vsacli.studies.search.combined import CombinedSearch, least_change, smallest_slow_down
+from vsacli.studies.search.cutting_planes import has_transitions, lowest_offset, smallest_offset
+from vsacli.studies.search.fix_report import NOT_CONFIRMED, SIMILAR, Fix, Fixes, NotPossible, in_order
+from vsacli.studies.search.loads import Load
 from vsacli.studies.search.recorded_limits import RecordedLimits
-from vsacli.studies.search.scans import (
-    WATCHED_STEPS,
-    lowest_offset,
-    smallest_offset,
-    smallest_slow_down,
-)
-from vsacli.studies.search.task import AS_IT_IS, Combination, Task, least_change
-from vsacli.studies.search.transitions import has_transitions
+from vsacli.studies.search.task import AS_IT_IS, Combination, Task
+from vsacli.studies.search.verification import verify, verify_fixes
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
-
-SIMPLER_SHARE = 1.05
-"""Size ratio up to which a larger fix with fewer kinds of change is preferred."""
 
 FASTER_SHARE = 0.8
 """Share of the extra duration of another fix below which a larger fix of the same kinds is worth offering."""
@@ -80,57 +73,87 @@ def fixes(
             robot.without_tool_limits(robot.limited_tools), trajectory, min_margin, progress=progress
         )
         return with_stiff_tools(robot, trajectory, of_joints)
-    acceptance = Acceptance(robot, min_margin, RecordedLimits(trajectory))
-    asked = Task(acceptance, trajectory)
-    as_it_is = Fix(0.0, robot, trajectory)
-    if damped_joints(robot, trajectory):
-        if asked.falls_short(as_it_is) is not None:
-            refuse_damped_transmissions(robot, trajectory, "fixes")
-        return Fixes(min_margin)
-    if not acceptance.refused_joints(trajectory).any():
-        short = asked.falls_short(as_it_is)
-        if short is None:
+    task = Task(Acceptance(robot, min_margin, RecordedLimits(trajectory)), trajectory)
+    damped = damped_joints(robot, trajectory)
+    if damped or not task.refused_loads:
+        (as_it_is,) = verify(task.acceptance, [PreparedRun(robot, trajectory)])
+        if as_it_is.refused is None:
             return Fixes(min_margin)
-        asked = replace(asked, acceptance=replace(acceptance, between=short))
-    found_causes = dict(causes(asked))
-    with progress(len(ALONE) + len(COMBINED)) as bar:
-        searches = Countdown(bar.update, len(ALONE) + len(COMBINED))
-        tried = _search_fixes(asked, found_causes, searches)
+        if damped:
+            refuse_damped_transmissions(robot, trajectory, "fixes")
+        task = replace(task, acceptance=replace(task.acceptance, between=as_it_is.refused))
+    found_causes = dict(causes(task))
+    with progress(len(SEARCHES)) as bar:
+        searches = Countdown(bar.update, len(SEARCHES))
+        tried = _search_fixes(task, found_causes, searches)
         if not tried.chosen and any(cause.fixable for cause in found_causes.values()):
             found_causes = {
-                index: replace(cause, fixable=cause.fixable and is_fixable(asked, index))
+                index: replace(cause, fixable=cause.fixable and is_fixable(task, index))
                 for index, cause in found_causes.items()
             }
-            tried = _search_fixes(asked, found_causes, searches)
+            tried = _search_fixes(task, found_causes, searches)
         searches.finish()
     return Fixes(
         min_margin,
-        **{name: tried.part(name) for name in ALONE},
+        **{name: tried.change(name) for name in ALONE},
         causes=tuple(found_causes.values()),
-        fixes=tuple(tried.chosen),
+        fixes=tuple(in_order(tried.chosen)),
     )
 
 
-class _Tried(NamedTuple):
-    """Results of searches by name, fixes to choose from, and fixes that a run refused between samples."""
+@dataclass
+class _Tried:
+    """Results of searches, and which of their fixes runs have confirmed or refused.
 
-    found: Mapping[str, list[Fix] | NotPossible]
-    chosen: list[Fix]
-    failed: list[Fix]
+    Attributes:
+        results: fixes that samples accept, by name of the search, or the reasons for none.
+        confirmed: fixes that a run confirmed, with its findings.
+        refused: fixes that a run refused between samples.
+    """
 
-    def part(self, name: str) -> Any:
+    results: dict[str, list[Fix] | NotPossible] = field(default_factory=dict)
+    confirmed: list[Fix] = field(default_factory=list)
+    refused: list[Fix] = field(default_factory=list)
+
+    @property
+    def chosen(self) -> list[Fix]:
+        """Fixes that no run has refused, and that no simpler one makes superfluous."""
+        chosen: list[Fix] = []
+        results = (result for result in self.results.values() if isinstance(result, list))
+        for fix in sorted(chain(*results), key=lambda fix: (len(fix.kinds), fix.size)):
+            if fix not in self.refused and not any(_superfluous(fix, simpler) for simpler in chosen):
+                chosen.append(next((known for known in self.confirmed if known == fix), fix))
+        return chosen
+
+    def search(self, task: Task, names: Iterable[str], progress: Countdown) -> None:
+        """Search for fixes where there is no result yet, or for further ones where some were refused."""
+        for name in names:
+            result = self.results.get(name)
+            if isinstance(result, NotPossible):
+                continue
+            kept = [fix for fix in result or () if fix not in self.refused]
+            if result is None or len(kept) < len(result):
+                try:
+                    self.results[name] = kept + list(SEARCHES[name](task))
+                except ImpossibleError as error:
+                    self.results[name] = kept or NotPossible(error.reasons)
+                progress.count()
+
+    def confirm(self, acceptance: Acceptance) -> FloatArray | None:
+        """Run the chosen fixes; return the instants at which some were refused, or None if none was."""
+        instants: list[FloatArray] = []
+        while pending := [fix for fix in self.chosen if fix not in self.confirmed]:
+            for fix, refused in verify_fixes(acceptance, pending):
+                (self.confirmed if refused is None else self.refused).append(fix)
+                instants += [] if refused is None else [refused]
+        return np.concatenate(instants) if instants else None
+
+    def change(self, name: str) -> Any:
         """Return the only change of the fix that a search of `ALONE` found, or the reasons for none."""
-        found = self.found.get(name)
-        if not isinstance(found, list):
-            return found
-        if any(found[0] is each for each in self.failed):
-            return NotPossible((NOT_CONFIRMED,))
-        return getattr(found[0], name)
-
-    @staticmethod
-    def slower(candidates: Sequence[Fix]) -> bool:
-        """Return whether any of the fixes slows the motion down."""
-        return any(each.longer > 0 for each in candidates)
+        result = self.results.get(name)
+        if not isinstance(result, list):
+            return result
+        return NotPossible((NOT_CONFIRMED,)) if result[0] in self.refused else getattr(result[0], name)
 
 
 def _search_fixes(task: Task, found_causes: Mapping[int, Finding], searches: Countdown) -> _Tried:
@@ -138,50 +161,32 @@ def _search_fixes(task: Task, found_causes: Mapping[int, Finding], searches: Cou
     hopeless = frozenset(index for index, cause in found_causes.items() if not cause.fixable)
     if hopeless == found_causes.keys():
         reasons = NotPossible(tuple(map(str, found_causes.values())))
-        return _Tried({name: reasons for name in ALONE if name != "transition"}, [], [])
-    asked = Task(replace(task.acceptance, ignored=hopeless), task.trajectory, task.cost)
+        return _Tried({name: reasons for name in ALONE if name != "transition"})
+    asked = replace(task, acceptance=replace(task.acceptance, ignored=hopeless))
     tried = _search_and_confirm(asked, searches)
     # new samples between the recorded ones may exceed a position limit that these keep, at any speed
-    lost = not tried.chosen or (tried.slower(tried.failed) and not tried.slower(tried.chosen))
+    lost = not tried.chosen or (_slows_down(tried.refused) and not _slows_down(tried.chosen))
     if lost and isinstance(task.trajectory.times, RecordedTimes):
         at_samples = _search_and_confirm(replace(asked, keeps_rate=False), searches)
         return at_samples if at_samples.chosen else tried
     return tried
 
 
-def _search_and_confirm(asked: Task, progress: Countdown) -> _Tried:
+def _slows_down(fixes: Iterable[Fix]) -> bool:
+    return any(fix.longer > 0 for fix in fixes)
+
+
+def _search_and_confirm(task: Task, progress: Countdown) -> _Tried:
     """Run all searches; repeat those whose fix a run refuses, with the refused instants as samples."""
-    searches = {**ALONE, **COMBINED}
-    if not has_transitions(asked.trajectory):
-        del searches["transition"]
-    found: dict[str, list[Fix] | NotPossible] = {}
-    confirmed: list[Fix] = []
-    every_failed: list[Fix] = []
+    tried, stepped = _Tried(), has_transitions(task.trajectory)
+    names = [name for name in SEARCHES if stepped or name != "transition"]
 
     def attempt(rule: Acceptance) -> tuple[_Tried, FloatArray | None]:
-        task = replace(asked, acceptance=rule)
-        for name in [each for each in searches if each not in found]:
-            try:
-                found[name] = list(searches[name](task))
-            except ImpossibleError as error:
-                found[name] = NotPossible(error.reasons)
-            progress.count()
-        by_search = {name: each for name in searches if isinstance(each := found[name], list)}
-        chosen, failed, short = _worth_choosing(chain(*by_search.values()), asked, confirmed)
-        every_failed.extend(failed)
-        tried = _Tried(dict(found), chosen, every_failed)
-        for name, own in by_search.items():
-            if any(each is other for each in own for other in failed):
-                del found[name]
-        return tried, short if failed else None
+        tried.search(replace(task, acceptance=rule), names, progress)
+        return tried, tried.confirm(task.acceptance)
 
-    tried, _ = asked.acceptance.confirmed(attempt)
+    task.acceptance.confirmed(attempt)
     return tried
-
-
-def _slow_down(task: Task) -> Iterator[Fix]:
-    factor = smallest_slow_down(task.acceptance, task.trajectory)
-    yield task.with_constants(Combination(factor, {}, {}, task.cost.of_factor(factor)))
 
 
 def _constants(task: Task) -> Iterator[Fix]:
@@ -214,73 +219,41 @@ def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Fi
 _Search = Callable[[Task], Iterable[Fix]]
 """Search for fixes of a task that its samples accept; raises ImpossibleError if there are none."""
 
-ALONE: Mapping[str, _Search] = {
-    "slow_down": _slow_down,
+ALONE = ("slow_down", "stiffness_offset", "stiffness_profile", "transition")
+"""Names of the searches for one kind of change, those of the kinds in `Fixes`."""
+
+SEARCHES: Mapping[str, _Search] = {
+    "slow_down": lambda task: [task.with_constants(smallest_slow_down(task))],
     "stiffness_offset": lambda task: [task.with_constants(task.constants())],
     "stiffness_profile": lambda task: [task.with_profiles(AS_IT_IS)],
     "transition": lambda task: [task.with_transition()],
-}
-"""Searches for one kind of change, by the name of the kind in `Fixes`."""
-
-COMBINED: Mapping[str, _Search] = {
     "constants": _constants,
     "profiles": _profile_fixes,
     "branches": _other_branches,
 }
-"""Searches for fixes that may combine several kinds of change."""
-
-
-def _worth_choosing(
-    candidates: Iterable[Fix], task: Task, confirmed: list[Fix]
-) -> tuple[list[Fix], list[Fix], FloatArray]:
-    """Select the fixes that a run confirms and that no simpler fix replaces.
-
-    Returns:
-        Selected fixes, those with another branch last; fixes that a run refused between samples; and the
-        instants at which it did, as times since the start of the task, s.
-    """
-    chosen: list[Fix] = []
-    failed: list[Fix] = []
-    instants = [np.empty(0)]
-    for fix in sorted(candidates, key=lambda each: (len(each.kinds), each.size)):
-        if not any(_superfluous(fix, beside) for beside in chosen):
-            known = any(fix is each for each in confirmed)
-            short = None if known else task.falls_short(fix)
-            (chosen if short is None else failed).append(fix)
-            instants += [] if short is None else [short]
-    confirmed += chosen
-    ordered = sorted(chosen, key=lambda each: (each.branch is not None, each.size))
-    return ordered, failed, np.concatenate(instants)
+"""Searches by name; those that are not `ALONE` may combine several kinds of change."""
 
 
 def _superfluous(fix: Fix, beside: Fix) -> bool:
     """Return whether another fix with the same or fewer kinds of change makes this one superfluous."""
     if beside.kinds < fix.kinds:
-        return beside.size <= SIMPLER_SHARE * fix.size
+        return beside.size <= SIMILAR * fix.size
     faster = fix.longer < FASTER_SHARE * beside.longer
     return beside.kinds == fix.kinds and beside.size <= fix.size and not faster
 
 
 def causes(task: Task) -> Iterator[tuple[int, Finding]]:
     """Yield the index of each joint with a refused sample, and the worst violation with advice."""
-    acceptance = task.acceptance
-    refused = np.flatnonzero(acceptance.refused_joints(task.trajectory)).tolist()
-    steps = acceptance.watched(task.trajectory, WATCHED_STEPS)
-    moving, resting = (part.loads(acceptance.robot) for part in (steps, steps.slowed(math.inf)))
-    beyond = acceptance.beyond_position(task.trajectory)
-    for index in refused:
-        if index in beyond:
-            advice = "timing and stiffness have no effect on that: change the path or the limit"
-            yield index, replace(beyond[index], advice=advice, fixable=False)
-        else:
-            cause = _cause(task, index, moving[index], resting[index])
-            yield index, replace(cause, fixable=cause.fixable or is_fixable(task, index))
+    resting = task.acceptance.watched_at_rest(task.trajectory).loads(task.acceptance.robot)
+    for index, load in task.refused_loads.items():
+        cause = _cause(task, index, load, resting[index])
+        yield index, replace(cause, fixable=cause.fixable or is_fixable(task, index))
 
 
 def is_fixable(task: Task, index: int) -> bool:
     """Return whether any kind of change fixes a joint, with the other joints ignored."""
     alone = _single_joint_task(task, index)
-    if CombinedSearch(alone, branches=True).possible():
+    if CombinedSearch(alone, branches=True).smallest() is not None:
         return True
     with suppress(ImpossibleError):
         alone.with_profiles(AS_IT_IS)
@@ -293,19 +266,24 @@ def is_fixable(task: Task, index: int) -> bool:
 def _single_joint_task(task: Task, index: int) -> Task:
     """Return the task with all other joints ignored."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
-    return Task(replace(task.acceptance, ignored=others), task.trajectory, task.cost)
+    return replace(task, acceptance=replace(task.acceptance, ignored=others))
 
 
-def _cause(task: Task, index: int, moving: Load, resting: Load) -> Finding:
+def _cause(task: Task, index: int, load: Load, resting: Load) -> Finding:
     """Return the worst violation at rest, or else in motion, with advice; fixable where that implies it."""
     acceptance, joint = task.acceptance, task.acceptance.robot.joints[index]
+    loads = load.at(load.steps), load  # violations at samples come first
+    beyond, moving = (
+        next(filter(None, (find(joint, part) for part in loads)), None)
+        for find in (acceptance.beyond_position, acceptance.worst)
+    )
+    if beyond is not None:
+        advice = "timing and stiffness have no effect on that: change the path or the limit"
+        return replace(beyond, advice=advice, fixable=False)
     at_rest = acceptance.worst(joint, resting)
     if at_rest is None:
-        (whole,) = joint_loads(acceptance.robot, task.trajectory, [index])
-        whole = whole.at(whole.steps)
-        first = float(whole.time[acceptance.refused_steps(joint, whole).argmax()])
-        unbounded = Finding(Flag.NOT_FINITE.label, first, math.nan, math.nan, "", joint=joint.name)
-        return acceptance.worst(joint, moving) or acceptance.worst(joint, whole) or unbounded
+        first = float(load.time[acceptance.refused_steps(joint, load).argmax()])
+        return moving or Finding(Flag.NOT_FINITE.label, first, math.nan, math.nan, "", joint=joint.name)
     found = replace(at_rest, at_rest=True, fixable=False)
     if "stiffness" not in joint.actuator.commanded:
         return replace(found, advice="no slower motion helps, and it has no stiffness to choose")
@@ -314,23 +292,24 @@ def _cause(task: Task, index: int, moving: Load, resting: Load) -> Finding:
     except ImpossibleError:
         why = f"no slower motion and no constant stiffness helps{_in_the_way(acceptance, joint, resting)}"
         return replace(found, advice=why)
-    return replace(found, advice=_constant_fix_text(task, index, moving), fixable=True)
+    return replace(found, advice=_constant_fix_text(task, index, load), fixable=True)
 
 
-def _constant_fix_text(task: Task, index: int, moving: Load) -> str:
+def _constant_fix_text(task: Task, index: int, load: Load) -> str:
     """Return the constant stiffness that fixes a joint, as a run confirms, or the constant addition to it."""
     alone = _single_joint_task(task, index)
 
     def attempt(rule: Acceptance) -> tuple[float, FloatArray | None]:
-        found = replace(alone, acceptance=rule).constants()
-        return found.constants[index], alone.falls_short(alone.with_constants(found))
+        constants = replace(alone, acceptance=rule).constants()
+        ((_, refused),) = verify_fixes(alone.acceptance, [alone.with_constants(constants)])
+        return constants.constants[index], refused
 
     confirmed = False
     with suppress(ImpossibleError):
         offset, confirmed = alone.acceptance.confirmed(attempt)
     if not confirmed:
         return "neither a slower motion nor another constant stiffness helps alone"
-    joint, asked = task.acceptance.robot.joints[index], moving.command.commanded["stiffness"]
+    joint, asked = task.acceptance.robot.joints[index], load.command.commanded["stiffness"]
     if asked.min() == asked.max():
         does = f"a stiffness of {'at least' if offset > 0 else 'at most'} {asked[0] + offset:.10g}"
     else:

@@ -20,9 +20,8 @@ from vsacli.base.wrench import wrench_columns
 from vsacli.documents.edited import edited, moved_files
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.file import text_to_change
-from vsacli.studies.search.fix_report import Fix
+from vsacli.studies.search.fix_report import Fix, branch_path
 from vsacli.studies.search.fixed_text import TableFile, edited_text, formula
-from vsacli.studies.search.task import branch_path
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import ResampledTimes, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory

@@ -1,4 +1,4 @@
-"""The stiffness profile nearest to the commanded one: a cubic spline between bounds, by a quadratic program.
+"""The stiffness profile nearest to the commanded one: a spline between bounds, by a quadratic program.
 
 `vsacli optimize` has another solver, `interior_point`, which needs a profile inside all bounds to start from.
 Here no such profile is known, and none exists where bounds touch; in return, the minimum is unique.
@@ -7,6 +7,8 @@ Here no such profile is known, and none exists where bounds touch; in return, th
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
@@ -14,9 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy
 
+from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, evenly
+from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import significant
-from vsacli.base.units import STIFFNESS
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import (
     Acceptance,
@@ -25,20 +28,28 @@ from vsacli.studies.search.acceptance import (
     checked_range,
     variable_stiffness_actuator,
 )
+from vsacli.studies.search.cutting_planes import smallest_offset
 from vsacli.studies.search.loads import Load
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 
-DEGREE = 3
-PIECES_PER_SMOOTHING = 3
+DEGREE = 5
+PIECES_PER_SMOOTHING = 2
 """Pieces of the spline per smoothing time; the objective suppresses finer detail."""
+
+FLAT_ENDS = 2
+"""Number of derivatives that are zero at both ends."""
+
+SMOOTHED = 3
+"""Derivative that the objective suppresses. Its square has no integral where the second one jumps; if the
+second derivative itself is suppressed, it jumps at both ends, from the zero that is prescribed there."""
 
 END_HALVINGS = 4
 """Halvings of the first and last pieces: the function is flat at the ends although its bounds may move."""
 
-DECAY_SMOOTHING_TIMES = 8
+DECAY_SMOOTHING_TIMES = 16
 """Smoothing times over which a change decays, to e^-8."""
 
 MOST_COEFFICIENTS = 100
@@ -80,11 +91,11 @@ class Bounds:
 
 
 def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = None) -> BSpline[np.float64]:
-    """Return the C2 function x between bounds that minimizes the integral of x^2 + smoothing^4 x''^2.
+    """Return the C2 function x between bounds that minimizes the integral of x^2 + smoothing^6 x'''^2.
 
     Its first and second derivatives are zero at both ends, so that the changed profile starts and stops like
-    the commanded one. It is the solution of a convex quadratic program in the coefficients of a cubic spline,
-    solved as a least-distance problem by non-negative least squares (Lawson & Hanson, "Solving Least Squares
+    the commanded one. A convex quadratic program in the coefficients of a quintic spline yields it, solved
+    as a least-distance problem by non-negative least squares (Lawson & Hanson, "Solving Least Squares
     Problems", 1974, chapter 23). Far from the instants at which the bounds exclude zero, x is zero.
 
     Args:
@@ -115,7 +126,7 @@ def _choose_knots(
             ends = np.unique(allowed[np.clip(np.searchsorted(allowed, ends), 0, len(allowed) - 1)])
         knots = np.concatenate([[first] * DEGREE, ends, [last] * DEGREE])
         near = _pieces_near(ends, bounds.time[bounds.excluding_zero], DECAY_SMOOTHING_TIMES * smoothing)
-        # coefficient i belongs to the pieces i-3..i
+        # coefficient i belongs to the pieces i-5..i
         free = np.convolve(near, np.ones(DEGREE + 1)) > 0
         if np.count_nonzero(free) <= MOST_COEFFICIENTS:
             return knots, free, smoothing
@@ -135,9 +146,8 @@ def _shapes(free: BoolArray) -> FloatArray:
     three, since the first two derivatives are zero at an end where these are equal.
     """
     rows = np.arange(len(free))
-    shape_of = np.clip(rows - DEGREE + 1, 0, len(free) - 2 * DEGREE + 1)
-    shapes = np.zeros((len(free), shape_of[-1] + 1))
-    shapes[rows, shape_of] = 1.0
+    shape_of = np.clip(rows - FLAT_ENDS, 0, len(free) - 1 - 2 * FLAT_ENDS)
+    shapes = np.eye(shape_of[-1] + 1)[shape_of]
     return shapes[:, np.any(shapes[free], axis=0)]
 
 
@@ -173,7 +183,8 @@ def _objective(knots: FloatArray, shapes: FloatArray, smoothing: float) -> Float
     time = ((ends[:-1] + half)[:, None] + half[:, None] * nodes).ravel()
     share = np.sqrt(half[:, None] * weights / smoothing).ravel()
     basis = scipy.interpolate.BSpline(knots, shapes, DEGREE)
-    rows = [share[:, None] * basis(time), share[:, None] * smoothing**2 * basis(time, nu=2)]
+    smoothed = smoothing**SMOOTHED * basis(time, nu=SMOOTHED)
+    rows = [share[:, None] * basis(time), share[:, None] * smoothed]
     return np.asarray(np.linalg.qr(np.concatenate(rows), mode="r"), dtype=np.float64)
 
 
@@ -205,6 +216,12 @@ MARGIN_FACTORS = (1, 2, 4, 8)
 SMOOTHING_FACTORS = (1, 2, 4, 8)
 """Multiples of the smoothing time to try then: torques grow with the second derivative."""
 
+RESONANCE_SHARE = 0.7
+"""Smoothing time as a share of that of the resonance."""
+
+FEWEST_STEPS = 10
+"""Sampling intervals in a smoothing time, at least: samples resolve the second derivative."""
+
 CLEARANCE = 1e-6
 """Distance of a profile from its bounds, relative to the largest change, so that rounding crosses none."""
 
@@ -235,7 +252,9 @@ class Change:
         return math.sqrt(float(scipy.integrate.trapezoid(self.rows[0] ** 2, self.time)) / duration)
 
 
-def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: float | None) -> Change:
+def nearest_change(
+    acceptance: Acceptance, joint: Joint, load: Load, judged: Callable[[Load], Load]
+) -> Change:
     """Return the smoothed C2 change of least mean square that fixes a joint; the constant one if nearer.
 
     If the limits of the motors refuse it, the nearest of several others is returned that are smoother or keep
@@ -245,7 +264,7 @@ def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: f
         acceptance: acceptance rule.
         joint: joint with at least one refused sample.
         load: load of the joint at samples and between, all of which must be accepted.
-        constant: constant that fixes the joint, if there is one.
+        judged: returns the part of the load at which a constant must be accepted.
 
     Raises:
         ImpossibleError: no change that was tried is accepted; the error has the reason.
@@ -253,7 +272,9 @@ def nearest_change(acceptance: Acceptance, joint: Joint, load: Load, constant: f
     _check_possible(acceptance, joint, load)
     nearest, *others = product(MARGIN_FACTORS, SMOOTHING_FACTORS)
     change = _change_with_margins(acceptance, joint, load, *nearest)
-    tried = [change] if constant is None else [change, Change.constant(load.time, constant)]
+    tried = [change]
+    with suppress(ImpossibleError):
+        tried.append(Change.constant(load.time, smallest_offset(acceptance, joint, judged(load))))
     if not _accepted(acceptance, joint, load, change):
         tried += [_change_with_margins(acceptance, joint, load, *factors) for factors in others]
     accepted = [each for each in tried if each is not None and _accepted(acceptance, joint, load, each)]
@@ -270,7 +291,7 @@ def _check_possible(acceptance: Acceptance, joint: Joint, load: Load) -> None:
         raise ImpossibleError(
             f"{joint.name} needs a stiffness of at least {significant(low[worst], toward=math.inf)} at t = "
             f"{load.time[worst]:.3f} s, but its limits of stiffness and deflection allow at most "
-            f"{significant(high[worst])} {STIFFNESS.unit(joint.type)}"
+            f"{significant(high[worst])} {units.STIFFNESS.unit(joint.type)}"
         )
 
 
@@ -293,7 +314,7 @@ def _change_with_margins(
         spline = nearest_spline(bounds, smoothings * _smoothing_time(joint, load), load.time[load.steps])
     except NoSplineError:
         return None
-    return Change(load.time, np.stack([spline(load.time, nu=order) for order in range(DEGREE)]))
+    return Change(load.time, np.stack([spline(load.time, nu=order) for order in range(STIFFNESS.orders)]))
 
 
 def _narrowed(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
@@ -305,12 +326,12 @@ def _narrowed(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
 
 
 def _smoothing_time(joint: Joint, load: Load) -> float:
-    """Return sqrt(B/sigma), at least three sampling intervals, s."""
+    """Return `RESONANCE_SHARE` of sqrt(B/sigma), at least `FEWEST_STEPS` sampling intervals, s."""
     # changes slower than this resonance require little inertial torque of the motors
     inertia = max(motor.inertia for motor in variable_stiffness_actuator(joint).motors)
     resonance = math.sqrt(inertia / float(load.command.commanded["stiffness"].min()))
     step = float(np.median(np.diff(load.time[load.steps])))
-    return min(max(resonance, 3 * step), float(load.time[-1] - load.time[0]))
+    return min(max(RESONANCE_SHARE * resonance, FEWEST_STEPS * step), float(load.time[-1] - load.time[0]))
 
 
 def _accepted(acceptance: Acceptance, joint: Joint, load: Load, change: Change | None) -> bool:

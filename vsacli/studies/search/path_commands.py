@@ -38,10 +38,10 @@ class Speeds(NamedTuple):
     fourth: Row
 
     @classmethod
-    def even(cls, factor: float, instants: int) -> Speeds:
-        """Return the speeds along a path that is uniformly slowed down by a factor."""
-        zero = np.zeros(instants)
-        return cls(zero + 1 / factor, zero, zero, zero)
+    def even(cls, factor: FloatArray) -> Speeds:
+        """Return the speeds along a path that is uniformly slowed down by factors, (instants,)."""
+        zero = np.zeros_like(factor)
+        return cls(1 / factor, zero, zero, zero)
 
     @classmethod
     def of(cls, pace: Sequence[Row]) -> Speeds:

@@ -32,10 +32,11 @@ from vsacli.studies.search.fix_report import (
     NotPossible,
     StifferTools,
     StiffnessFactor,
+    in_order,
 )
 from vsacli.studies.search.loads import joint_loads
 from vsacli.studies.search.recorded_limits import RecordedLimits
-from vsacli.studies.search.task import RELATIVE_CHANGE, Task
+from vsacli.studies.search.verification import verify_fixes
 from vsacli.trajectory.trajectory import Trajectory
 
 LARGEST_FACTOR = 1e3
@@ -66,10 +67,10 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
     ignored = frozenset(index for index, name in enumerate(robot.joint_names) if name in left_out)
     rule = Acceptance(robot, of_joints.min_margin, RecordedLimits(trajectory), ignored=ignored)
     candidates = [Fix(0.0, robot, trajectory, asked=trajectory), *of_joints.fixes]
-    chosen, hopeless = _confirmed_fixes(Task(rule, trajectory), candidates)
+    chosen, hopeless = _confirmed_fixes(rule, candidates)
     if hopeless:
         limited = replace(rule, robot=robot.without_tool_limits(hopeless))
-        chosen, _ = _confirmed_fixes(Task(limited, trajectory), candidates)
+        chosen, _ = _confirmed_fixes(limited, candidates)
     alone = next((fix.stiffness_factor for fix in chosen if fix.kinds == {"stiffness_factor"}), None)
     not_alone = (JOINTS_FALL_SHORT,) if of_joints.needed else (NOT_CONFIRMED,)
     causes = (
@@ -81,23 +82,24 @@ def with_stiff_tools(robot: Robot, trajectory: Trajectory, of_joints: Fixes) -> 
         of_joints,
         stiffness_factor=alone or NotPossible(tuple(hopeless.values()) or not_alone),
         causes=(*of_joints.causes, *causes),
-        fixes=tuple(sorted(chosen, key=lambda fix: (fix.branch is not None, fix.size))),
+        fixes=tuple(in_order(chosen)),
     )
 
 
-def _confirmed_fixes(task: Task, candidates: Sequence[Fix]) -> tuple[list[Fix], dict[str, str]]:
+def _confirmed_fixes(acceptance: Acceptance, candidates: Sequence[Fix]) -> tuple[list[Fix], dict[str, str]]:
     """Return the fixes with factors that a run confirms, and that no simpler one replaces.
 
     Without any, the tools that no factor makes stiff enough, whatever the fix, follow with the reason.
     """
-    robot, chosen = task.acceptance.robot, list[Fix]()
+    robot, chosen = acceptance.robot, list[Fix]()
     hopeless: list[dict[str, str]] = []
     for fix in candidates:
-        factors, too_soft = _stiffened(replace(fix, robot=replace(fix.robot, tools=robot.tools)), task)
+        factors, too_soft = _stiffened(replace(fix, robot=replace(fix.robot, tools=robot.tools)), acceptance)
         hopeless.append(too_soft)
         replaced = any(factors.kinds >= simpler.kinds for simpler in chosen)
-        if factors.kinds and not too_soft and not replaced and task.falls_short(factors) is None:
-            chosen.append(factors)
+        if factors.kinds and not too_soft and not replaced:
+            ((confirmed, refused),) = verify_fixes(acceptance, [factors])
+            chosen += [confirmed] if refused is None else []
     common = {} if chosen else hopeless[0]
     return chosen, {name: common[name] for name in common if all(name in each for each in hopeless)}
 
@@ -134,10 +136,10 @@ class _HeldRun:
         return least <= 0 or least < (self._robot.end_effectors[tool].min_stiffness or 0.0)
 
 
-def _stiffened(fix: Fix, task: Task) -> tuple[Fix, dict[str, str]]:
+def _stiffened(fix: Fix, acceptance: Acceptance) -> tuple[Fix, dict[str, str]]:
     """Return a fix with the smallest factors that make its tools stiff enough, and why some stay too soft."""
     trajectory, robot = fix.trajectory, fix.robot
-    acceptance, held = replace(task.acceptance, robot=robot), _HeldRun(robot, trajectory)
+    acceptance, held = replace(acceptance, robot=robot), _HeldRun(robot, trajectory)
     scales, parts, too_soft = np.ones(len(robot.joints)), list[StiffnessFactor](), dict[str, str]()
     judged = range(len(robot.tools)) if robot.limited_tools else ()
     soft = [tool for tool in judged if held.lacks(tool, scales)]
@@ -158,15 +160,10 @@ def _stiffened(fix: Fix, task: Task) -> tuple[Fix, dict[str, str]]:
             break
         else:
             too_soft |= dict.fromkeys((robot.tool_names[tool] for tool in tools), reasons[0])
-    asked = trajectory.block(0, trajectory.samples).commanded[STIFFNESS.key]
     factors = {joint: float(scales[joint]) for joint in np.flatnonzero(scales != 1).tolist()}
-    sizes = [
-        RELATIVE_CHANGE.of_stiffness(asked[:, joint], (factor - 1) * asked[:, joint])
-        for joint, factor in factors.items()
-    ]
     stiffened = replace(
         fix,
-        size=math.hypot(fix.size, *sizes),
+        size=math.hypot(fix.size, *(factor - 1 for factor in factors.values())),
         declared=with_scaled_stiffness(fix.declared, factors) if factors else fix.declared,
         stiffness_factor=StifferTools(tuple(parts)) if parts else None,
     )

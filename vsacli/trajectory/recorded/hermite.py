@@ -112,8 +112,10 @@ def derivatives_are_consistent(time: FloatArray, rows: FloatArray) -> bool:
     present = rows[:, ~np.isnan(rows[0]).all(axis=1)]
     peaks = np.abs(present).max(axis=2)
     changes = np.abs(np.diff(present[:-MATCHED])).max(axis=2)
-    lower = AGREEING * changes + ROUNDINGS * np.spacing(peaks[:-MATCHED])
-    allowed = np.concatenate([lower, AGREEING * peaks[-1:]])
+    rounding = ROUNDINGS * np.spacing(peaks)
+    lower = AGREEING * changes + rounding[:-MATCHED]
+    highest = AGREEING * peaks[-1:] + rounding[[-MATCHED]] / np.diff(time).min() ** (MATCHED - 1)
+    allowed = np.concatenate([lower, highest])
     parts = (slice(first, first + TOGETHER + 1) for first in range(0, len(time) - 1, TOGETHER))
     with np.errstate(all="ignore"):  # NaN after overflow counts as inconsistent
         return all(np.all(_integration_errors(time[part], present[:, :, part]) <= allowed) for part in parts)

@@ -1,0 +1,252 @@
+"""The smallest number that all samples of a task accept, found at a few of them: constants, transition times.
+
+A search asks few samples. The smallest number that these accept is checked at all samples, and some of those
+that refuse it join the few, until none does. Numbers are integers that stand for values on a grid, so that
+the printed value is the confirmed one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+
+import numpy as np
+
+from vsacli.base import units
+from vsacli.base.arrays import BoolArray, IndexArray, evenly
+from vsacli.base.signals import STIFFNESS
+from vsacli.base.texts import significant
+from vsacli.robot.joint import Joint
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range
+from vsacli.studies.search.changed_motion import with_stiffness
+from vsacli.studies.search.fixed_text import changes_of_steps
+from vsacli.studies.search.loads import Load, TaskSamples
+from vsacli.trajectory.curves import RestToRest
+from vsacli.trajectory.curves.steps import PiecewiseProfile, profile_of_levels
+from vsacli.trajectory.trajectory import Trajectory
+
+FEWEST = 10
+"""Number of samples with which a search begins, and the most that a check at all samples adds."""
+
+SECTIONS = 16
+"""Number of integers that are tried at once between a refused and an accepted one."""
+
+SHARE = 0.01
+"""Relative stride of a scan."""
+
+ROWS_AT_ONCE = 10_000
+"""Samples evaluated in one call, which costs hardly more than that of a few."""
+
+LARGEST_RATIO = 100
+"""Largest ratio by which an offset may change the stiffness of a joint if nothing else bounds it."""
+
+OFFSET_DIGITS = 4
+"""Decimal places of an offset after the leading digit of the stiffness: the grid of printed values."""
+
+TRANSITION_DIGITS = 3
+"""Decimal places of a transition after its leading digit: the grid of printed values."""
+
+ROUNDING = 1e-9
+"""Relative increase of a stiffness that keeps its margin, or of a time that is kept, in spite of rounding."""
+
+GRID_ROUNDING = 1e-6
+"""Share of the grid spacing by which a bound may miss a number; far below the tolerance of any limit."""
+
+
+def first_accepted(accepts: Callable[[Sequence[int]], Iterable[bool]], numbers: Sequence[int]) -> int | None:
+    """Return the first of ascending numbers that is accepted, then that of the integers just below; or None.
+
+    An accepted integer between two refused numbers can be missed.
+
+    Args:
+        accepts: returns, for each number in turn, whether it is accepted.
+        numbers: numbers to scan.
+    """
+    while numbers:
+        refused = numbers[0] - 1
+        for number, accepted in zip(numbers, accepts(numbers), strict=False):
+            if accepted:
+                break
+            refused = number
+        else:
+            return None
+        if number - refused == 1:
+            return number
+        numbers = np.unique(np.linspace(refused + 1, number, SECTIONS).astype(np.intp)).tolist()
+    return None
+
+
+def smallest_accepted(
+    refuse: Callable[[Sequence[int], IndexArray], Iterator[BoolArray]], samples: int, numbers: Sequence[int]
+) -> int | None:
+    """Return the smallest number that all samples accept, or None.
+
+    Args:
+        refuse: yields masks of the samples with given indices that refuse some numbers, each (numbers,
+            samples), together for all numbers in turn.
+        samples: number of samples.
+        numbers: ascending numbers to scan, see `first_accepted`.
+    """
+    few = evenly(samples, FEWEST)
+
+    def accepts(tried: Sequence[int]) -> Iterator[bool]:
+        for masks in refuse(tried, few):
+            yield from np.all(~masks, axis=1)
+
+    while (number := first_accepted(accepts, numbers)) is not None:
+        (refused,) = np.nonzero(next(refuse([number], np.arange(samples)))[0])
+        if not refused.size:
+            break
+        few = np.union1d(few, refused[evenly(len(refused), FEWEST)])
+    return number
+
+
+def scanned_numbers(first: int, last: int, share: float, base: float = 0.0) -> list[int]:
+    """Return integers from the first to the last whose sums with a base differ by a share; or none."""
+    if first > last:
+        return []
+    start, stop = abs(base + first), abs(base + last)
+    steps = np.arange(math.ceil(abs(math.log(stop / start)) / math.log1p(share)))
+    sums = start * (1 + share) ** (steps if stop > start else -steps)
+    numbers = np.rint(np.abs(sums - abs(base))).astype(np.intp)
+    return [int(number) for number in np.unique([first, *numbers, last])]
+
+
+def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
+    """Return the constant closest to zero that fixes a joint, N m/rad (N/m).
+
+    The attainable range and the limits of stiffness and deflection bound it directly; for the limits of the
+    motors, constants are scanned outward in strides of 1 % of the stiffness.
+
+    Args:
+        acceptance: acceptance rule.
+        joint: joint with at least one refused sample.
+        load: load of the joint at all samples.
+
+    Raises:
+        ImpossibleError: no constant is accepted; the error has the reason.
+    """
+    low, high = _offset_bounds(acceptance, joint, load)
+    raised = _smallest_of_sign(acceptance, joint, load, 1, (low, high))
+    most = -low if raised is None else min(-low, raised)
+    lowered = _smallest_of_sign(acceptance, joint, load, -1, (-high, most))
+    offsets = [offset for offset in (raised, lowered) if offset is not None]
+    if offsets:
+        return min(offsets, key=abs)
+    nearest = min(max(low, 0.0), high)
+    reason = acceptance.reason(joint, load.changed(nearest))
+    with_it = f"with {nearest:+.6g}" if nearest else "as it is"
+    raise ImpossibleError(f"none keeps every limit of {joint.name}; {with_it}, {reason}")
+
+
+def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
+    """Return the constant that makes a joint as soft as load and stiffness limits admit, N m/rad (N/m).
+
+    Raises:
+        ImpossibleError: no stiffness fixes the joint.
+    """
+    asked = load.command.commanded["stiffness"]
+    rise = checked_range(acceptance, joint, load).low - asked
+    hardest = int(rise.argmax())
+    return float(rise[hardest] + ROUNDING * (asked[hardest] + rise[hardest]))
+
+
+def _offset_bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, float]:
+    """Return the offsets that attainable range, stiffness limits and deflection limits admit."""
+    admissible = checked_range(acceptance, joint, load)
+    asked = load.command.commanded["stiffness"]
+    rise, fall = admissible.low - asked, admissible.high - asked
+    first, last = int(rise.argmax()), int(fall.argmin())
+    if rise[first] > fall[last]:
+        unit = units.STIFFNESS.unit(joint.type)
+        raise ImpossibleError(
+            f"none takes {joint.name} from {asked[first]:.6g} to at least "
+            f"{significant(admissible.low[first], toward=math.inf)} {unit} at t = {load.time[first]:.3f} s "
+            f"and from {asked[last]:.6g} to at most "
+            f"{significant(admissible.high[last], toward=-math.inf)} {unit} at t = {load.time[last]:.3f} s"
+        )
+    return float(rise[first]), float(fall[last])
+
+
+def _smallest_of_sign(
+    acceptance: Acceptance, joint: Joint, load: Load, sign: int, bounds: tuple[float, float]
+) -> float | None:
+    """Return the accepted constant of a sign that is closest to zero, with bounds on its size; or None."""
+    softest = float(load.command.commanded["stiffness"].min())
+    exponent = math.floor(math.log10(softest)) - OFFSET_DIGITS
+    unit, ratio = 10.0**exponent, LARGEST_RATIO - 1 if sign > 0 else 1 - 1 / LARGEST_RATIO
+
+    def refuse(numbers: Sequence[int], steps: IndexArray) -> Iterator[BoolArray]:
+        several = max(1, ROWS_AT_ONCE // len(steps))
+        for start in range(0, len(numbers), several):
+            tried = np.multiply(sign, numbers[start : start + several])
+            values = [float(f"{number}e{exponent}") for number in tried]  # nearest to the decimal fraction
+            raised = load.at(np.tile(steps, len(values))).changed(np.repeat(values, len(steps)))
+            yield acceptance.refused_steps(joint, raised).reshape(len(values), -1)
+
+    first = math.ceil(max(bounds[0], 0.0) / unit - GRID_ROUNDING)
+    last = math.floor(min(bounds[1], ratio * softest) / unit + GRID_ROUNDING)
+    number = smallest_accepted(
+        refuse, len(load.time), scanned_numbers(first, last, SHARE, sign * softest / unit)
+    )
+    return None if number is None else float(f"{sign * number}e{exponent}")
+
+
+def has_transitions(trajectory: Trajectory) -> bool:
+    """Return whether the stiffness is given as levels with transitions between them."""
+    return bool(_transitions_between_levels(trajectory))
+
+
+def _transitions_between_levels(trajectory: Trajectory) -> list[RestToRest]:
+    """Return the transitions between levels; none if the stiffness is another curve."""
+    stiffness = trajectory.commanded[STIFFNESS.key]
+    return (changes_of_steps(stiffness) or []) if isinstance(stiffness, PiecewiseProfile) else []
+
+
+def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple[float, float, Trajectory]:
+    """Return the commanded transition time, the shortest accepted longer one, s, and the trajectory with it.
+
+    Each transition begins as commanded.
+
+    Args:
+        acceptance: acceptance rule, which includes the robot.
+        trajectory: trajectory that `has_transitions`.
+
+    Raises:
+        ImpossibleError: no transition that ends before the next one begins is accepted.
+    """
+    changes = _transitions_between_levels(trajectory)
+    limits = [*(change.span[0] for change in changes[1:]), trajectory.duration]
+    shortest = min(change.span[1] - change.span[0] for change in changes)
+    longest = min(limit - change.span[0] for change, limit in zip(changes, limits, strict=True))
+    exponent = math.floor(math.log10(shortest)) - TRANSITION_DIGITS
+    first, last = (math.floor(end / 10.0**exponent * (1 + ROUNDING)) for end in (shortest, longest))
+    elapsed = trajectory.times.block(0, trajectory.samples) - trajectory.start
+    instants = np.union1d(elapsed, acceptance.between)
+
+    def length(number: int) -> float:
+        return min(float(f"{number}e{exponent}"), longest)
+
+    def refuse(numbers: Sequence[int], places: IndexArray) -> Iterator[BoolArray]:
+        for number in numbers:
+            longer = _with_transitions(trajectory, changes, limits, length(number))
+            part = TaskSamples.between(longer, instants[places])
+            yield np.any(acceptance.refused(part), axis=1)[np.newaxis]
+
+    number = smallest_accepted(refuse, len(instants), scanned_numbers(first + 1, last, SHARE))
+    if number is None:
+        raise ImpossibleError(f"none of up to {longest:.4g} s does; then the next change begins")
+    return shortest, length(number), _with_transitions(trajectory, changes, limits, length(number))
+
+
+def _with_transitions(
+    trajectory: Trajectory, changes: Sequence[RestToRest], limits: Sequence[float], length: float
+) -> Trajectory:
+    """Return the trajectory with transitions of a length, s; each ends at its limit at the latest."""
+    levels = [changes[0].start, *(change.end for change in changes)]
+    spans = [
+        (change.span[0], min(change.span[0] + length, limit))
+        for change, limit in zip(changes, limits, strict=True)
+    ]
+    profile = profile_of_levels(STIFFNESS, (0.0, trajectory.duration), changes[0].degree, levels, spans)
+    return with_stiffness(trajectory, profile)
