@@ -142,7 +142,7 @@ def robot_template(
     values = {
         "name": name,
         "placeholder": True,
-        "gravity": [0, 0, -9.81],
+        "gravity": [0, -9.81, 0] if types == [TYPES["R"]] else [0, 0, -9.81],
         "joints": [_joint(number, *joint) for number, joint in enumerate(chosen)],
     }
     return commented_document(file_formats.ROBOT, robot_file.RobotFile, values, ROBOT_HEAD, SOURCES)
@@ -166,7 +166,7 @@ def _joint_types(letters: str) -> list[str]:
 
 
 def _joint(index: int, name: str, joint_type: str, actuator: str) -> Values:
-    """Return a joint; the axis of the first joint is vertical, those of all others are horizontal.
+    """Return a joint; the axis of the first of several is vertical, those of all others are horizontal.
 
     Links get shorter and lighter towards the tip, as those of real arms do: the load of the first joints
     hardly grows with the number of joints, so that springs of one size hold all arms.
