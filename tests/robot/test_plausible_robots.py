@@ -15,7 +15,7 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws import Cubic, Exponential, Quadratic
 from vsacli.actuators.rigid import Rigid
-from vsacli.files.templates import robot_template
+from vsacli.files.robot_template import robot_template
 
 
 def rod(mass: float, length: float, radius: float) -> Link:
