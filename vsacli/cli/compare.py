@@ -66,10 +66,8 @@ def compare(
     that the recording does not fit the result.
     """
     if recognized(recording) in ("result", "simulation"):
-        _check_options(
-            {"--time-offset": time_offset, "--columns": columns, "--plot": figures}, result, recording
-        )
-        return _compare_results(result, recording, as_json)
+        for_recordings = {"--time-offset": time_offset, "--columns": columns, "--plot": figures}
+        return _compare_results(result, recording, for_recordings, as_json)
     from vsacli.cli.compare_plots import comparison_page, draw_comparison
     from vsacli.results.pages.document import input_text
     from vsacli.results.store.reader import open_stored
@@ -94,18 +92,15 @@ def compare(
     return Exit.VERDICT if comparison.warnings else Exit.OK
 
 
-def _check_options(options: Mapping[str, object], result: str, other: str) -> None:
-    """Refuse options that are for recordings.
+def _compare_results(result: str, other: str, for_recordings: Mapping[str, object], as_json: bool) -> Exit:
+    """Compare two results.
 
     Raises:
-        click.UsageError: with the first of these options.
+        click.UsageError: an option is given that is for recordings.
     """
-    if option := next((name for name, content in options.items() if content is not None), None):
+    if option := next((name for name, content in for_recordings.items() if content is not None), None):
         to_draw = f"to draw both, run vsacli plot {result} {other}"
         raise click.UsageError(f"{option} is for recordings, but {other} is a result; {to_draw}")
-
-
-def _compare_results(result: str, other: str, as_json: bool) -> Exit:
     from vsacli.results.store.reader import open_stored
     from vsacli.studies.measured import compare_results
 

@@ -121,7 +121,8 @@ class _JointType(_ActuatorType):
 @click.option(
     "--joints",
     metavar="LETTERS",
-    help="Type of each joint from the base to the tip: R (revolute) or P (prismatic), e.g. RRP.",
+    help="Types of the joints from the base to the tip, a letter for each: R (revolute) or P (prismatic), "
+    "e.g. RRP. Their names are those of --joint.",
     show_default="R for each --joint",
 )
 @click.option(

@@ -29,7 +29,6 @@ SHARES, REFINEMENTS = np.linspace(0, 1, 11)[1:-1, None, None], 5
 """Parts of a step of these values, 58 %, in which an end is searched, and how often: to 6e-6."""
 
 Names = NDArray[np.object_]
-"""Bounds as texts."""
 
 
 class AttainableStiffness(NamedTuple):
