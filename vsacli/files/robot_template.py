@@ -53,14 +53,17 @@ class LinkSizes(NamedTuple):
 
     def of_link(self, index: int) -> tuple[float, float]:
         """Return length and mass of a link; if one is missing, that of a similar link of this size."""
-        taper = min(index, TAPERED)
-        usual_length, usual_mass = LENGTH * SHORTER**taper, MASS * LIGHTER**taper
-        length, mass = (sizes[index % len(sizes)] if sizes else None for sizes in self)
-        if length is None:
-            length = usual_length if mass is None else LENGTH * (mass / MASS) ** (1 / 3)
-        return length, usual_mass if mass is None and not self.lengths else mass or MASS * (
-            length / LENGTH
-        ) ** 3
+        match self.lengths, self.masses:
+            case (), ():
+                taper = min(index, TAPERED)
+                return LENGTH * SHORTER**taper, MASS * LIGHTER**taper
+            case (), masses:
+                mass = masses[index % len(masses)]
+                return LENGTH * (mass / MASS) ** (1 / 3), mass
+            case lengths, ():
+                length = lengths[index % len(lengths)]
+                return length, MASS * (length / LENGTH) ** 3
+        return self.lengths[index % len(self.lengths)], self.masses[index % len(self.masses)]
 
 
 USUAL_SIZES = LinkSizes()
@@ -88,17 +91,14 @@ def robot_template(
         StorageError: the disk has no room for a temporary file.
     """
     types = _joint_types(joints)
-    each = [actuators] * len(types) if isinstance(actuators, str) else actuators
+    words = [actuators] * len(types) if isinstance(actuators, str) else actuators
     names = joint_names or [f"joint_{number}" for number in range(1, len(types) + 1)]
-    chosen = [*zip(names, types, each, strict=True)]
+    chosen = [*zip(names, types, words, strict=True)]
     values = _robot_values(name, chosen, sizes)
     if sizes != USUAL_SIZES:
-        usual, sized = (
-            _load_template(_robot_document(each))
-            for each in (_robot_values(name, chosen, USUAL_SIZES), values)
-        )
-        scales = _scales_of_numbers(sized, usual)
-        for index, (joint, word) in enumerate(zip(values["joints"], each, strict=True)):
+        usual = _load_template(_robot_document(_robot_values(name, chosen, USUAL_SIZES)))
+        scales = _scales_of_numbers(_load_template(_robot_document(values)), usual)
+        for index, (joint, word) in enumerate(zip(values["joints"], words, strict=True)):
             if word not in DEVICES:
                 scaled = {
                     key: _scale_numbers(joint[key], ("joints", index, key), scales)
