@@ -42,7 +42,7 @@ LONG = (
     *("fixing-a-motion.md", "friction.md", "gallery.md", "identification.md", "index.md", "measured.md"),
     *("models.md", "optimization.md", "performance.md", "plausibility.md", "python.md"),
     *("reading-a-verdict.md", "recorded.md", "recordings.md", "robots.md", "ros-bags.md"),
-    *("README.md", "file-formats.md", "sensitivity.md", "serial.md"),
+    *("README.md", "file-formats.md", "scope.md", "sensitivity.md", "serial.md"),
     *("simulation.md", "sizing.md", "studies.md", "urdf.md"),
 )
 """Pages whose examples take more than half a second."""
@@ -209,6 +209,24 @@ def test_the_contents_list_every_page() -> None:
     assert sorted(listed) == sorted(
         page.relative_to(docs).as_posix() for page in docs.rglob("*.md") if page.name != "index.md"
     )
+
+
+def test_the_contents_say_what_each_page_answers() -> None:
+    """In about five words, next to its title."""
+    text = (REPOSITORY / "docs" / "index.md").read_text(encoding="utf-8")
+    entries = re.findall(r"^- \[[^\]]+\]\(([^)]+)\)(.*)$", text, re.MULTILINE)
+    assert len(entries) == len(contents.ENTRY.findall(text))
+    for page, answer in entries:
+        assert re.fullmatch(r": \w[^:]*(: .*)?", answer), page
+        assert 3 <= len(answer.partition(": ")[2].partition(": ")[0].split()) <= 6, page
+
+
+def test_the_first_pages_lead_to_what_is_not_done() -> None:
+    for page, link in (
+        (REPOSITORY / "README.md", "docs/scope.md"),
+        (REPOSITORY / "docs" / "index.md", "scope.md"),
+    ):
+        assert f"({link})" in page.read_text(encoding="utf-8")
 
 
 def test_exit_codes_are_listed_once() -> None:

@@ -184,7 +184,8 @@ def test_robot_on_the_command_line(vsacli: Any) -> None:
     assert "robot vsa-3r: 3 joints, 20.923 kg\n" in done.out
     assert "reach 0.6 m from the origin of DH frame 0; bound 0.6 m\n" in done.out
     assert (
-        "shoulder   antagonistic     cubic    32.452 N m   from 800 N m/rad   from 819.43 N m/rad" in done.out
+        "shoulder   antagonistic     cubic    32.452 N m   from 800 N m/rad   springs, none"
+        "   from 819.43 N m/rad   springs, none" in done.out
     )
     described = json.loads(vsacli("info", ROBOT, "--json").out)
     assert described["joints"][2]["link"]["mass"] == 5.0894

@@ -24,8 +24,10 @@ from vsacli.base.errors import InputError
 from vsacli.cli.new import new
 from vsacli.documents.fields import declared_fields
 from vsacli.files.data_sheets import SOURCES
+from vsacli.files.devices import DEVICES
 from vsacli.files.examples import example_tables
-from vsacli.files.templates import robot_template, trajectory_template
+from vsacli.files.robot_template import robot_template
+from vsacli.files.templates import trajectory_template
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import DenavitHartenberg, Joint, Limits, Link
 from vsacli.trajectory.file import load_trajectory
@@ -145,7 +147,7 @@ def completions(option: str, incomplete: str) -> list[str]:
 
 
 def test_every_kind_of_actuator_is_completed() -> None:
-    assert set(completions("--actuator", "")) == {*EVERY_ACTUATOR, *MECHANISMS}
+    assert set(completions("--actuator", "")) == {*EVERY_ACTUATOR, *MECHANISMS, *DEVICES}
     assert completions("--actuator", "serial:v") == ["serial:variable_ratio"]
     assert completions("--joint", "elbow:ri") == ["elbow:rigid"]
     assert completions("--joint", "elb") == []
@@ -183,8 +185,8 @@ CONTRADICTIONS = {
     "--joint a:rigid --joint a:elastic": "--joint: the name 'a' is given twice; each joint has its own",
     "--joint a:rigid --actuator rigid": "--actuator is that of every joint, but --joint names one for each",
     "--joint a:rigid --joints RR": "--joints has 2 letters, but --joint is given 1 time; give a letter",
-    "--joint RRP": "expected NAME:KIND or NAME:KIND:MECHANISM, e.g. elbow:serial:lever, found 'RRP'",
-    "--joint a:": "expected NAME:KIND or NAME:KIND:MECHANISM, e.g. elbow:serial:lever, found 'a:'",
+    "--joint RRP": "NAME:KIND:MECHANISM or NAME:DEVICE, e.g. elbow:serial:lever, found 'RRP'",
+    "--joint a:": "NAME:KIND:MECHANISM or NAME:DEVICE, e.g. elbow:serial:lever, found 'a:'",
     "--joint 1a:rigid": "the name must be made of letters, digits, _ and -, beginning with a letter",
     "--joint a:seral": "'seral' is not a kind of actuator; did you mean 'serial'?",
     "--joint a:serial:leaver": "is not a mechanism or spring law of serial actuators; did you mean 'lever'?",

@@ -17,7 +17,8 @@ from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.documents.commented import WIDTH
 from vsacli.documents.fields import OneOf, PairOf, RecordOf, declared_fields
-from vsacli.files.templates import MOST_JOINTS, robot_template, trajectory_template
+from vsacli.files.robot_template import MOST_JOINTS, robot_template
+from vsacli.files.templates import trajectory_template
 from vsacli.robot.file import RobotFile, load_robot
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import OF_PLACEHOLDERS, Robot

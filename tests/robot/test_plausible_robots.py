@@ -15,7 +15,7 @@ from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.laws import Cubic, Exponential, Quadratic
 from vsacli.actuators.rigid import Rigid
-from vsacli.files.templates import robot_template
+from vsacli.files.robot_template import robot_template
 
 
 def rod(mass: float, length: float, radius: float) -> Link:
@@ -24,7 +24,7 @@ def rod(mass: float, length: float, radius: float) -> Link:
     return Link(mass=mass, com=(-length / 2, 0, 0), inertia=Inertia(xx=along, yy=across, zz=across))
 
 
-def arm(count: int, mass: float, length: float, radius: float, actuator, gravity=(0, 0, -9.81)) -> Robot:
+def arm(count: int, mass: float, length: float, radius: float, actuator, gravity=(0, -9.81, 0)) -> Robot:
     """Rods one after the other, all alike."""
     joints = tuple(
         Joint(
@@ -68,7 +68,7 @@ MEANT = {
         Elastic(motor=Motor(inertia=1e-3, gear_ratio=1800, side="shaft"), stiffness=1e5),
         (0, 0, 0),
     ),
-    "on the Moon": arm(2, 5, 0.4, 0.05, Rigid(motor=Motor(inertia=0.5)), (0, 0, -1.62)),
+    "on the Moon": arm(2, 5, 0.4, 0.05, Rigid(motor=Motor(inertia=0.5)), (0, -1.62, 0)),
     "direct drive": arm(2, 3, 0.35, 0.04, Rigid(motor=Motor(inertia=8e-3, gear_ratio=1, max_velocity=50))),
     "stiff gears on a light arm": arm(
         1, 1.0, 0.3, 0.02, Elastic(motor=Motor(inertia=3e-5, gear_ratio=160, side="shaft"), stiffness=1e4)
@@ -94,7 +94,7 @@ def test_ranges_that_are_meant():
         Limits(position=(-12.5, 12.5), velocity=(-50, 50)),
     ):
         joints = tuple(Joint(**{**vars(joint), "limits": limits}) for joint in robot.joints)
-        assert Robot(name="arm", joints=joints).warnings == ()
+        assert Robot(name="arm", joints=joints, gravity=robot.gravity).warnings == ()
 
 
 @pytest.mark.parametrize("actuator", ["antagonistic", "elastic", "rigid"])
@@ -109,7 +109,8 @@ def test_templates_whose_placeholders_are_taken_for_real(joints, actuator, tmp_p
 def test_random_robots_of_other_tests(seed):
     rng = np.random.default_rng(seed)
     joints = tuple(random_joint(rng, f"joint_{number}", letter) for number, letter in enumerate("RPRRP"))
-    assert Robot(name="random", joints=joints).warnings == ()
+    warnings = Robot(name="random", joints=joints).warnings
+    assert [each for each in warnings if ".com puts" not in each] == []  # centers of mass are anywhere
 
 
 @pytest.mark.slow
@@ -151,6 +152,83 @@ def test_the_attainable_stiffness_is_computed_once(monkeypatch: pytest.MonkeyPat
     for _ in range(2):
         assert load_trajectory(REST_TO_REST, robot).warnings == ()
     assert len(solved) == 3
+
+
+FINGER = """format: vsacli-robot/1
+name: finger
+{head}
+joints:
+  - name: knuckle
+    type: revolute
+    dh: {{a: {first}, alpha: 0}}
+    link: {{mass: 0.05, com: [{knuckle}, 0, 0], inertia: {{xx: 2e-6, yy: 2.1e-5, zz: 2.1e-5}}}}
+    actuator: {{type: rigid, motor: {{inertia: 1e-4}}}}
+  - name: tip
+    type: revolute
+    dh: {{a: {second}, alpha: 0}}
+    link: {{mass: 0.05, com: [{tip}, 0, 0], inertia: {{xx: 2e-6, yy: 2.1e-5, zz: 2.1e-5}}}}
+    actuator: {{type: rigid, motor: {{inertia: 1e-4}}}}
+"""
+CENTER = ("com: [-0.022, 0, 0]", "com: [0.022, 0, 0]")
+STANDING = "gravity: [0, -9.81, 0]"
+
+
+def finger_warnings(
+    tmp_path: Path, knuckle: float, tip: float, head: str = STANDING, rows: tuple[float, float] = (0.07, 0.07)
+) -> list[str]:
+    """Warnings about a finger whose phalanges are 70 mm long."""
+    path = tmp_path / "finger.yaml"
+    path.write_text(FINGER.format(knuckle=knuckle, tip=tip, head=head, first=rows[0], second=rows[1]))
+    return [warning.removeprefix(f"{path}:") for warning in load_robot(path).warnings]
+
+
+def test_a_center_of_mass_half_a_link_beyond_the_tip(tmp_path: Path) -> None:
+    assert finger_warnings(tmp_path, -0.035, -0.035) == []
+    assert finger_warnings(tmp_path, -0.035, +0.035) == [
+        "13: joints.tip.link.com puts the center of mass 0.5 link lengths beyond its far end; did "
+        "you mean the opposite sign? It is given in the link frame"
+    ]
+
+
+def test_a_center_of_mass_before_the_joint_of_a_modified_row(tmp_path: Path) -> None:
+    """The frame of a link is at its own joint: the first phalanx ends at the row of the second."""
+    head, rows = f"convention: modified\n{STANDING}", (0, 0.07)
+    assert finger_warnings(tmp_path, 0.035, 0.035, head, rows) == []
+    (warning,) = finger_warnings(tmp_path, -0.035, 0.035, head, rows)
+    assert "joints.knuckle.link.com puts the center of mass 0.5 link lengths beyond its joint" in warning
+
+
+def test_a_tool_or_a_mount_beyond_the_frame_of_the_link(tmp_path: Path) -> None:
+    """The link is as long as what it carries."""
+    for beyond in ("tool: {xyz: [0.08, 0, 0]}", "tools: {pad: {joint: tip, xyz: [0.08, 0, 0]}}"):
+        assert finger_warnings(tmp_path, -0.035, +0.035, f"{STANDING}\n{beyond}") == []
+    beyond = "joints.index_knuckle.link.com puts the center of mass 0.489 link lengths beyond its far end"
+    assert any(beyond in warning for warning in hand_with(tmp_path, CENTER).warnings)
+    mount = ("  - name: index_middle\n", "  - name: index_middle\n    mount: {xyz: [0.022, 0, 0]}\n")
+    assert not any(
+        "index_knuckle.link.com" in warning for warning in hand_with(tmp_path, mount, CENTER).warnings
+    )
+
+
+@pytest.mark.parametrize("head", ["", "gravity: [0, 0, -9.81]", "base: {rpy: [pi, 0, 0]}"])
+def test_gravity_that_is_forgotten_or_along_all_axes(head: str, tmp_path: Path) -> None:
+    (warning,) = finger_warnings(tmp_path, -0.035, -0.035, head)
+    assert "gravity = 9.81 m/s^2 is along the axes of all joints, so that it loads none of them" in warning
+    for meant in ("gravity: [0, 0, 0]", "base: {rpy: [pi/2, 0, 0]}", "gravity: [0, -0.1, -9.81]"):
+        assert finger_warnings(tmp_path, -0.035, -0.035, meant) == []
+    (remark,) = finger_warnings(tmp_path, -0.035, -0.035, f"{head}\nplaceholder: true")
+    assert "placeholders" in remark
+
+
+def test_gravity_of_a_single_vertical_joint(tmp_path: Path) -> None:
+    """It may be meant if it is written, as in `maccepa_1r`."""
+    arm = REPOSITORY / "robots" / "maccepa_1r.yaml"
+    assert load_robot(arm).warnings == ()
+    written = (
+        "gravity: [0, 0, -9.81]            # m/s^2, along the joint's axis: the link carries nothing at rest"
+    )
+    (warning,) = load_robot(edited(arm, tmp_path / "arm.yaml", (written, ""))).warnings
+    assert "gravity = 9.81 m/s^2 is along the axes of all joints" in warning
 
 
 def hand_with(tmp_path: Path, *changes: tuple[str, str]) -> Robot:

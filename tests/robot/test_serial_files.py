@@ -93,7 +93,8 @@ def test_a_table_of_scales_is_among_the_sources() -> None:
 def test_a_motor_that_sets_the_springs_is_held_against_no_link() -> None:
     """Its size follows from its screw; that of the motor which carries the load does not."""
     small = "{inertia: 2e-6, max_velocity: 900, max_torque: 0.05}"
-    text = HEAD.replace("{inertia: 0.02}", small) + f"      {AWAS}\n"
+    standing = HEAD.replace("joints:", "gravity: [0, -9.81, 0]\njoints:")
+    text = standing.replace("{inertia: 0.02}", small) + f"      {AWAS}\n"
     Path("arm.yaml").write_text(text.lstrip())
     assert load_robot("arm.yaml").warnings == ()
     Path("arm.yaml").write_text(text.lstrip().replace("{inertia: 0.3}", small))

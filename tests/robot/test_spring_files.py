@@ -264,7 +264,7 @@ def test_misfit_of_either_side_is_told(rig: Path):
     for name in ("spring.csv", "other.csv"):
         (rig.parent / name).write_text(rows(row_3=ROUGH))
     both = "[{type: table, file: spring.csv}, {type: table, file: other.csv}]"
-    rig.write_text(ROBOT.replace("SPRING", both))
+    rig.write_text(ROBOT.replace("SPRING", both).replace("joints:", "gravity: [0, -9.81, 0]\njoints:"))
     assert [Path(warning.split()[7]).name for warning in load_robot(rig).warnings] == [
         "spring.csv",
         "other.csv",

@@ -24,7 +24,7 @@ from vsacli.cli.command_parts import (
     stop_option,
     trajectory_argument,
 )
-from vsacli.cli.console import Talk, talk_options
+from vsacli.cli.console import EXIT_OF_VERDICT, Exit, Talk, say_text, talk_options
 from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import YAML_FILE
 from vsacli.cli.input_errors import naming_option
@@ -94,7 +94,8 @@ def check_feasibility(
     --fixes lists changes that make the motion executable: a slower motion, another stiffness (a constant or
     a smooth profile), another branch, or several of these, so that every sample keeps --min-margin and all
     limits. The smallest change comes first, and each is confirmed by a run. --write-fix N -o FILE writes the
-    trajectory with fix N of the list.
+    trajectory with fix N of the list; then only the list is printed, and the exit code is 0 if that fixes
+    every joint.
     """
     _check_fix_options(number, output, changes)
     from vsacli.base.flags import MIN_MARGIN, check_min_margin
@@ -133,10 +134,15 @@ def check_feasibility(
 
             progress = partial(talk.progress, shown_from=0, label="searching")
             found = fixes(*inputs, min_margin, progress=progress)
-        if found is not None and output is not None and number is not None:
-            _write_fix(found, number, output, outputs, talk)
+        written = found is not None and _write_fix(found, number, output, outputs, talk)
     talk.wrote(outputs)
-    return show_report(report, as_json, (robot, trajectory), changes, found, options)
+    if found is None or not written or EXIT_OF_VERDICT[report.verdict] == Exit.BUG:
+        return show_report(report, as_json, (robot, trajectory), changes, found, options)
+    if as_json:
+        show_report(report, as_json, (robot, trajectory), changes, found)
+    else:
+        say_text(str(found))  # the report was read before this fix was chosen
+    return Exit.OK if all(cause.fixable for cause in found.causes) else Exit.VERDICT
 
 
 def _check_fix_options(number: int | None, output: str | None, changes: tuple[str, ...]) -> None:
@@ -149,14 +155,16 @@ def _check_fix_options(number: int | None, output: str | None, changes: tuple[st
         raise click.UsageError("--write-fix starts from the files as they are; change them instead of --set")
 
 
-def _write_fix(found: Fixes, number: int, path: str, outputs: Outputs, talk: Talk) -> None:
-    """Write the fix with this number, if it exists, and print the name of the file."""
+def _write_fix(found: Fixes, number: int | None, path: str | None, outputs: Outputs, talk: Talk) -> bool:
+    """Write the fix with this number, and print the name of the file; return whether there is such a fix."""
+    if number is None or path is None:
+        return False
     from vsacli.studies.search import write_fixed
 
     if number <= len(found.fixes):
         write_fixed(found.fixes[number - 1], path, outputs)
         talk.note(f"fix {number} goes to {path}")
-        return
+        return True
     if not found.needed:
         reason = "nothing needs to change"
     elif not found.fixes:
@@ -167,3 +175,4 @@ def _write_fix(found: Fixes, number: int, path: str, outputs: Outputs, talk: Tal
         choice = joined(map(str, range(1, count + 1)), "or")
         reason = f"there {there}, no fix {number}; give --write-fix {choice}"
     talk.note(f"{path} is not written: {reason}")
+    return False

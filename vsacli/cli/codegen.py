@@ -68,8 +68,9 @@ def _wrench_frame(robot: Robot, wrenches: Sequence[str]) -> WrenchFrame | None:
     metavar="[TOOL:]FRAME",
     type=_ToolFrame(FRAMES),
     multiple=True,
-    help="Add a wrench at the end effector as an input, in the axes of this frame; for a robot with several "
-    "tools with the name of one, e.g. left_hand:base, and may be repeated.",
+    help="Add a wrench at the end effector as an input, in the axes of this frame: "
+    f"{' or '.join(FRAMES)}; for a robot with several tools with the name of one, e.g. left_hand:base. May "
+    "be repeated.",
 )
 @click.option(
     "--parameters",

@@ -50,7 +50,7 @@ def variables_option(default: str, further: str = "") -> Callable[[Any], Any]:
         "--variables",
         metavar="NAMES",
         callback=words_of("tau_motor,flags"),
-        help=f"Write only these variables, e.g. tau_motor,flags{further}.",
+        help=f"Write only these variables, separated by commas, e.g. tau_motor,flags{further}.",
         show_default=default,
     )
 

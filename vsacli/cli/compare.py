@@ -1,7 +1,8 @@
-"""`vsacli compare`: a result compared with a recording of the same motion."""
+"""`vsacli compare`: a result compared with a recording of the same motion, or with another result."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
@@ -17,13 +18,13 @@ from vsacli.cli.command_parts import (
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
-from vsacli.cli.input_errors import naming_kind
+from vsacli.cli.input_errors import naming_kind, recognized
 from vsacli.cli.option_types import TIME
 
 
 @click.command(
     "compare",
-    epilog=example("vsacli compare result.h5 torques.csv --plot figures"),
+    epilog=example("vsacli compare result.h5 torques.csv --plot figures", "vsacli compare soft.h5 stiff.h5"),
 )
 @click.argument("result", type=FILE)
 @click.argument("recording", type=FILE)
@@ -51,6 +52,10 @@ def compare(
 ) -> Exit:
     """Compare RESULT, the file of a result or a simulation, with RECORDING, a CSV file of the same motion.
 
+    RECORDING may be another result, or for a simulation another simulation: the report then has the rms and
+    peaks of each signal in both, their difference at equal times, and the number of samples with each flag;
+    --json has all variables. Figures of both on the same axes are drawn by `vsacli plot RESULT RESULT`.
+
     The column `time` of the recording may start at any time and have its own sampling rate. Columns have the
     names of `vsacli export`: elbow.q, elbow.tau_motor_1, or elbow.tau_motor_shaft_1 for the motor side of the
     gear; a unit in brackets may follow. Other columns are ignored unless --columns maps them.
@@ -60,6 +65,9 @@ def compare(
     to the other signals, each with its standard error. Exit code 3 if it begins with a warning, for example
     that the recording does not fit the result.
     """
+    if recognized(recording) in ("result", "simulation"):
+        for_recordings = {"--time-offset": time_offset, "--columns": columns, "--plot": figures}
+        return _compare_results(result, recording, for_recordings, as_json)
     from vsacli.cli.compare_plots import comparison_page, draw_comparison
     from vsacli.results.pages.document import input_text
     from vsacli.results.store.reader import open_stored
@@ -82,3 +90,21 @@ def compare(
     say(comparison, as_json)
     talk.wrote(outputs)
     return Exit.VERDICT if comparison.warnings else Exit.OK
+
+
+def _compare_results(result: str, other: str, for_recordings: Mapping[str, object], as_json: bool) -> Exit:
+    """Compare two results.
+
+    Raises:
+        click.UsageError: an option is given that is for recordings.
+    """
+    if option := next((name for name, content in for_recordings.items() if content is not None), None):
+        to_draw = f"to draw both, run vsacli plot {result} {other}"
+        raise click.UsageError(f"{option} is for recordings, but {other} is a result; {to_draw}")
+    from vsacli.results.store.reader import open_stored
+    from vsacli.studies.measured import compare_results
+
+    kinds = naming_kind("RESULT", result, ("result", "simulation"))
+    with kinds, open_stored(result) as first, open_stored(other) as second:
+        say(compare_results(first, second), as_json)
+    return Exit.OK

@@ -23,13 +23,14 @@ if TYPE_CHECKING:
 PAGE = "html"
 """Format of a page, which replaces figures."""
 
-LENGTH, FONT = (
+LENGTH, FONT, RESOLUTION = (
     Number("a length in cm, e.g. 8.9", positive=True),
     Number("a size in pt, e.g. 8", positive=True),
+    Number("dots per inch, e.g. 300", positive=True),
 )
 
 
-LOOK = ("style", "width", "height", "font_size", "no_title")
+LOOK = ("style", "width", "height", "font_size", "dpi", "no_title")
 """Parameters of the look."""
 
 
@@ -138,6 +139,13 @@ def figure_options(
         @click.option("--width", metavar="CM", type=LENGTH, help="Width of the figures.")
         @click.option("--height", metavar="CM", type=LENGTH, help="Height of the figures.")
         @click.option("--font-size", metavar="PT", type=FONT, help="Font size of the figures.")
+        @click.option(
+            "--dpi",
+            metavar="DPI",
+            type=RESOLUTION,
+            help="Resolution of png figures in dots per inch.",
+            show_default="220",
+        )
         @click.option("--no-title", is_flag=True, help="Draw figures without a title.")
         @wraps(command)
         def drawing(*args: Any, place: str | None, file_format: str | None, **kwargs: Any) -> Any:
@@ -182,10 +190,18 @@ def _refuse_unused(target: FigureTarget | None, file_format: str | None, chosen:
         raise click.UsageError(f"{given[0] if given else '--format'} needs --plot")
     if target is not None and target.file_format == PAGE and given:
         raise click.UsageError(f"{given[0]} cannot be used with a page; leave it out")
+    if target is not None and target.file_format != "png" and chosen["dpi"]:
+        raise click.UsageError(f"--dpi is for png; {target.file_format} figures have no pixels, leave it out")
 
 
 def _look(
-    style: str, width: float | None, height: float | None, font_size: float | None, *, no_title: bool
+    style: str,
+    width: float | None,
+    height: float | None,
+    font_size: float | None,
+    dpi: float | None,
+    *,
+    no_title: bool,
 ) -> Look:
     """Return the look that options choose.
 
@@ -201,6 +217,8 @@ def _look(
         look = replace(look, height=height or look.height)
     with naming_option("--font-size"):
         look = replace(look, font_size=font_size or look.font_size)
+    with naming_option("--dpi"):
+        look = replace(look, dpi=dpi)
     return replace(look, title=look.title and not no_title)
 
 

@@ -36,7 +36,7 @@ from vsacli.cli.option_types import SEED, SENSOR_NOISE, TIME, Number
     metavar="NAMES",
     callback=words_of("springs,motors"),
     help="Parameters to identify: springs, motors, friction, links, or paths such as "
-    "'joints.*.actuator.spring.k'.",
+    "'joints.*.actuator.spring.k', separated by commas.",
     show_default="all",
 )
 @click.option(

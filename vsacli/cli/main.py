@@ -47,10 +47,10 @@ _SECTIONS = {
     "Results": {
         "plot": "Plot robots, results, simulations and recordings.",
         "export": "Export results, or the robot, for other programs.",
-        "compare": "Compare a result with a recording.",
+        "compare": "Compare a result with a recording or another result.",
     },
     "Files": {
-        "new": "Create a commented robot or trajectory file.",
+        "new": "Create a commented robot, trajectory or study file.",
         "examples": "List the bundled robots and trajectories, or copy them.",
         "import-urdf": "Convert a URDF to a robot file.",
         "validate": "Report every problem of files of any kind.",

@@ -1,7 +1,8 @@
-"""`vsacli new`: commented robot and trajectory files as a starting point."""
+"""`vsacli new`: commented robot, trajectory and study files as a starting point."""
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -18,10 +19,19 @@ from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.storage import STANDARD
 from vsacli.base.texts import counted
-from vsacli.cli.command_parts import example, overwrite_option, read_robot
+from vsacli.cli.command_parts import (
+    example,
+    load_inputs,
+    overwrite_option,
+    read_robot,
+    robot_argument,
+    trajectory_argument,
+)
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.input_errors import naming_option
+from vsacli.cli.option_types import Numbers
+from vsacli.files.devices import DEVICES
 
 _output_option = click.option(
     "-o", "--output", type=YAML_FILE, help="File to write.", show_default="standard output"
@@ -33,7 +43,7 @@ _output_option = click.option(
     epilog=example("vsacli new robot --joints RR"),
 )
 def new() -> None:
-    """Create a commented robot or trajectory file as a starting point."""
+    """Create a commented robot, trajectory or study file as a starting point."""
 
 
 class _JointOption(NamedTuple):
@@ -44,29 +54,34 @@ class _JointOption(NamedTuple):
 
 
 class _ActuatorType(StringParamType):
-    """`KIND` or `KIND:MECHANISM`, with shell completion."""
+    """`KIND`, `KIND:MECHANISM` or a device, with shell completion."""
 
     name = "actuator"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """See `click.ParamType.convert`."""
+        if (device := value.lower().replace("-", "_")) in DEVICES:
+            return device
         try:
             kind_and_mechanism(value)
         except InputError as error:
-            self.fail(str(error), param, ctx)
+            from vsacli.base.did_you_mean import did_you_mean  # loaded for error messages only
+
+            devices = did_you_mean(device, DEVICES)
+            self.fail(f"{error}{devices if 'did you mean' in devices else ''}", param, ctx)
         return value
 
     def shell_complete(
         self, _context: click.Context, _parameter: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """Complete names of kinds and mechanisms."""
+        """Complete names of kinds, mechanisms and devices."""
         of_kinds = (f"{kind}:{each}" for kind in ACTUATORS for each in mechanisms_of(kind))
-        names = (*ACTUATORS, *MECHANISMS, *of_kinds)
+        names = (*ACTUATORS, *MECHANISMS, *of_kinds, *DEVICES)
         return [CompletionItem(name) for name in names if name.startswith(incomplete)]
 
 
 class _JointType(_ActuatorType):
-    """`NAME:KIND` or `NAME:KIND:MECHANISM`."""
+    """`NAME:KIND`, `NAME:KIND:MECHANISM` or `NAME:DEVICE`."""
 
     name = "joint"
 
@@ -76,7 +91,7 @@ class _JointType(_ActuatorType):
             return value
         name, colon, actuator = value.partition(":")
         if not (name and colon and actuator):
-            expected = "expected NAME:KIND or NAME:KIND:MECHANISM, e.g. elbow:serial:lever"
+            expected = "expected NAME:KIND, NAME:KIND:MECHANISM or NAME:DEVICE, e.g. elbow:serial:lever"
             self.fail(f"{expected}, found {value!r}", param, ctx)
         from vsacli.documents.fields import Text
         from vsacli.documents.record_checks import fault_of
@@ -100,17 +115,19 @@ class _JointType(_ActuatorType):
     epilog=example(
         "vsacli new robot --joints RRP -o arm.yaml",
         "vsacli new robot --joint base:rigid --joint elbow:serial:lever -o mixed.yaml",
+        "vsacli new robot --joint mcp:qbmove --length 0.07 --mass 0.03 -o finger.yaml",
     ),
 )
 @click.option(
     "--joints",
     metavar="LETTERS",
-    help="Type of each joint from the base to the tip: R (revolute) or P (prismatic), e.g. RRP.",
+    help="Types of the joints from the base to the tip, a letter for each: R (revolute) or P (prismatic), "
+    "e.g. RRP. Their names are those of --joint.",
     show_default="R for each --joint",
 )
 @click.option(
     "--actuator",
-    metavar="KIND[:MECHANISM]",
+    metavar="KIND[:MECHANISM]|DEVICE",
     type=_ActuatorType(),
     help="Actuator of every joint, as in --joint.",
     show_default="antagonistic",
@@ -118,12 +135,30 @@ class _JointType(_ActuatorType):
 @click.option(
     "--joint",
     "chosen",
-    metavar="NAME:KIND[:MECHANISM]",
+    metavar="NAME:KIND[:MECHANISM]|NAME:DEVICE",
     type=_JointType(),
     multiple=True,
     help="Name and actuator of one joint, from the base to the tip; may be repeated. "
     f"KIND: {', '.join(ACTUATORS)}. MECHANISM: of serial actuators {', '.join(MECHANISMS)}; of antagonistic "
-    "and elastic ones a spring law such as cubic, sinh or table (docs/springs.md).",
+    "and elastic ones a spring law such as cubic, sinh or table (docs/springs.md). DEVICE: one of "
+    f"docs/devices.md, {', '.join(DEVICES)}.",
+)
+@click.option(
+    "--length",
+    "lengths",
+    metavar="METERS",
+    type=Numbers("lengths in m, one for all links or one for each, e.g. 0.045,0.03", positive=True),
+    help="Length of all links, or of each, separated by commas, in m. Axes are then parallel and horizontal, "
+    "and actuators fit the load.",
+    show_default="0.3, shorter towards the tip",
+)
+@click.option(
+    "--mass",
+    "masses",
+    metavar="KG",
+    type=Numbers("masses in kg, one for all links or one for each, e.g. 0.025,0.015", positive=True),
+    help="Mass of all links, or of each, separated by commas, in kg; with the effects of --length.",
+    show_default="2, lighter towards the tip; with --length that of similar links",
 )
 @_output_option
 @overwrite_option
@@ -132,6 +167,8 @@ def robot(
     joints: str | None,
     actuator: str | None,
     chosen: tuple[_JointOption, ...],
+    lengths: tuple[float, ...] | None,
+    masses: tuple[float, ...] | None,
     output: str | None,
     overwrite: bool,
     talk: Talk,
@@ -146,14 +183,20 @@ def robot(
     out. Reports mark its springs and motors as placeholders until the key `placeholder` is removed.
     """
     from vsacli.files.examples import example_tables
-    from vsacli.files.templates import robot_template
+    from vsacli.files.robot_template import LinkSizes, robot_template
 
     letters = _letters(joints, actuator, chosen)
+    for option, sizes in {"--length": lengths, "--mass": masses}.items():
+        if sizes is not None and len(sizes) not in (1, len(letters)):
+            found = f"{counted(len(letters), 'joint')}, but {counted(len(sizes), 'value')}"
+            raise click.UsageError(f"{option}: {found}; give one value for all links or one for each")
     with naming_option("--joint" if joints is None else "--joints"):
-        if chosen:
-            text = robot_template(letters, [each.actuator for each in chosen], [each.name for each in chosen])
-        else:
-            text = robot_template(letters, actuator or "antagonistic")
+        text = robot_template(
+            letters,
+            [each.actuator for each in chosen] or actuator or "antagonistic",
+            [each.name for each in chosen],
+            sizes=LinkSizes(lengths or (), masses or ()),
+        )
     _write(text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text])
     talk.note(f"next: vsacli new trajectory --robot {_file(output, 'arm.yaml')} -o move.yaml")
 
@@ -211,6 +254,31 @@ def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk
     inputs = () if robot is None else [source.path for source in robot.sources]
     _write(trajectory_template(robot), output, overwrite, talk, inputs)
     talk.note(f"next: vsacli invdyn {_file(robot_path, 'arm.yaml')} {_file(output, 'move.yaml')}")
+
+
+@new.command(
+    "study",
+    short_help="Write a study file for a robot and a trajectory.",
+    epilog=example("vsacli new study robots/vsa_3r.yaml trajectories/rest_to_rest.yaml -o study.yaml"),
+)
+@robot_argument
+@trajectory_argument
+@_output_option
+@overwrite_option
+@talk_options
+def study(robot: str, trajectory: str, output: str | None, overwrite: bool, talk: Talk) -> None:
+    """Write a study file, to be edited: many runs of ROBOT and TRAJECTORY with varied values.
+
+    It varies the first stiffness of the springs by 20 % either way, and the duration if the trajectory gives
+    it. The file names both others relative to its own folder.
+    """
+    from vsacli.files.study_template import study_template
+
+    inputs = load_inputs(robot, trajectory, talk)
+    folder = Path(output).parent if output not in (None, STANDARD) else Path()
+    paths = (Path(os.path.relpath(path, folder)).as_posix() for path in (robot, trajectory))
+    _write(study_template(inputs.robot, inputs.trajectory, *paths), output, overwrite, talk, inputs.files)
+    talk.note(f"next: vsacli study {_file(output, 'study.yaml')}")
 
 
 def _file(path: str | None, usual: str) -> str:

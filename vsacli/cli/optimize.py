@@ -62,7 +62,8 @@ if TYPE_CHECKING:
     "-o",
     "--output",
     type=YAML_FILE,
-    help="Write the best trajectory; signals without a formula go to a CSV file next to it.",
+    help="Write the best trajectory, which is only reported otherwise; signals without a formula go to a CSV "
+    "file next to it.",
 )
 @figure_options("--plot", purpose="Save figures of stiffness, torques and timing in this folder.")
 @seed_option("initial guesses")
@@ -126,6 +127,8 @@ def optimize(
             write_fixed(Fix(0.0, inputs.robot, found.trajectory), output, outputs)
         elif output is not None:
             talk.note(f"{output} is not written: nothing feasible was found")
+        elif found.trajectory is not None:
+            talk.note("the best trajectory is not written; give -o FILE to keep it")
         if paths and found.trajectory is not None:
             from vsacli.cli.optimize_plots import optimum_sheets
             from vsacli.results.plots import FigureFiles

@@ -103,13 +103,14 @@ class Numbers(StringParamType):
     Args:
         expected: as of `Number`.
         counts: how many numbers there may be; any number of them if empty.
+        positive: whether all must be above zero.
     """
 
     name = "numbers"
 
-    def __init__(self, expected: str, counts: Iterable[int] = ()) -> None:
+    def __init__(self, expected: str, counts: Iterable[int] = (), *, positive: bool = False) -> None:
         self.expected, self.counts = expected, tuple(counts)
-        self._one = Number(expected)
+        self._one = Number(expected, positive=positive)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """See `click.ParamType.convert`."""

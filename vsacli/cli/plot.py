@@ -53,13 +53,13 @@ DRAWN = ("robot", "trajectory", "result", "simulation", "table of a study", "tab
     "--joints",
     metavar="NAMES",
     callback=words_of("shoulder,elbow"),
-    help="Draw only these joints, e.g. shoulder,elbow.",
+    help="Draw only the joints with these names, separated by commas, e.g. shoulder,elbow.",
 )
 @click.option(
     "--variables",
     metavar="NAMES",
     callback=words_of("theta,dtheta"),
-    help="Draw one figure for each of these variables instead, e.g. theta,dtheta.",
+    help="Draw one figure for each of these variables instead, separated by commas, e.g. theta,dtheta.",
 )
 @click.option("--robot", type=FILE, help="Robot of the recording, for joint names.")
 @overwrite_option
@@ -77,36 +77,14 @@ def plot(
 ) -> None:
     """Draw a robot, results, simulations, recordings, studies and sensitivities, or compare several results.
 
-    A result gives <stem>-motion, <stem>-motor-torque, <stem>-elastic-torque and <stem>-energy, a simulation
-    <stem>-motion, <stem>-position-error, <stem>-stiffness-error and <stem>-motor-torque. Both give
-    <stem>-losses if the robot has dry friction or dampers, and <stem>-motor-current and <stem>-motor-voltage
-    if its motors have the constants for them; results of robots with dampers give <stem>-damper, and those
-    with tip_compliance <stem>-tool-stiffness and <stem>-tool-path. Two or more FILEs give one figure
-    <stem>-<stem>-compare: motor torques of results, or position errors of simulations, overlaid joint by
-    joint, and their differences from the first.
-
-    A recording, a CSV file or a trajectory with recorded signals, gives <stem>-recording: the samples of each
-    signal, the fitted spline, the residual and the spectra of both. A result computed from a recording gives
-    it as well. Joints have the names of the columns, or of --robot.
-
-    A robot gives <stem>-arm (links, joints and motors at q = 0, or in the middle of position limits),
-    <stem>-actuators (torque of the springs over deflection) and <stem>-stiffness (attainable stiffness over
-    torque, with singularities and limits).
-
-    With --variables the figures are called <stem>-theta or <stem>-<stem>-compare-theta.
-
-    The table of a study gives <stem>-margin (margin over the varied parameters), <stem>-pareto (cost over
-    margin) and <stem>-feasibility (share of runs with at least a given margin, compared if there are several
-    tables). Where runs were optimized, <stem>-cost replaces the first two.
-
-    The file of vsacli sensitivity -o gives <stem>-ranking: the parameters with the largest effect on the
-    motor torques.
+    Each figure is a file <stem>-<figure>: of a result <stem>-motion, <stem>-motor-torque and others, of a
+    robot <stem>-arm, <stem>-actuators and <stem>-stiffness, of two or more results <stem>-<stem>-compare. The
+    page docs/figures.md lists and explains all of them.
 
     --format html writes one page <stem>.html for a browser, without network access: the report, zoomable
     plots of every variable, and the robot at the time cursor; for results that fail, the fixes of
     check-feasibility --fixes; for several FILEs, their differences; for studies, margin and cost of each run;
-    for a robot its figures and parameters.
-    It requires the package bokeh: pip install bokeh.
+    for a robot its figures and parameters. It requires the package bokeh: pip install bokeh.
     """
     shown = DrawnPart(joints or (), _span(start, end), variables)
     if twice := next((file for file in files if files.count(file) > 1), None):

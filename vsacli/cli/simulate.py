@@ -106,7 +106,7 @@ class Options(NamedTuple):
     metavar="RAD",
     default="0",
     type=Numbers("a value in rad (m), or one for each joint, e.g. 0.01,0,-0.02"),
-    help="Initial position error in rad (m), for all joints or for each.",
+    help="Initial position error in rad (m): one value for all joints, or one for each, separated by commas.",
     show_default=True,
 )
 @click.option(
@@ -114,7 +114,7 @@ class Options(NamedTuple):
     metavar="NM/RAD",
     default="0",
     type=Numbers("a value in N m/rad (N/m), or one for each joint, e.g. 10,0,-20"),
-    help="Initial stiffness error in N m/rad (N/m), for all joints or for each.",
+    help="Initial stiffness error in N m/rad (N/m), in the form of --initial-error.",
     show_default=True,
 )
 @click.option(

@@ -17,6 +17,7 @@ from vsacli.documents.fields import (
     Items,
     ItemsByName,
     OneOf,
+    OwnKind,
     PairOf,
     RecordOf,
     ValueKind,
@@ -64,6 +65,11 @@ def commented_document(
     lines = [_YamlLine(f"format: {format_name}"), *_Commented(sources, unmentioned).record(cls, values, "")]
     comments = [f"# {line}".rstrip() for line in head]
     return "\n".join([*comments, *(text for line in lines for text in _wrap_comment(line))]) + "\n"
+
+
+def three_digits(value: float) -> float:
+    """Return a number rounded for a file to begin with."""
+    return float(f"{value:.3g}")
 
 
 def _wrap_comment(line: _YamlLine) -> Iterator[str]:
@@ -139,6 +145,9 @@ class _Commented:
     ) -> Iterator[_YamlLine]:
         """Yield a field for a value in the form used in files; nested fields are indented."""
         match kind:
+            case PairOf() if isinstance(value, list):
+                yield _YamlLine(f"{name}:", comment)
+                yield from (_YamlLine(f"- {on_one_line(entry)}").inside() for entry in value)
             case PairOf(item):
                 yield from self._field(item, name, value, comment, variant)
             case RecordOf(cls):
@@ -155,6 +164,11 @@ class _Commented:
             case Items() if kind.records or isinstance(value[0], list):
                 yield _YamlLine(f"{name}:", comment)
                 yield from self._entries(kind, value, variant)
+            case OwnKind() if all(isinstance(entry, Mapping | list) for entry in value.values()):
+                yield _YamlLine(f"{name}:", comment)
+                yield from (
+                    _YamlLine(f"{key}: {on_one_line(entry)}").inside() for key, entry in value.items()
+                )
             case _:
                 yield _YamlLine(f"{name}: {on_one_line(value)}", comment)
 

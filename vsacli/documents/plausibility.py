@@ -182,6 +182,10 @@ class ValuesInFile:
             node = inner
         return node, ()
 
+    def has(self, path: NumberPath) -> bool:
+        """Return whether the file has a node at a path."""
+        return not self.node_along(path)[1]
+
     def line(self, path: NumberPath) -> int:
         """Return the line of the deepest node along a path."""
         return self.node_along(path)[0].line

@@ -1,28 +1,21 @@
-"""Commented starter files: a robot with plausible values, and a trajectory that its robot can execute."""
+"""A commented trajectory file to begin with, which its robot can execute."""
 
 from __future__ import annotations
 
 import math
-import re
 import textwrap
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.kinds import example
 from vsacli.base import file_formats
-from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.signals import WRENCH
 from vsacli.base.storage import reporting_temporary_errors, temporary_folder
-from vsacli.base.texts import counted, for_yaml
-from vsacli.documents.commented import WIDTH, commented_document
-from vsacli.documents.number import BOOLEANS
+from vsacli.documents.commented import WIDTH, commented_document, three_digits
 from vsacli.dynamics.forward import mass_matrix
-from vsacli.files.data_sheets import SOURCES
 from vsacli.files.info.robot_info import static_load, stiffness_ranges
-from vsacli.robot import file as robot_file
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
@@ -80,20 +73,6 @@ def _rounded_up(duration: float) -> float:
 
 Values = dict[str, Any]
 
-TYPES = {"R": "revolute", "P": "prismatic"}
-MOST_JOINTS = 100
-MOST_SPELLED_OUT = 12
-"""Largest number of joints for which an error shows the letters."""
-
-SHORTER, LIGHTER, TAPERED = 0.8, 0.7, 6
-"""Length and mass of a link relative to those of the link before it, up to this many links."""
-
-ROBOT_HEAD = (
-    "A robot to begin with. Replace the numbers by those of yours, then remove `placeholder`. What stands",
-    "commented out is optional and shown with its default. Numbers are SI; expressions such as pi/2 and",
-    "90 deg may be written.",
-)
-
 DURATION = 4.0
 """Duration of the starter trajectory, s."""
 
@@ -121,88 +100,6 @@ USED_SHARE = 0.5
 
 START_TO_LOWEST, END_TO_LOWEST = 1.15, 1.35
 """Stiffness at both ends relative to the minimum attainable one, if there is no maximum."""
-
-
-def robot_template(
-    joints: str,
-    actuators: str | Sequence[str] = "antagonistic",
-    joint_names: Sequence[str] = (),
-    name: str = "my-robot",
-) -> str:
-    """Return the text of a robot file.
-
-    Args:
-        joints: a letter for each joint from the base to the tip, R (revolute) or P (prismatic).
-        actuators: `KIND` or `KIND:MECHANISM` of every joint, or of each joint.
-        joint_names: name of each joint; by default joint_1, joint_2 and so on.
-        name: name of the robot.
-
-    Raises:
-        InputError: there are other letters, none, or too many; or an actuator does not suit its joint.
-    """
-    types = _joint_types(joints)
-    each = [actuators] * len(types) if isinstance(actuators, str) else actuators
-    names = joint_names or [f"joint_{number}" for number in range(1, len(types) + 1)]
-    chosen = zip(names, types, each, strict=True)
-    values = {
-        "name": name,
-        "placeholder": True,
-        "gravity": [0, 0, -9.81],
-        "joints": [_joint(number, *joint) for number, joint in enumerate(chosen)],
-    }
-    return commented_document(file_formats.ROBOT, robot_file.RobotFile, values, ROBOT_HEAD, SOURCES)
-
-
-def _joint_types(letters: str) -> list[str]:
-    types = [TYPES.get(letter, "") for letter in letters.upper()]
-    if len(types) > MOST_JOINTS:
-        raise InputError.one(f"expected at most {MOST_JOINTS} joints, found {len(types)}")
-    if not types or not all(types):
-        expected = "expected a letter for each joint, R (revolute) or P (prismatic), e.g. RRP for 3 joints"
-        number = int(letters) if re.fullmatch("[0-9]{1,3}", letters) else 0
-        several = counted(number, "revolute joint")
-        hint = (
-            f"for {several}: --joints {'R' * number}"
-            if 0 < number <= MOST_SPELLED_OUT
-            else f"found {letters!r}"
-        )
-        raise InputError.one(f"{expected}; {hint}")
-    return types
-
-
-def _joint(index: int, name: str, joint_type: str, actuator: str) -> Values:
-    """Return a joint; the axis of the first joint is vertical, those of all others are horizontal.
-
-    Links get shorter and lighter towards the tip, as those of real arms do: the load of the first joints
-    hardly grows with the number of joints, so that springs of one size hold all arms.
-    """
-    alpha: Any = 0 if index else "pi/2"
-    taper = min(index, TAPERED)
-    length, mass = 0.3 * SHORTER**taper, 2.0 * LIGHTER**taper
-    across = mass * length * length / 12
-    inertia = {"xx": across * 2 / 15, "yy": across, "zz": across}
-    link = {"mass": _rounded(mass), "inertia": {axis: _rounded(each) for axis, each in inertia.items()}}
-    half, travel = _rounded(length / 2), _rounded(length * 2 / 3)
-    geometry = _by_type(
-        joint_type,
-        {"dh": {"a": 2 * half, "alpha": alpha}, "link": {**link, "com": [-half, 0, 0]}},
-        {"dh": {"a": 0, "alpha": alpha, "d": travel}, "link": {**link, "com": [0, 0, -travel / 2]}},
-    )
-    try:
-        driven = example(actuator, joint_type)
-    except InputError as error:
-        raise InputError.one(f"{name}: {error}") from None
-    return {
-        "name": for_yaml(name) if name.lower() in (*BOOLEANS, "null") else name,
-        "type": joint_type,
-        **geometry,
-        "damping": _by_type(joint_type, 0.1, 1.0),
-        "actuator": driven,
-    }
-
-
-def _by_type(joint_type: str, revolute: Any, prismatic: Any) -> Any:
-    return revolute if joint_type == TYPES["R"] else prismatic
 
 
 def trajectory_template(robot: Robot | None = None, name: str = "my-trajectory") -> str:
@@ -292,8 +189,8 @@ def _stiffness(robot: Robot) -> Values:
     if not chosen:
         return {}
     return {
-        "start": {name: _rounded(start) for name, (start, _) in chosen.items()},
-        "end": {name: _rounded(end) for name, (_, end) in chosen.items()},
+        "start": {name: three_digits(start) for name, (start, _) in chosen.items()},
+        "end": {name: three_digits(end) for name, (_, end) in chosen.items()},
     }
 
 
@@ -329,7 +226,3 @@ def _stiffnesses(joint: Joint, load: float, q: float, of_motion: float) -> tuple
 def _damping(robot: Robot) -> Values:
     """Return the middle of the range of each damper."""
     return {joint.name: sum(joint.damper.range) / 2 for joint in robot.joints if joint.damper is not None}
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.3g}")

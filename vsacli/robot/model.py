@@ -300,6 +300,7 @@ class Robot(DeclaredRecord):
             self.placeholder,
             tuple(range(len(self.joints))),
             dict(enumerate(self.tool_joints)),
+            self.end_effectors,
         )
 
     @cached_property

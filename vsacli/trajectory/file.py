@@ -55,8 +55,8 @@ class TrajectoryFile(DeclaredRecord):
     )
     rate: float | None = number(
         units.RATE,
-        f"sampling rate, {DEFAULT_RATE:g} by default; if a signal is recorded, the times of the recording by"
-        " default; with this key, equally spaced times of its fit, or the rate of a recording without times",
+        f"sampling rate, {DEFAULT_RATE:g} by default; a recorded signal is taken at its own times without "
+        "this key, and at equally spaced ones with it; of a recording without times, its rate",
         check=POSITIVE,
         default=None,
     )

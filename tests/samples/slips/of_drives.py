@@ -48,6 +48,10 @@ FURTHER: list[Slip] = [
 ]  # fmt: skip
 
 REST: list[Slip] = [
+    Slip("mN m as law of a light joint", "qbmove_arm_gazebo", "qbmove_arm",
+        {"k: 0.0222": "k: 22.2"}, "stiff springs", "spring", "N mm/rad"),
+    Slip("springs of a larger device", "tendon_1r", "tendon_1r",
+        {"c: 1.5": "c: 150"}, "motors compared with springs", "max_torque", "units of the springs"),
     Slip("mN m as friction of a motor", "puma_560", "puma_560",
         {"coulomb: [0.395, 0.435]": "coulomb: [395, 435]"},
         "dry friction compared with torque", "friction.coulomb.0", "395 N mm"),

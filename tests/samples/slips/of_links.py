@@ -43,6 +43,10 @@ FURTHER: list[Slip] = [
 ]  # fmt: skip
 
 REST: list[Slip] = [
+    Slip("center of mass beyond the tip", "vsa_3r", "rest_to_rest",
+        {"com: [-0.15, 0, 0]": "com: [+0.15, 0, 0]"}, "centers of mass", "link.com", "the opposite sign"),
+    Slip("gravity along all axes", "planar_2r", "planar_2r",
+        {"gravity: [0, -9.81, 0]": "gravity: [0, 0, -9.81]"}, "load of gravity", "gravity", "turn it"),
     Slip("masses in g, inertias in g m^2", "tendon_1r", "tendon_1r",
         {"mass: 0.8 ": "mass: 800 ", "xx: 5e-4, yy: 4.5e-3, zz: 4.5e-3": "xx: 0.5, yy: 4.5, zz: 4.5"},
         "densities of links", "mass", "800 g"),

@@ -16,6 +16,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.record_values import json_fields
+from vsacli.robot.attainable import attainable_stiffnesses
 from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity, frames
 from vsacli.robot.model import Robot
@@ -145,7 +146,8 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
     is the torque of gravity alone. `stiffness_range` of a joint with commanded stiffness is the attainable
     range `unloaded`, without torque, and `loaded`, with the static load in either direction; an unbounded end
     is infinite, and both ends are NaN if the springs cannot carry the load. For an elastic joint it is the
-    stiffness of its spring at these torques.
+    stiffness of its spring at these torques. `attainable_stiffness` is the part of it within the limits that
+    matter at rest, with what `bounds` each end.
     """
     by_tool = _reaches(robot)
     return {
@@ -187,6 +189,7 @@ def _joints(robot: Robot) -> list[dict[str, Any]]:
             **({} if carriers == in_row else {"parent": carriers[index]}),
             "static_load": {"torque": float(value), "at": configuration.tolist()},
             "stiffness_range": stiffness_ranges(joint, float(value), float(configuration[index])),
+            "attainable_stiffness": _attainable(joint, float(value), float(configuration[index])),
         }
         for index, (joint, value, configuration) in enumerate(
             zip(robot.joints, load_sizes(loads), loads.configurations, strict=True)
@@ -215,6 +218,14 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
         "unloaded": [float(solution.lower[0]), float(solution.upper[0])],
         "loaded": [float(solution.lower.max()), float(solution.upper.min())],
     }
+
+
+def _attainable(joint: Joint, load: float, q: float) -> dict[str, dict[str, Any]]:
+    """Return the stiffness attainable within all limits; empty if it is not commanded."""
+    if "stiffness" not in joint.actuator.commanded:
+        return {}
+    attainable = attainable_stiffnesses(joint, load, q)
+    return {name: {"range": [*ends.range], "bounds": [*ends.bounds]} for name, ends in attainable.items()}
 
 
 def gravity_torques(robot: Robot, q: FloatArray) -> FloatArray:

@@ -39,7 +39,7 @@ def robot_lines(robot: Values) -> Iterator[str]:
     yield from ("", *aligned(list(_masses(joints))))
     yield from ("", *aligned(list(_drives(joints))), "")
     yield "static load: the largest torque of gravity that was found, over configurations within the limits"
-    yield "stiffness: attainable without load, and with the static load in either direction"
+    yield "stiffness: attainable at rest, without load and with the static load in either direction"
     yield from ("", *device_lines(joints))
     yield from _dampers(joints)
     if robot["held_at_zero"]:
@@ -91,13 +91,22 @@ def _masses(joints: Sequence[Values]) -> Iterator[tuple[str, ...]]:
 
 
 def _drives(joints: Sequence[Values]) -> Iterator[tuple[str, ...]]:
-    yield "joint", "actuator", "springs", "static load", "stiffness", "under load"
+    yield "joint", "actuator", "springs", "static load", "stiffness", "bounds", "under load", "bounds"
     for joint in joints:
-        kind, actuator, ranges = joint["type"], joint["actuator"], joint["stiffness_range"]
-        unit = STIFFNESS.unit(kind)
-        attainable = (span(ranges[name], unit) if ranges else "-" for name in ("unloaded", "loaded"))
+        kind, actuator = joint["type"], joint["actuator"]
         load = f"{short(joint['static_load']['torque'])} {TORQUE.unit(kind)}"
-        yield joint["name"], actuator["type"], _springs(actuator) or "-", load, *attainable
+        ranges = (word for name in ("unloaded", "loaded") for word in _attainable_words(joint, name))
+        yield joint["name"], actuator["type"], _springs(actuator) or "-", load, *ranges
+
+
+def _attainable_words(joint: Values, load: str) -> tuple[str, str]:
+    """Return the attainable stiffness, unloaded or loaded, and what bounds its ends."""
+    unit = STIFFNESS.unit(joint["type"])
+    if attainable := joint["attainable_stiffness"]:
+        bounds = dict.fromkeys(bound or "none" for bound in attainable[load]["bounds"])
+        return span(attainable[load]["range"], unit), ", ".join(bounds)
+    of_springs = joint["stiffness_range"]
+    return (span(of_springs[load], unit), "springs") if of_springs else ("-", "-")
 
 
 def _dampers(joints: Sequence[Values]) -> Iterator[str]:

@@ -18,11 +18,8 @@ USUAL_FONT = 10.0
 
 CM_PER_INCH = 2.54
 
-SIZES = (2.0, 200.0)
-"""Smallest and largest width or height, cm."""
-
-FONTS = (4.0, 72.0)
-"""Smallest and largest font size, pt."""
+SIZES, FONTS, RESOLUTIONS = (2.0, 200.0), (4.0, 72.0), (20.0, 1200.0)
+"""Smallest and largest width or height, cm, font size, pt, and resolution of PNG figures, dots per inch."""
 
 LEGIBLE = 7.0
 """Smallest size of texts, pt, unless the font size itself is smaller."""
@@ -39,18 +36,21 @@ class Look:
         width, height: size, cm; None: as the content requires.
         font_size: size of most texts, pt.
         title: whether figures have a title.
+        dpi: resolution of PNG figures, dots per inch; None: the usual one.
     """
 
     width: float | None = None
     height: float | None = None
     font_size: float = USUAL_FONT
     title: bool = True
+    dpi: float | None = None
 
     def __post_init__(self) -> None:
         for value, (least, most), unit in (
             (self.width, SIZES, "cm"),
             (self.height, SIZES, "cm"),
             (self.font_size, FONTS, "pt"),
+            (self.dpi, RESOLUTIONS, "dots per inch"),
         ):
             if value is not None and not least <= value <= most:
                 raise InputError.one(f"must be from {least:g} to {most:g} {unit}, not {value:g} {unit}")

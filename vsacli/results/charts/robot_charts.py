@@ -18,12 +18,12 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.actuators.mechanisms import MECHANISMS
-from vsacli.actuators.transmission import Command, JointVariables
+from vsacli.actuators.transmission import JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import MIN_MARGIN, Flag, has_flag
-from vsacli.base.signals import COMMANDED
+from vsacli.base.flags import Flag, has_flag
 from vsacli.base.variables import VARIABLES
 from vsacli.results.charts.arm_chart import home_position
+from vsacli.robot.attainable import state_at_rest
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
@@ -172,17 +172,8 @@ class ActuatorChart:
         return VARIABLES[variable].quantity.unit(self.joints[0].type)
 
     def at_rest(self, tau_e: FloatArray, stiffness: FloatArray) -> JointVariables:
-        """Return the variables of the joint at rest; arrays of one shape (samples,).
-
-        The torque of a motor at rest is that of its transmission; dry friction, which would help to hold the
-        load, is left out.
-        """
-        still = np.zeros_like(tau_e)
-        signal = dict(zip(COMMANDED["stiffness"].names, (stiffness, still, still), strict=True))
-        command = Command.at_rest(tau_e, still + self.q)._replace(commanded=signal)
-        with np.errstate(all="ignore"):  # springs overflow at the largest torques of the search
-            found = self.actuator.transmit(command, MIN_MARGIN, None)
-        return found._replace(tau_motor=found.tau_transmission)
+        """See `state_at_rest`; arrays of one shape (samples,)."""
+        return state_at_rest(self.actuator, tau_e, stiffness, np.full_like(tau_e, self.q))
 
     def ends(self, tau_e: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray]:
         """Return minimum and maximum stiffness at torques, and where each is a singularity; (samples,)."""

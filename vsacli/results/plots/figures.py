@@ -17,6 +17,7 @@ from vsacli.base.outputs import Outputs
 from vsacli.results.charts.chart import Sheet
 from vsacli.results.charts.comparison import comparison_sheets
 from vsacli.results.charts.figures import sheets_of
+from vsacli.results.charts.look import current_look
 from vsacli.results.plots.arm_figure import tool_path_figure
 from vsacli.results.plots.sheets import drawn
 from vsacli.results.plots.styles import house_style
@@ -133,6 +134,7 @@ def rendered_figure(figure: Figure, file_format: str) -> bytes:
 
 
 def _resolution(figure: Figure) -> float:
-    """Return the resolution, dpi: the usual one, or less for a figure with too many pixels."""
+    """Return the resolution, dpi: that of the look or the usual one; less if there are too many pixels."""
     width, height = figure.get_size_inches()
-    return min(float(rcParams["savefig.dpi"]), math.sqrt(MOST_PIXELS / (width * height)))
+    resolution = current_look().dpi or float(rcParams["savefig.dpi"])
+    return min(resolution, math.sqrt(MOST_PIXELS / (width * height)))

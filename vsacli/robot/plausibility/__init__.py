@@ -10,13 +10,14 @@ from vsacli.documents import tree
 from vsacli.documents.plausibility import ValuesInFile, implausible_measurements, implausible_values
 from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.documents.source import Source
-from vsacli.robot.plausibility.bodies import BODY_RULES
+from vsacli.robot.plausibility.bodies import BODY_RULES, WHOLE_ROBOT_RULES
 from vsacli.robot.plausibility.checked_robot import CheckedRobot
-from vsacli.robot.plausibility.drives import DRIVE_RULES
+from vsacli.robot.plausibility.drives import DRIVE_RULES, RULES_OF_MOTORS_AND_SPRINGS
 from vsacli.robot.plausibility.links import impossible_links
 from vsacli.robot.plausibility.springs import SPRING_RULES
 
-ROBOT_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES)
+SUBTREE_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES, *RULES_OF_MOTORS_AND_SPRINGS)
+ROBOT_RULES = (*WHOLE_ROBOT_RULES, *SUBTREE_RULES)
 
 
 def robot_findings(
@@ -27,13 +28,19 @@ def robot_findings(
     The robot file is the first of the sources. Each subtree on the base is judged by itself, as if it stood
     alone: one with a number in another unit neither explains nor hides the findings of the others.
     """
+    file_lines = ValuesInFile(sources[0]) if sources else None
+    # A single joint may well be vertical, unless its file says nothing about gravity.
+    chosen = file_lines is None or file_lines.has(("gravity",))
     findings = [
-        *impossible_links(robot.joints, ValuesInFile(sources[0]) if sources else None),
+        *impossible_links(robot.joints, file_lines),
+        *implausible_values(
+            () if chosen and len(robot.joints) == 1 else WHOLE_ROBOT_RULES, robot, file_lines
+        ),
         *(
             problem
             for subtree in subtrees
             for problem in implausible_values(
-                ROBOT_RULES, subtree, _robot_file_lines(robot, subtree, sources)
+                SUBTREE_RULES, subtree, _robot_file_lines(robot, subtree, sources)
             )
         ),
     ]
@@ -45,7 +52,7 @@ def robot_rules_with_findings(
 ) -> frozenset[str]:
     """Return the names of the rules that have findings in a subtree of a robot."""
     lines = _robot_file_lines(robot, subtree, sources)
-    return frozenset(implausible_measurements(ROBOT_RULES, subtree, lines))
+    return frozenset(implausible_measurements(SUBTREE_RULES, subtree, lines))
 
 
 def _robot_file_lines(

@@ -10,6 +10,7 @@ import numpy as np
 
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import PathIndex
+from vsacli.robot.joint import Pose
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, density_of_sphere, joint_path, ratio_or_nan
 
 TURN = 2 * math.pi
@@ -45,6 +46,10 @@ SLIPS_OF_GRAVITY = (
     OtherUnit("cm/s^2", 1e-2),
     OtherUnit("ft/s^2", 0.3048),
 )
+SLENDER = 2.0
+"""Length of a link over its radius of gyration from which on the link is long enough to have two ends; of a
+thin rod it is 3.5."""
+
 SIZES = ("lengths", "densities of links", "sizes of links")
 """Names of rules of numbers that determine the sizes of a robot; if one has findings, sizes mean little."""
 
@@ -122,6 +127,35 @@ def _relative_gyration(checked: CheckedRobot, index: int) -> float:
     )
 
 
+def _measure_centers_of_mass(checked: CheckedRobot) -> Iterator[Measured]:
+    """Yield how far the center of mass of each slender link is beyond its ends, over its length.
+
+    The length of a link that carries no joint is its `a`, since its frame may be anywhere along `d`.
+    """
+    for index, joint in enumerate(checked.joints):
+        carries = index in checked.parents
+        a, d, alpha = joint.dh.a, joint.dh.d if carries else 0.0, joint.dh.alpha
+        length = math.hypot(a, d)
+        if joint.is_revolute and length > SLENDER * checked.sizes.gyrations[index] > 0:
+            along = np.array([a, d * math.sin(alpha), d * math.cos(alpha)]) / length**2
+            com = 1 + float(along @ joint.link.com)  # 0 at the joint, 1 at the link's frame
+            places = [0.0, 1.0, *(1 + float(along @ point) for point in _points_on_link(checked, index))]
+            before, behind = min(places) - com, com - max(places)
+            beside = {"end": "its joint" if before > behind else "its far end"}
+            path = joint_path(index, joint, "link", "com")
+            yield Measured(path, math.nan, "m", max(before, behind), beside)
+
+
+def _points_on_link(checked: CheckedRobot, carrier: int) -> Iterator[tuple[float, float, float]]:
+    """Yield the positions of mounts and tools on a link, in its frame, m."""
+    for joint, parent in zip(checked.joints, checked.parents, strict=True):
+        if parent == carrier and joint.mount is not None:
+            yield joint.mount.xyz
+    for tool, parent in zip(checked.end_effectors, checked.tool_joints, strict=True):
+        if parent == carrier:
+            yield tool.xyz
+
+
 def _measure_gravity(size: Callable[[float], float]) -> Measure:
     """Return the measure of the magnitude of gravity, with a size from it."""
 
@@ -130,6 +164,26 @@ def _measure_gravity(size: Callable[[float], float]) -> Measure:
         yield Measured(("gravity",), value, "m/s^2", size(value))
 
     return measure
+
+
+def _measure_load_of_gravity(checked: CheckedRobot) -> Iterator[Measured]:
+    """Yield the largest sine of the angles between gravity and successive axes, if all joints are revolute.
+
+    Without any such angle all axes are along gravity, in every configuration.
+    """
+    size = math.hypot(*checked.gravity)
+    if size and not checked.placeholder and all(joint.is_revolute for joint in checked.joints):
+        off_base = np.cross(_turned_z(checked.base), checked.gravity) / size
+        off_mounts = (_turned_z(joint.mount)[:2] for joint in checked.joints if joint.mount is not None)
+        twists = (math.sin(checked.joints[carrier].dh.alpha) for carrier in {*checked.parents} - {-1})
+        sines = [math.hypot(*off_base), *(math.hypot(*off) for off in off_mounts), *map(abs, twists)]
+        yield Measured(("gravity",), size, "m/s^2", max(sines))
+
+
+def _turned_z(pose: Pose) -> tuple[float, float, float]:
+    """Return the z axis of a pose, in the frame in which it is given."""
+    (cr, cp, cy), (sr, sp, sy) = (tuple(map(wave, pose.rpy)) for wave in (math.cos, math.sin))
+    return cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr
 
 
 def _measure_upward_gravity(checked: CheckedRobot) -> Iterator[Measured]:
@@ -179,6 +233,12 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="makes a link whose radius of gyration is {size} times the reach of the robot",
         advice="check the units of mass, inertia and lengths",
         explained_by=("lengths", "densities of links")),
+    Rule("centers of mass", "`com`", _measure_centers_of_mass,
+        size="of revolute joints: link lengths beyond joint, next joints and tools, if above 2 gyrations",
+        low=-math.inf, high=0.25,
+        reason="links end near their joints; real robots: up to 0.15",
+        finding="puts the center of mass {size} link lengths beyond {end}",
+        advice="did you mean the opposite sign? It is given in the link frame", explained_by=SIZES),
     Rule("size of gravity", "`gravity`", _measure_gravity(lambda size: size or math.nan),
         size="m/s^2, if there is any", low=0.02, high=30, usual=9.81,
         reason="Jupiter: 25; Ceres: 0.28",
@@ -193,3 +253,12 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="points upwards, along +z of the base frame",
         advice="did you mean the opposite sign? If it hangs from the ceiling, turn `base` instead"),
 )  # fmt: skip
+
+WHOLE_ROBOT_RULES: tuple[Rule[CheckedRobot], ...] = (
+    Rule("load of gravity", "`gravity`", _measure_load_of_gravity,
+        size="largest sine of its angle with an axis, if all joints are revolute", low=1e-3,
+        reason="along all axes it loads no joint",
+        finding="is along the axes of all joints, so that it loads none of them",
+        advice="if these axes are horizontal, turn it, e.g. [0, -9.81, 0]; if vertical, write [0, 0, 0]"),
+)  # fmt: skip
+"""Rules that are not about one subtree alone: a single joint that gravity loads is enough."""

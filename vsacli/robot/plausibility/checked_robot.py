@@ -14,7 +14,7 @@ from vsacli.actuators.motor import Motor
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.plausibility import Measured
 from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex
-from vsacli.robot.joint import Joint, Link, Pose
+from vsacli.robot.joint import Joint, Link, Pose, Tool
 
 WEIGHT_PER_MASS = 9.81
 """Gravity, m/s^2; loads are compared with the weight on earth, also of robots in space."""
@@ -51,6 +51,7 @@ class CheckedRobot:
         placeholder: whether springs and motors are placeholders.
         numbers_in_robot: index of each joint in the whole robot.
         tools: index of the joint that carries each tool, by the index of the tool in the whole robot.
+        end_effectors: these tools.
     """
 
     joints: tuple[Joint, ...]
@@ -61,6 +62,7 @@ class CheckedRobot:
     placeholder: bool
     numbers_in_robot: tuple[int, ...]
     tools: Mapping[int, int]
+    end_effectors: tuple[Tool, ...]
 
     def subtree(self, joints: tuple[int, ...]) -> CheckedRobot:
         """Return the data of some joints, which are renumbered; numbers of the whole robot stay with them."""
@@ -84,7 +86,17 @@ class CheckedRobot:
             numbers=tuple(inside),
             numbers_in_robot=joints,
             tools=tools,
+            end_effectors=tuple(
+                effector
+                for tool, effector in zip(self.tools, self.end_effectors, strict=True)
+                if tool in tools
+            ),
         )
+
+    @property
+    def tool_joints(self) -> tuple[int, ...]:
+        """Index of the joint whose link carries each of `end_effectors`."""
+        return tuple(self.tools.values())
 
     @cached_property
     def sizes(self) -> BodySizes:
@@ -152,6 +164,8 @@ class BodySizes:
         moved_inertias: inertia of all links that a joint of the stretched robot moves, kg m^2; for a
             prismatic joint their mass, kg.
         loads: largest torque of the weight at each joint of the stretched robot, N m (N).
+        load_bounds: the weight that each joint moves times the radius of gyration about it, N m (N); at least
+            its load, and not zero if the center of mass is on the axis.
     """
 
     def __init__(self, joints: Sequence[Joint], parents: Sequence[int]) -> None:
@@ -179,6 +193,7 @@ class BodySizes:
         )
         self.moved_inertias = np.where(revolute, turned, mass)
         self.loads = WEIGHT_PER_MASS * np.where(revolute, moment - before * mass, mass)
+        self.load_bounds = WEIGHT_PER_MASS * np.sqrt(mass * self.moved_inertias)
 
     @property
     def extent(self) -> float:

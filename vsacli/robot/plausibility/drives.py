@@ -143,6 +143,13 @@ def _joint_velocity(drive: _CheckedMotor) -> float:
     return ratio_or_nan(drive.velocity, limit) if drive.rotates else math.nan
 
 
+def _deflection_of_springs(drive: _CheckedMotor) -> float:
+    """Return the deflection of springs at rest under the largest torque, rad (of the reach)."""
+    attainable = drive.checked.unloaded_ranges[drive.number]
+    travel = 1.0 if drive.joint.is_revolute else drive.checked.sizes.extent
+    return math.nan if attainable is None else ratio_or_nan(drive.torque, attainable.lower * travel)
+
+
 def _measure_dry_friction(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield Coulomb friction of motors as written: one number if it is equal in both directions."""
     for drive in _checked_motors(checked):
@@ -228,5 +235,16 @@ WINDING_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="is that of no motor", units=(OtherUnit("mN m/A", 1e-3), OtherUnit("N cm/A", 1e-2)),
         advice="from volts per 1000 turns a minute it is 0.00955 N m/A for each of them"),
 )  # fmt: skip
+
+RULES_OF_MOTORS_AND_SPRINGS: tuple[Rule[CheckedRobot], ...] = (
+    Rule("motors compared with springs", "`max_torque`, `spring`",
+        _measure_motors("max_torque", _deflection_of_springs, carrying=True),
+        size="deflection of the springs at rest under this torque, rad (of the reach)",
+        low=0.01, reason="bundled robots: 0.03 to 6; the springs would not count",
+        finding="deflects the springs of the joint by only {size} rad (of the reach)",
+        advice="check the units of the springs, then those of the motor",
+        explained_by=(*GEARS, "weak motors", "stiff springs")),
+)  # fmt: skip
+"""Rules that follow those of springs."""
 
 DRIVE_RULES = (*GEAR_RULES, *MOTOR_RULES, *RESISTANCE_RULES, *WINDING_RULES)

@@ -60,13 +60,20 @@ def _joints_with_commanded_stiffness(
 
 
 def _measure_minimum_stiffness(checked: CheckedRobot) -> Iterator[Measured]:
-    """Yield the minimum stiffness at rest, where stiffness is commanded, over the weight at full reach."""
+    """Yield the minimum stiffness at rest, where stiffness is commanded, over the load of the joint.
+
+    The load is that of the weight, at the radius of gyration since centers of mass may be on the axis, and
+    that of the joint's own damping at 1 rad/s (reach/s).
+    """
     for index, joint, attainable in _joints_with_commanded_stiffness(checked):
-        size = ratio_or_nan(attainable.lower * _reference_travel(checked, joint), checked.sizes.scale(joint))
-        beside = {"stiffness": f"{attainable.lower:.4g} {_stiffness_unit(joint)}"}
-        yield Measured(
-            joint_path(index, joint, "actuator", "spring"), math.nan, _stiffness_unit(joint), size, beside
-        )
+        unit, travel = _stiffness_unit(joint), _reference_travel(checked, joint)
+        load = float(checked.sizes.load_bounds[index]) + joint.damping * travel
+        beside = {
+            "stiffness": f"{attainable.lower:.4g} {unit}",
+            "load": f"{load:.3g} {units.TORQUE.unit(joint.type)}",
+        }
+        size = ratio_or_nan(attainable.lower * travel, load)
+        yield Measured(joint_path(index, joint, "actuator", "spring"), math.nan, unit, size, beside)
 
 
 def _measure_stiff_transmissions(checked: CheckedRobot) -> Iterator[Measured]:
@@ -162,10 +169,10 @@ def _measure_largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
 
 SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("stiff springs", "`spring`", _measure_minimum_stiffness,
-        size="stiffness at rest times 1 rad (reach), over weight times reach",
-        high=1000, usual=4,
-        reason="bundled robots have 0.03 to 100",
-        finding="makes {stiffness} at rest, {size} times the robot's weight at its reach per rad (per reach)",
+        size="stiffness at rest times 1 rad (reach), over weight times gyration, plus damping at 1 rad/s",
+        high=2000, usual=20,
+        reason="bundled robots have 0.06 to 700",
+        finding="makes {stiffness} at rest, per rad (reach) {size} times {load} of weight and damping",
         units=TOO_STIFF, explained_by=SIZES),
     Rule("stiff transmissions", "`stiffness`, `spring` of elastic joints", _measure_stiff_transmissions,
         size="of revolute joints, stiffness at rest times 1 rad, over weight times reach",

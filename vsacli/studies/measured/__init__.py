@@ -1,6 +1,7 @@
-"""Comparison of laboratory measurements with results."""
+"""Comparison of results with laboratory measurements, and with each other."""
 
 from vsacli.studies.measured.against_result import compare
 from vsacli.studies.measured.agreement import Comparison
+from vsacli.studies.measured.result_difference import compare_results
 
-__all__ = ["Comparison", "compare"]
+__all__ = ["Comparison", "compare", "compare_results"]

@@ -204,6 +204,11 @@ class Optimized(DeclaredRecord):
     )
     seed: int = integer("seed of the random initial guesses", check=_SEED, default=0)
 
+    @classmethod
+    def example(cls, _variant: str) -> Mapping[str, Any]:
+        """Return the values of a new study file."""
+        return {"minimize": MINIMIZED[0]}
+
     def _problems(self) -> list[FieldProblem]:
         if (self.minimize, self.vary) == (TIME, STIFFNESS):
             return [FieldProblem(("vary",), "for the sake of time it is `timing` or `both` that varies")]
