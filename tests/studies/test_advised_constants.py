@@ -11,16 +11,13 @@ import pytest
 from samples.command_line import ROBOT
 from samples.shipped import shipped_robot
 
-from vsacli import load_robot, load_trajectory
+from vsacli import fixes, load_robot, load_trajectory
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import Acceptance
-from vsacli.studies.search.fix_search import causes
-from vsacli.studies.search.task import Task
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -62,9 +59,9 @@ def _weakened(joint: Joint, max_torque: float) -> Joint:
 
 def advised(robot: Robot, trajectory: Trajectory) -> Iterator[tuple[int, str]]:
     """The index of each joint whose cause advises a constant, and the constant as it is printed."""
-    for index, cause in causes(Task(Acceptance(robot, MIN_MARGIN), trajectory)):
+    for cause in fixes(robot, trajectory, MIN_MARGIN).causes:
         if match := ADVICE.search(str(cause)):
-            yield index, match[2]
+            yield robot.joint_names.index(cause.joint), match[2]
 
 
 def fixed(robot: Robot, trajectory: Trajectory, index: int) -> bool:

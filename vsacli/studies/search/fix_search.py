@@ -82,21 +82,20 @@ def fixes(
         if damped:
             refuse_damped_transmissions(robot, trajectory, "fixes")
         task = replace(task, acceptance=replace(task.acceptance, between=as_it_is.refused))
-    found_causes = dict(causes(task))
+    causes = _causes(task)
     with progress(len(SEARCHES)) as bar:
         searches = Countdown(bar.update, len(SEARCHES))
-        tried = _search_fixes(task, found_causes, searches)
-        if not tried.chosen and any(cause.fixable for cause in found_causes.values()):
-            found_causes = {
-                index: replace(cause, fixable=cause.fixable and is_fixable(task, index))
-                for index, cause in found_causes.items()
-            }
-            tried = _search_fixes(task, found_causes, searches)
+        tried = _search_fixes(task, causes, searches)
+        if not tried.chosen and any(cause.fixable for cause in causes.values()):
+            for index, cause in causes.items():
+                fixable = cause.fixable and bool(_fixes_alone(task, index, SEARCHES))
+                causes[index] = replace(cause, fixable=fixable)
+            tried = _search_fixes(task, causes, searches)
         searches.finish()
     return Fixes(
         min_margin,
         **{name: tried.change(name) for name in ALONE},
-        causes=tuple(found_causes.values()),
+        causes=tuple(causes.values()),
         fixes=tuple(in_order(tried.chosen)),
     )
 
@@ -156,18 +155,18 @@ class _Tried:
         return NotPossible((NOT_CONFIRMED,)) if result[0] in self.refused else getattr(result[0], name)
 
 
-def _search_fixes(task: Task, found_causes: Mapping[int, Finding], searches: Countdown) -> _Tried:
+def _search_fixes(task: Task, causes: Mapping[int, Finding], searches: Countdown) -> _Tried:
     """Search for fixes of all joints that can be fixed."""
-    hopeless = frozenset(index for index, cause in found_causes.items() if not cause.fixable)
-    if hopeless == found_causes.keys():
-        reasons = NotPossible(tuple(map(str, found_causes.values())))
+    hopeless = frozenset(index for index, cause in causes.items() if not cause.fixable)
+    if hopeless == causes.keys():
+        reasons = NotPossible(tuple(map(str, causes.values())))
         return _Tried({name: reasons for name in ALONE if name != "transition"})
     asked = replace(task, acceptance=replace(task.acceptance, ignored=hopeless))
-    tried = _search_and_confirm(asked, searches)
+    tried = _search_and_confirm(asked, SEARCHES, searches)
     # new samples between the recorded ones may exceed a position limit that these keep, at any speed
     lost = not tried.chosen or (_slows_down(tried.refused) and not _slows_down(tried.chosen))
     if lost and isinstance(task.trajectory.times, RecordedTimes):
-        at_samples = _search_and_confirm(replace(asked, keeps_rate=False), searches)
+        at_samples = _search_and_confirm(replace(asked, keeps_rate=False), SEARCHES, searches)
         return at_samples if at_samples.chosen else tried
     return tried
 
@@ -176,10 +175,10 @@ def _slows_down(fixes: Iterable[Fix]) -> bool:
     return any(fix.longer > 0 for fix in fixes)
 
 
-def _search_and_confirm(task: Task, progress: Countdown) -> _Tried:
-    """Run all searches; repeat those whose fix a run refuses, with the refused instants as samples."""
+def _search_and_confirm(task: Task, names: Iterable[str], progress: Countdown) -> _Tried:
+    """Run searches; repeat those whose fix a run refuses, with the refused instants as samples."""
     tried, stepped = _Tried(), has_transitions(task.trajectory)
-    names = [name for name in SEARCHES if stepped or name != "transition"]
+    names = [name for name in names if stepped or name != "transition"]
 
     def attempt(rule: Acceptance) -> tuple[_Tried, FloatArray | None]:
         tried.search(replace(task, acceptance=rule), names, progress)
@@ -242,35 +241,22 @@ def _superfluous(fix: Fix, beside: Fix) -> bool:
     return beside.kinds == fix.kinds and beside.size <= fix.size and not faster
 
 
-def causes(task: Task) -> Iterator[tuple[int, Finding]]:
-    """Yield the index of each joint with a refused sample, and the worst violation with advice."""
+def _causes(task: Task) -> dict[int, Finding]:
+    """Return the worst violation of each refused joint, with advice, by index."""
     resting = task.acceptance.watched_at_rest(task.trajectory).loads(task.acceptance.robot)
-    for index, load in task.refused_loads.items():
-        cause = _cause(task, index, load, resting[index])
-        yield index, replace(cause, fixable=cause.fixable or is_fixable(task, index))
+    loads = task.refused_loads.items()
+    return {index: _cause(task, index, load, resting[index]) for index, load in loads}
 
 
-def is_fixable(task: Task, index: int) -> bool:
-    """Return whether any kind of change fixes a joint, with the other joints ignored."""
-    alone = _single_joint_task(task, index)
-    if CombinedSearch(alone, branches=True).smallest() is not None:
-        return True
-    with suppress(ImpossibleError):
-        alone.with_profiles(AS_IT_IS)
-        return True
-    with suppress(ImpossibleError):
-        return has_transitions(task.trajectory) and bool(alone.with_transition())
-    return False
-
-
-def _single_joint_task(task: Task, index: int) -> Task:
-    """Return the task with all other joints ignored."""
+def _fixes_alone(task: Task, index: int, names: Iterable[str]) -> list[Fix]:
+    """Return fixes of one joint by some searches, with the other joints ignored."""
     others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
-    return replace(task, acceptance=replace(task.acceptance, ignored=others))
+    alone = replace(task, acceptance=replace(task.acceptance, ignored=others))
+    return _search_and_confirm(alone, names, Countdown(lambda _: None, 0)).chosen
 
 
 def _cause(task: Task, index: int, load: Load, resting: Load) -> Finding:
-    """Return the worst violation at rest, or else in motion, with advice; fixable where that implies it."""
+    """Return the worst violation at rest, or else in motion, with advice; fixable unless known not to be."""
     acceptance, joint = task.acceptance, task.acceptance.robot.joints[index]
     loads = load.at(load.steps), load  # violations at samples come first
     beyond, moving = (
@@ -284,32 +270,26 @@ def _cause(task: Task, index: int, load: Load, resting: Load) -> Finding:
     if at_rest is None:
         first = float(load.time[acceptance.refused_steps(joint, load).argmax()])
         return moving or Finding(Flag.NOT_FINITE.label, first, math.nan, math.nan, "", joint=joint.name)
-    found = replace(at_rest, at_rest=True, fixable=False)
+    at_rest = replace(at_rest, at_rest=True)
     if "stiffness" not in joint.actuator.commanded:
-        return replace(found, advice="no slower motion helps, and it has no stiffness to choose")
-    try:
-        smallest_offset(acceptance, joint, resting)
-    except ImpossibleError:
-        why = f"no slower motion and no constant stiffness helps{_in_the_way(acceptance, joint, resting)}"
-        return replace(found, advice=why)
-    return replace(found, advice=_constant_fix_text(task, index, load), fixable=True)
+        advice = "no slower motion helps, and it has no stiffness to choose"
+    else:
+        try:
+            smallest_offset(acceptance, joint, resting)
+            return replace(at_rest, advice=_constant_fix_text(task, index, load))
+        except ImpossibleError:
+            way = _in_the_way(acceptance, joint, resting)
+            advice = f"no slower motion and no constant stiffness helps{way}"
+    return replace(at_rest, advice=advice, fixable=bool(_fixes_alone(task, index, SEARCHES)))
 
 
 def _constant_fix_text(task: Task, index: int, load: Load) -> str:
     """Return the constant stiffness that fixes a joint, as a run confirms, or the constant addition to it."""
-    alone = _single_joint_task(task, index)
-
-    def attempt(rule: Acceptance) -> tuple[float, FloatArray | None]:
-        constants = replace(alone, acceptance=rule).constants()
-        ((_, refused),) = verify_fixes(alone.acceptance, [alone.with_constants(constants)])
-        return constants.constants[index], refused
-
-    confirmed = False
-    with suppress(ImpossibleError):
-        offset, confirmed = alone.acceptance.confirmed(attempt)
-    if not confirmed:
+    fixes_alone = _fixes_alone(task, index, ["stiffness_offset"])
+    if not (fixes_alone and fixes_alone[0].stiffness_offset):
         return "neither a slower motion nor another constant stiffness helps alone"
     joint, asked = task.acceptance.robot.joints[index], load.command.commanded["stiffness"]
+    offset = fixes_alone[0].stiffness_offset.by_joint[joint.name]
     if asked.min() == asked.max():
         does = f"a stiffness of {'at least' if offset > 0 else 'at most'} {asked[0] + offset:.10g}"
     else:

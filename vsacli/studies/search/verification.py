@@ -76,17 +76,13 @@ def _refused_instants(
     times = [worst.time for tool in report.tools for worst in tool.worst.values()]
     for joint in joints:
         if joint.margin < acceptance.min_margin or any(map(joint.shows, REFUSED)):
-            times += [joint.margin_time, *_violation_times(joint)]
+            findings = (*joint.worst.values(), *joint.between.values())
+            times += [joint.margin_time, *(finding.time for finding in findings)]
     between = _refused_between(acceptance, run, factor)
     if report.self_check.passed and not times and not between.size:
         return None
     elapsed = (np.array(times) - run.trajectory.start) / factor
     return np.union1d(elapsed[np.isfinite(elapsed)], between)
-
-
-def _violation_times(joint: JointReport) -> Iterator[float]:
-    """Yield the time of the worst violation of each kind at a joint."""
-    yield from (worst.time for worst in (*joint.worst.values(), *joint.between.values()))
 
 
 def _refused_between(acceptance: Acceptance, run: PreparedRun, factor: float) -> FloatArray:
