@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -119,11 +120,14 @@ class CheckedRobot:
         """Joints with their indices; none if springs and motors are placeholders."""
         return enumerate(() if self.placeholder else self.joints)
 
-    def of_unit(self, unit: str) -> Iterator[Measured]:
-        """Yield the numbers with a unit, each with its magnitude as size."""
+    @cached_property
+    def numbers_by_unit(self) -> Mapping[str, Sequence[Measured]]:
+        """Numbers by their unit, each with its magnitude as size."""
+        numbers: defaultdict[str, list[Measured]] = defaultdict(list)
         for path, quantity, value, _ in self.numbers:
-            if quantity.unit(self._variant(path)) == unit:
-                yield Measured(path, value, unit, abs(value))
+            unit = quantity.unit(self._variant(path))
+            numbers[unit].append(Measured(path, value, unit, abs(value)))
+        return numbers
 
     def _variant(self, path: NumberPath) -> str:
         """Return the joint type on which the unit of a number depends."""
