@@ -16,7 +16,7 @@ from vsacli import load_robot, load_trajectory
 from vsacli.actuators.kinds import ACTUATORS, mechanisms_of
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
-from vsacli.files.devices import DEVICES
+from vsacli.files.device_actuators import DEVICES
 from vsacli.files.examples import example_tables, examples
 from vsacli.files.robot_template import LinkSizes, robot_template
 from vsacli.files.templates import trajectory_template

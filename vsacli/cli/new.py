@@ -31,7 +31,7 @@ from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import Numbers
-from vsacli.files.devices import DEVICES
+from vsacli.files.device_actuators import DEVICES
 
 _output_option = click.option(
     "-o", "--output", type=YAML_FILE, help="File to write.", show_default="standard output"

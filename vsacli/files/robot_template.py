@@ -20,7 +20,7 @@ from vsacli.documents.number import BOOLEANS
 from vsacli.documents.record_values import PathIndex
 from vsacli.documents.source import Problems
 from vsacli.files.data_sheets import SOURCES
-from vsacli.files.devices import DEVICES, OF_DEVICE
+from vsacli.files.device_actuators import DEVICES, OF_DEVICE
 from vsacli.files.examples import example_tables, examples
 from vsacli.robot import file as robot_file
 from vsacli.robot.model import Robot
