@@ -16,6 +16,7 @@ from vsacli import load_robot, load_trajectory
 from vsacli.actuators.kinds import ACTUATORS, mechanisms_of
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
+from vsacli.documents.record_values import numbers_in_record
 from vsacli.files.devices import DEVICES
 from vsacli.files.examples import example_tables, examples
 from vsacli.files.robot_template import LinkSizes, robot_template
@@ -53,8 +54,17 @@ def test_a_joint_with_a_device(vsacli: Any, word: str) -> None:
     assert vsacli("new", "robot", "--joint", f"mcp:{word}", "-o", "arm.yaml").code == 0
     joint, (device,) = load_robot("arm.yaml").joints[0], examples([DEVICES[word]])
     expected = device.robot.joints[-1]
-    for name in ("actuator", "damper", "damping"):
+    for name in ("damper", "damping"):
         assert getattr(joint, name) == getattr(expected, name), name
+    numbers, those_of_device = (
+        [(number.path, number.value) for number in numbers_in_record(each.actuator)]
+        for each in (joint, expected)
+    )
+    assert numbers == those_of_device
+    tables, those_of_device = (
+        [source.text for source in each.actuator.sources] for each in (joint, expected)
+    )
+    assert tables == those_of_device
 
 
 def test_a_device_by_the_name_that_the_literature_has(vsacli: Any) -> None:
