@@ -16,7 +16,6 @@ from vsacli import load_robot, load_trajectory
 from vsacli.actuators.kinds import ACTUATORS, mechanisms_of
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
-from vsacli.documents.record_values import numbers_in_record
 from vsacli.files.devices import DEVICES
 from vsacli.files.examples import example_tables, examples
 from vsacli.files.robot_template import LinkSizes, robot_template
@@ -52,15 +51,15 @@ def load_taken_for_real(text: str, folder: Path) -> Robot:
 def test_a_joint_with_a_device(vsacli: Any, word: str) -> None:
     """Its actuator, damper and damping are those of the device's file."""
     assert vsacli("new", "robot", "--joint", f"mcp:{word}", "-o", "arm.yaml").code == 0
-    joint, (device,) = load_robot("arm.yaml").joints[0], examples([DEVICES[word]])
-    expected = device.robot.joints[-1]
+    robot, (device,) = load_robot("arm.yaml"), examples([DEVICES[word]])
+    joint, expected = robot.joints[0], device.robot.joints[-1]
     for name in ("damper", "damping"):
         assert getattr(joint, name) == getattr(expected, name), name
     numbers, those_of_device = (
-        [(number.path, number.value) for number in numbers_in_record(each.actuator)]
-        for each in (joint, expected)
+        [(number.path[2:], number.value) for number in each.checked.numbers if "actuator" in number.path]
+        for each in (robot, device.robot)
     )
-    assert numbers == those_of_device
+    assert numbers == those_of_device[-len(numbers) :]
     tables, those_of_device = (
         [source.text for source in each.actuator.sources] for each in (joint, expected)
     )
