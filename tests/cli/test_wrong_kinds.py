@@ -68,12 +68,8 @@ _COMPUTE = "to compute a result: vsacli invdyn arm.yaml TRAJECTORY"
             "is a result, but RECORDING must be a CSV table; vsacli export run.h5 writes",
         ),
         (
-            "compare run.h5 run.h5",
-            "is a result, but RECORDING must be a CSV table; vsacli export run.h5 writes",
-        ),
-        (
             "compare run.h5 arm.yaml",
-            "is a robot, but RECORDING must be a CSV table; the order is RESULT RECORDING",
+            "is a robot, but RECORDING must be a CSV table or a result (HDF5); the order is RESULT RECORDING",
         ),
         ("compare arm.yaml samples.csv", f"is a robot, but {_RESULT}; {_COMPUTE}"),
         ("plot study.yaml", f"is a study, but {_DRAWN}; run it with vsacli study study.yaml"),

@@ -51,10 +51,19 @@ def load_taken_for_real(text: str, folder: Path) -> Robot:
 def test_a_joint_with_a_device(vsacli: Any, word: str) -> None:
     """Its actuator, damper and damping are those of the device's file."""
     assert vsacli("new", "robot", "--joint", f"mcp:{word}", "-o", "arm.yaml").code == 0
-    joint, (device,) = load_robot("arm.yaml").joints[0], examples([DEVICES[word]])
-    expected = device.robot.joints[-1]
-    for name in ("actuator", "damper", "damping"):
+    robot, (device,) = load_robot("arm.yaml"), examples([DEVICES[word]])
+    joint, expected = robot.joints[0], device.robot.joints[-1]
+    for name in ("damper", "damping"):
         assert getattr(joint, name) == getattr(expected, name), name
+    numbers, those_of_device = (
+        [(number.path[2:], number.value) for number in each.checked.numbers if "actuator" in number.path]
+        for each in (robot, device.robot)
+    )
+    assert numbers == those_of_device[-len(numbers) :]
+    tables, those_of_device = (
+        [source.text for source in each.actuator.sources] for each in (joint, expected)
+    )
+    assert tables == those_of_device
 
 
 def test_a_device_by_the_name_that_the_literature_has(vsacli: Any) -> None:

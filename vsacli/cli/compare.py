@@ -79,7 +79,7 @@ def compare(
         with naming_kind("RESULT", result, ("result", "simulation")), open_stored(result) as stored:
             talk.detail(result_line(stored))
             with (
-                naming_kind("RECORDING", recording, ("table",)),
+                naming_kind("RECORDING", recording, ("table", "result")),
                 naming_kind("--columns", columns, ("columns",)),
             ):
                 comparison = compared(stored, recording, time_offset, columns)
