@@ -88,7 +88,9 @@ def written(vsacli, robot, task, text, kind, number):
     done = vsacli("check-feasibility", robot, task, "--write-fix", number, "-o", "fixed.yaml", "--json")
     assert done.code == 0, done.err
     fixes = json.loads(done.out)["fixes"]["fixes"]
-    numbers = [place for place, each in enumerate(fixes, 1) if each.keys() == {"size", kind, "text"}]
+    numbers = [
+        place for place, each in enumerate(fixes, 1) if each.keys() == {"size", "motors", kind, "text"}
+    ]
     assert number == numbers[0]
     return fixes[number - 1]["text"], (task.parent / "fixed.yaml").read_text()
 

@@ -179,6 +179,15 @@ def test_rest_to_rest_stays_rest_to_rest(duration):
     assert "motors move" not in str(report)
 
 
+@pytest.mark.parametrize(("duration", "stiffness"), [(0.3, 850.0), (0.5, 850.0), (0.4, 790.0)])
+def test_samples_resolve_the_second_derivative(duration, stiffness):
+    """It begins at zero and reaches its peak in many samples, where the range is exceeded at once as well."""
+    trajectory = rest_to_rest(duration, stiffness, rate=1000)
+    rates = profile(vsa_3r(), trajectory)[0].block(0, trajectory.samples).commanded["ddstiffness"]
+    # a smoothing time has at least ten sampling intervals, of which a third derivative takes a few
+    assert np.all(np.abs(np.diff(rates, axis=0)).max(axis=0) <= 0.25 * np.abs(rates).max(axis=0))
+
+
 def test_moving_ends_keep_the_rates_that_were_commanded():
     """A sinusoid that starts at full speed, with a stiffness that falls at the start."""
     position = Sinusoids(

@@ -192,13 +192,8 @@ def _smallest_of_sign(
     return None if number is None else float(f"{sign * number}e{exponent}")
 
 
-def has_transitions(trajectory: Trajectory) -> bool:
-    """Return whether the stiffness is given as levels with transitions between them."""
-    return bool(_transitions_between_levels(trajectory))
-
-
-def _transitions_between_levels(trajectory: Trajectory) -> list[RestToRest]:
-    """Return the transitions between levels; none if the stiffness is another curve."""
+def transitions_between_levels(trajectory: Trajectory) -> list[RestToRest]:
+    """Return the transitions between levels of the stiffness; none if it is another curve."""
     stiffness = trajectory.commanded[STIFFNESS.key]
     return (changes_of_steps(stiffness) or []) if isinstance(stiffness, PiecewiseProfile) else []
 
@@ -210,12 +205,12 @@ def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple
 
     Args:
         acceptance: acceptance rule, which includes the robot.
-        trajectory: trajectory that `has_transitions`.
+        trajectory: trajectory that has `transitions_between_levels`.
 
     Raises:
         ImpossibleError: no transition that ends before the next one begins is accepted.
     """
-    changes = _transitions_between_levels(trajectory)
+    changes = transitions_between_levels(trajectory)
     limits = [*(change.span[0] for change in changes[1:]), trajectory.duration]
     shortest = min(change.span[1] - change.span[0] for change in changes)
     longest = min(limit - change.span[0] for change, limit in zip(changes, limits, strict=True))

@@ -28,7 +28,7 @@ from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.combined import CombinedSearch, least_change, smallest_slow_down
-from vsacli.studies.search.cutting_planes import has_transitions, lowest_offset, smallest_offset
+from vsacli.studies.search.cutting_planes import lowest_offset, smallest_offset, transitions_between_levels
 from vsacli.studies.search.fix_report import NOT_CONFIRMED, SIMILAR, Fix, Fixes, NotPossible, in_order
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.recorded_limits import RecordedLimits
@@ -177,7 +177,7 @@ def _slows_down(fixes: Iterable[Fix]) -> bool:
 
 def _search_and_confirm(task: Task, names: Iterable[str], progress: Countdown) -> _Tried:
     """Run searches; repeat those whose fix a run refuses, with the refused instants as samples."""
-    tried, stepped = _Tried(), has_transitions(task.trajectory)
+    tried, stepped = _Tried(), bool(transitions_between_levels(task.trajectory))
     names = [name for name in names if stepped or name != "transition"]
 
     def attempt(rule: Acceptance) -> tuple[_Tried, FloatArray | None]:

@@ -86,7 +86,10 @@ def _refused_instants(
 
 
 def _refused_between(acceptance: Acceptance, run: PreparedRun, factor: float) -> FloatArray:
-    """Return up to `MOST_REFUSED` refused instants between the samples of a motion, s."""
+    """Return up to `MOST_REFUSED` refused instants between the samples of a motion, s.
+
+    With the worst instants of the run alone, 7 of 44 fixes of random tasks miss the margin on this grid.
+    """
     robot, trajectory = run
     # the allowance for the noise of a recording is known at samples only; the run checks between them
     if not trajectory.known_between or trajectory.estimates:
