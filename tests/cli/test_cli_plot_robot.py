@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 from samples.command_line import REPOSITORY, ROBOT, SEVEN_JOINTS, contents
+from samples.pages import Page
 
 NAMES = ("arm", "actuators", "stiffness")
 
@@ -63,4 +65,29 @@ def test_a_page_has_the_figures_parameters_and_file_of_a_robot(vsacli):
     assert page.count('src="data:image/svg+xml;base64,') == 3
     assert "<h1>vsa-3r</h1>" in page
     assert "format: vsacli-robot/1" in page
-    assert "<script" not in page
+
+
+@pytest.mark.slow
+def test_sliders_end_at_the_position_limits(vsacli, tmp_path):
+    """Without them, half a turn or the size of the arm from home, which is 0 if the limits allow it."""
+    link = "{mass: 1, com: [0, 0, 0], inertia: {xx: 1, yy: 1, zz: 1}}"
+    row = f"dh: {{a: 0.3, alpha: 0}}, link: {link}, actuator: {{type: rigid, motor: {{inertia: 1}}}}"
+    joints = [
+        ("free", "revolute", ""),
+        ("slide", "prismatic", ""),
+        ("above", "revolute", ", limits: {position: [0.5, 1.5]}"),
+        ("around", "revolute", ", limits: {position: [-1, 0.2]}"),
+    ]
+    lines = [f"  - {{name: {name}, type: {kind}, {row}{limits}}}\n" for name, kind, limits in joints]
+    text = "format: vsacli-robot/1\nname: ends\njoints:\n" + "".join(lines)
+    (tmp_path / "ends.yaml").write_text(text, encoding="utf-8")
+    assert vsacli("plot", "ends.yaml", "-o", "ends.html").code == 0
+    page = Page(Path("ends.html"))
+    sliders = {joint["name"]: (joint["home"], *joint["range"]) for joint in page.data["joints"]}
+    home, low, high = sliders.pop("slide")
+    assert 0 == home < high == -low < 1.2  # the lengths of all links
+    assert sliders == {
+        "free": (0, -math.pi, math.pi),
+        "above": (1, 0.5, 1.5),
+        "around": (0, -1, 0.2),
+    }

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import re
+import shutil
 from collections.abc import Callable
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
@@ -11,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from samples.command_line import REPOSITORY
 from samples.figures import rest_to_rest
+from samples.pages import Page
 
 from vsacli.base.flags import Flag
 from vsacli.results.plots import compare_files, plot_stored
@@ -62,6 +67,46 @@ def test_a_comparison_marks_failures_by_file() -> None:
     failing.read("flags")[100:151, 0] = Flag.INFEASIBLE
     base, *_ = compare_files([rest_to_rest(401), failing])["compare"].axes
     assert list(strips(base)) == [(0.85, 0.15, 0.11)]  # the look of the second file
+
+
+def test_a_comparison_does_not_magnify_rounding(tmp_path: Path, feasible_result: Path) -> None:
+    """Of one joint that differs, of one that differs by single precision, and of one that is equal."""
+    other = shutil.copy(feasible_result, tmp_path / "other.h5")
+    with h5py.File(other, "r+") as file:
+        file["tau_motor"][:, 0] = np.float32(file["tau_motor"][:, 0])
+        file["tau_motor"][:, 2] *= 1 + 1e-5
+    with open_stored(feasible_result) as first, open_stored(other) as second:
+        comparison = compare_files([first, second])["compare"]
+        peaks = np.abs(first.read("tau_motor")).max(axis=0)
+    differences = [axes for axes in comparison.axes if axes.get_title(loc="left").partition(" the first")[1]]
+    titles = [axes.get_title(loc="left") for axes in differences]
+    assert [re.sub(r"\d\S*", "#", title) for title in titles] == [
+        *["equal to the first, rms # N m"] * 2,
+        *["equal to the first"] * 2,
+        *["minus the first, rms # N m"] * 2,
+    ]
+    for axes, peak in zip(differences, peaks.ravel(), strict=True):
+        [line] = [line for line in axes.get_lines() if len(line.get_xdata()) > 2]
+        largest, top = np.abs(line.get_ydata()).max(), axes.get_ylim()[1]
+        if axes in differences[:4]:
+            assert largest < 1e-4 * top  # a hundredth of the thickness of a line
+            assert top == pytest.approx(0.01 * peak)
+        else:
+            assert largest > 0.5 * top
+
+
+@pytest.mark.slow
+def test_pages_do_not_magnify_rounding(vsacli: Callable, feasible_result: Path) -> None:
+    shutil.copy(feasible_result, "other.h5")
+    with h5py.File("other.h5", "r+") as file:
+        file["q"][...] = np.float32(file["q"][...])
+        file["tau_e"][:, 0] *= 1.01
+    assert vsacli("plot", feasible_result, "other.h5", "-o", "both.html", "-q").code == 0
+    page = Page(Path("both.html"))
+    equal, other = (page.chart(name, "difference") for name in ("q", "tau_e"))
+    assert equal["note"] == "equal within 1e-06 of the largest value"
+    assert equal["shown"] == pytest.approx([-np.pi / 200, np.pi / 200])
+    assert (other["note"], other["shown"]) == ("", None)
 
 
 def test_a_joint_without_a_curve_is_not_in_the_legend() -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from vsacli.results.plots.point_labels import BELOW, label_points
 from vsacli.results.plots.styles import house_style
@@ -24,7 +26,7 @@ def labeled(places: list[tuple[float, float]], labels: list[str], **options: obj
         label_points(axes, places, labels, **options)  # type: ignore[arg-type]
         renderer = FigureCanvasAgg(figure).get_renderer()
         figure.draw(renderer)
-        boxes = [text.get_window_extent(renderer) for text in axes.texts]
+        boxes = [Text.get_window_extent(text, renderer) for text in axes.texts]  # without lines to points
     assert not any(one.overlaps(other) for one, other in combinations(boxes, 2))
     for box in boxes:
         assert axes.bbox.x0 <= box.x0 < box.x1 <= axes.bbox.x1
@@ -54,3 +56,20 @@ def test_the_most_important_labels_remain_where_there_is_no_space() -> None:
 
 def test_labels_below_a_line_are_right_of_its_points() -> None:
     assert labeled([(0.2, 0.3), (0.6, 0.5)], ["run 1", "run 2"], sides=BELOW) == ["run 1", "run 2"]
+
+
+def test_labels_cover_no_other_points() -> None:
+    """Not those that have no label; where they are on all sides, a line leads to a label farther away."""
+    with house_style():
+        figure = Figure((3.0, 2.4), layout="constrained")
+        axes = figure.add_subplot()
+        ring = [(0.5 + 0.1 * math.cos(angle), 0.5 + 0.12 * math.sin(angle)) for angle in range(7)]
+        axes.plot(*zip((0.0, 0.0), (1.0, 1.0), (0.5, 0.5), *ring, strict=True), linestyle="", marker="o")
+        label_points(axes, [(0.5, 0.5)], ["run 12"])
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        figure.draw(renderer)
+        [text] = axes.texts
+        assert text.get_text() == "run 12"
+        assert text.arrow_patch is not None
+        box = Text.get_window_extent(text, renderer)  # without the line
+        assert not any(box.contains(*axes.transData.transform(place)) for place in [(0.5, 0.5), *ring])

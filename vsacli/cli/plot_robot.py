@@ -65,7 +65,7 @@ def write_robot_page(path: str, page: Staged) -> None:
     robot = load_robot(path)
     drawn = {WORDS[name]: rendered_figure(figure, "svg") for name, figure in _figures(robot).items()}
     inputs = [source_text(source) for source in robot.sources]
-    page.write_text(robot_page(robot.name, drawn, render(describe_robot(robot)), inputs))
+    page.write_text(robot_page(robot, drawn, render(describe_robot(robot)), inputs))
 
 
 def _names(robot: Robot) -> list[str]:

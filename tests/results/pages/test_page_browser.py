@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
+import matplotlib.image
 import numpy as np
 import pytest
 from samples.browser import Browser, browsing
@@ -19,7 +20,12 @@ from samples.measured_pages import wicked_page
 from samples.studies import study
 from samples.torso import torso_result
 
+from vsacli.base.arrays import FloatArray
 from vsacli.cli.main import run
+from vsacli.results.charts.arm_chart import ArmPoints
+from vsacli.robot.file import load_robot
+from vsacli.robot.kinematics import forward_kinematics
+from vsacli.robot.model import Robot
 
 pytestmark = [pytest.mark.slow, needs("chromium", "chromium"), needs("chromedriver", "chromium-driver")]
 
@@ -84,6 +90,15 @@ class Pages:
         motion = edited(REST_TO_REST, self.folder / "short.yaml", ("rate: 1000 ", "rate: 50 "))
         self._run("simulate", ROBOT, motion, "-o", self.folder / "simulated.h5")
         return [self.folder / "simulated.h5"]
+
+    def _posed(self, name: str = "scara_4") -> list[Path]:
+        return [REPOSITORY / "robots" / f"{name}.yaml"]
+
+    def of_robot(self, name: str) -> Path:
+        """A bundled robot without a motion."""
+        folder = self.folder / name
+        self._run("plot", *self._posed(name), "--format", "html", "-o", folder)
+        return folder / f"{name}.html"
 
     def _studied(self) -> list[Path]:
         self._run("study", study(self.folder), "-o", self.folder / "studied.h5")
@@ -204,11 +219,9 @@ def test_a_tree_moves_with_its_tools(browser: Browser, tmp_path: Path) -> None:
     torso_result(tmp_path).save(tmp_path / "torso.h5")
     assert run(["plot", str(tmp_path / "torso.h5"), "--format", "html", "-o", str(tmp_path), "-q"]) == 0
     browser.open(tmp_path / "torso.html", whole=False)
-    drawn = browser.run(
-        """const { arm } = vsacli.data.files[0], { array } = vsacli;
-        return [arm.tools, arm.tool_carriers, array(arm.origins).length, array(arm.seats).length]"""
-    )
-    assert drawn == [["left_hand", "right_hand", "lamp"], [4, 7, 8], 41 * (9 + 3) * 3, 41 * 8 * 3]
+    tools = browser.run("return vsacli.robot.arms[0].tools.map(({ name, carrier }) => [name, carrier])")
+    assert tools == [["left_hand", 4], ["right_hand", 7], ["lamp", 8]]
+    assert_points(browser, load_robot(tmp_path / "tree.yaml"), stored_positions(tmp_path / "torso.h5"))
     picture = "return document.getElementById('arm').toDataURL()"
     still = browser.settled(picture)
     browser.find("#play").click()
@@ -216,6 +229,27 @@ def test_a_tree_moves_with_its_tools(browser: Browser, tmp_path: Path) -> None:
     browser.find("#play").click()
     assert browser.settled(picture) != still
     assert not browser.complaints()
+
+
+def stored_positions(path: Path) -> FloatArray:
+    with h5py.File(path) as file:
+        return np.asarray(file["q"][...])
+
+
+SINGLE = 4e-7
+"""Error of a point of an arm of about 1 m, m, with positions of up to 3 rad in single precision."""
+
+
+def assert_points(browser: Browser, robot: Robot, q: FloatArray) -> None:
+    """Compare the points at the instants of a motion with those of the package, all in the base frame."""
+    points = ArmPoints.of(robot, q)
+    passed = browser.run("return vsacli.robot.arms[0].passed")
+    np.testing.assert_allclose(passed, np.concatenate((points.origins, points.tools), axis=1), atol=SINGLE)
+    np.testing.assert_allclose(np.array(passed)[:, 1:], forward_kinematics(robot, q)[..., :3, 3], atol=SINGLE)
+
+
+def test_the_chain_moves_as_forward_kinematics_says(page: Browser, feasible_result: Path) -> None:
+    assert_points(page, load_robot(ROBOT), stored_positions(feasible_result))
 
 
 FALL = """const { flat } = vsacli.robot.eye(), [from, to] = [flat([0, 0, 0]), flat(arguments[0])];
@@ -242,9 +276,9 @@ def test_up_is_against_gravity_with_its_arrow(browser: Browser, pages: Pages, gr
         assert down > 10 * abs(gravity[1])
         assert abs(aside) < 1e-9 * down
     heights = browser.run(
-        """const { data, array, robot: { down } } = vsacli, points = array(data.files[0].arm.origins);
-        return Array.from({ length: points.length / 3 }, (_, at) =>
-          -down.reduce((sum, part, axis) => sum + part * points[3 * at + axis], 0));"""
+        """const { arms, down } = vsacli.robot;
+        const height = (point) => -down.reduce((sum, part, axis) => sum + part * point[axis], 0);
+        return arms[0].passed.flat().map(height);"""
     )
     assert min(heights) > browser.run("return vsacli.robot.ground()")  # nothing is below the ground
     assert browser.settled(DARKEST) < 80
@@ -363,18 +397,128 @@ def test_the_robot_is_dark_on_paper(browser: Browser, pages: Pages) -> None:
     assert paper < dark
 
 
-@pytest.mark.cases(3)  # with tables of failures, of several results, and of runs
-@pytest.mark.parametrize("name", ["failing", "compared", "result", "studied", "simulated"])
-def test_no_page_is_wider_than_a_phone(browser: Browser, pages: Pages, name: str) -> None:
-    size = {"width": 420, "height": 900, "deviceScaleFactor": 1, "mobile": True}
+@contextlib.contextmanager
+def as_phone(browser: Browser, height: int = 900) -> Iterator[None]:
+    """The browser in the size of a phone."""
+    size = {"width": 420, "height": height, "deviceScaleFactor": 1, "mobile": True}
     browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:
+        yield
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+@pytest.mark.cases(4)  # with tables of failures, of several results, and of runs; and a robot
+@pytest.mark.parametrize("name", ["failing", "compared", "result", "studied", "simulated", "posed"])
+def test_no_page_is_wider_than_a_phone(browser: Browser, pages: Pages, name: str) -> None:
+    with as_phone(browser):
         browser.open(pages[name])
         assert browser.run("return document.documentElement.scrollWidth") == 420
         narrowest = "return Math.min(...[...document.querySelectorAll('th')].map(cell => cell.offsetWidth))"
-        assert browser.run(narrowest) > 30  # no name has one letter per line
-    finally:
-        browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        assert browser.run(narrowest) is None or browser.run(narrowest) > 30  # not one letter per line
+
+
+EDGES = """const { left, right, top } = document.querySelector(arguments[0]).getBoundingClientRect();
+return [left, right, top].map((place) => Math.round(place))"""
+"""Where an element is in the window, pixels."""
+
+
+def edge_brightness(browser: Browser, selector: str) -> tuple[float, float]:
+    """Brightness of the background near the left and the right edge of an element, 0 to 1."""
+    left, right, top = browser.settled(EDGES, selector)
+    picture = matplotlib.image.imread(io.BytesIO(browser.driver.get_screenshot_as_png()))[..., :3]
+    background = picture[top + 1 : top + 12].mean(axis=-1).max(axis=0)  # of rows with and without letters
+    return background[left + 6], background[right - 7]  # beside borders and scroll bars
+
+
+@pytest.mark.parametrize(("name", "selector"), [("result", ".wide"), ("posed", "pre")])
+def test_a_table_that_a_phone_cuts_off_has_a_shadow_there(
+    browser: Browser, pages: Pages, name: str, selector: str
+) -> None:
+    browser.media(prefers_color_scheme="light")
+    with as_phone(browser):
+        browser.open(pages[name])
+        find = f"const table = document.querySelector('{selector}');"
+        browser.run(f"{find} table.scrollIntoView({{ block: 'center' }});")
+        assert browser.run(f"{find} return table.scrollWidth - table.clientWidth") > 30
+        left, right = edge_brightness(browser, selector)
+        assert left > 0.97
+        assert right < 0.92
+        browser.run(f"{find} table.scrollLeft = 1e4")
+        assert edge_brightness(browser, selector)[1] > 0.97
+        if name == "result":  # names of joints stay in sight
+            assert browser.run(EDGES, "table.joints tbody th")[0] == browser.run(EDGES, selector)[0]
+
+
+@pytest.fixture
+def posed(browser: Browser, pages: Pages) -> Browser:
+    """The page of a robot without a motion."""
+    browser.media(prefers_color_scheme="light")
+    return browser.open(pages["posed"])
+
+
+PICTURE = "return document.getElementById('arm').toDataURL()"
+
+MOVE = """document.querySelectorAll('#sliders input').forEach((slider, joint) => {
+  slider.value = arguments[0][joint]; slider.dispatchEvent(new Event('input'));
+});
+const { arms, pointsNow } = vsacli.robot, points = pointsNow(arms[0]);
+return [vsacli.state.positions, points.origins, points.seats, points.elbows, points.axes]"""
+"""Move sliders; the positions that they have then, and the points of the robot."""
+
+SPARE = """const { arms, pointsNow, eye } = vsacli.robot, { flat } = eye();
+const { width, height } = document.getElementById('arm');
+return Math.min(...pointsNow(arms[0]).origins.map(flat).flatMap(([x, y]) => [x, width - x, y, height - y]))"""
+"""Distance of the robot from the edge of its picture, pixels."""
+
+
+@pytest.mark.cases(2)  # a tree, and a slide with limits
+@pytest.mark.parametrize("name", ["torso_2x3r", "scara_4", "hand_3x2r", "rp_2", "panda_7r"])
+def test_sliders_move_a_robot_as_forward_kinematics_says(browser: Browser, pages: Pages, name: str) -> None:
+    browser.open(pages.of_robot(name))
+    robot = load_robot(REPOSITORY / "robots" / f"{name}.yaml")
+    ranges = np.array([joint["range"] for joint in browser.run("return vsacli.data.joints")])
+    for asked in np.random.default_rng(0).uniform(*ranges.T, (5, len(ranges))):
+        positions, *drawn = browser.run(MOVE, asked.tolist())
+        np.testing.assert_allclose(positions, asked, atol=np.ptp(ranges) / 1000)  # steps of a slider
+        points = ArmPoints.of(robot, np.array([positions]))
+        origins = np.concatenate((points.origins[0], points.tools[0]))
+        expected = (origins, points.seats[0], points.elbows[0], points.axes[0])
+        for there, wanted in zip(drawn, expected, strict=True):
+            np.testing.assert_allclose(there, wanted, atol=1e-12)  # m, of arms of about 1 m; both are double
+        assert browser.run(SPARE) > 0
+    assert browser.complaints() == []
+
+
+def test_a_robot_moves_before_there_is_a_motion(posed: Browser) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    still = posed.settled(PICTURE)
+    sliders = posed.driver.find_elements("css selector", "#sliders input")
+    assert [each.get_attribute("aria-label") for each in sliders] == [
+        f"position of {name}" for name in ("shoulder", "elbow", "slide", "wrist")
+    ]
+    ActionChains(posed.driver).click_and_hold(sliders[1]).move_by_offset(60, 0).release().perform()
+    moved = posed.settled(PICTURE)
+    assert moved != still
+    said = re.fullmatch(r"(.*) rad, (.*)°", posed.texts("#sliders output")[1])
+    assert said
+    assert float(said[1]) > 0.2
+    assert np.degrees(float(said[1])) == pytest.approx(float(said[2]), abs=0.1)
+    posed.find("#home").click()
+    assert posed.settled(PICTURE) == still
+    assert posed.texts("#sliders output")[2] == "0.1000 m"  # the middle of its limits
+    ActionChains(posed.driver).drag_and_drop_by_offset(posed.find("#arm"), 80, 0).perform()
+    assert posed.settled(PICTURE) != still
+    assert posed.run("return performance.getEntriesByType('resource').length") == 0
+    assert posed.complaints() == []
+
+
+def test_a_moved_robot_stays_in_sight_on_a_phone(posed: Browser) -> None:
+    with as_phone(posed, height=600):
+        posed.run("document.querySelector('#sliders label:last-child').scrollIntoView({ block: 'end' })")
+        assert posed.settled("return scrollY") > 50  # so far the picture would leave upward
+        assert posed.run("return document.getElementById('arm').getBoundingClientRect().top") >= 0
 
 
 def test_names_that_would_act_are_texts(browser: Browser, tmp_path: Path, feasible_result: Path) -> None:

@@ -23,7 +23,7 @@ from vsacli.results.charts.figures import (
     variable_words,
 )
 from vsacli.results.charts.reduction import GROWING
-from vsacli.results.charts.stored import StoredCharts, StoredSignals
+from vsacli.results.charts.stored import StoredCharts, StoredSignals, flat_range
 from vsacli.results.store.reader import StoredResult
 
 
@@ -137,7 +137,7 @@ def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
     for joint, of_joint in enumerate(there):
         there_in = [column if has_it else None for column, has_it in enumerate(of_joint)]
         rows.append([_over(charts, compared, signals, joint, column) for column in there_in])
-        rows.append([_apart(charts, compared, differences, joint, column) for column in there_in])
+        rows.append([_apart(charts, compared, signals, differences, joint, column) for column in there_in])
     time = np.sort(np.concatenate([file.time[[0, -1]] for file in charts.files]))
     block = PanelGrid(time, rows, HEIGHTS, MOST_ROWS)
     size = (max(2, block.columns) * PANEL_WIDTH, block.height + 1.2)
@@ -164,15 +164,23 @@ def _over(
 
 
 def _apart(
-    charts: StoredCharts, compared: _Compared, differences: StoredSignals, joint: int, column: int | None
+    charts: StoredCharts,
+    compared: _Compared,
+    signals: StoredSignals,
+    differences: StoredSignals,
+    joint: int,
+    column: int | None,
 ) -> Chart | None:
     if column is None:
         return None
     lines = differences.lines(column, [joint], "file")
     unit = charts.first.declared[compared.variable].quantity.unit(charts.first.joint_types[joint])
     rms = [line.rms for line in lines if line.rms is not None]
-    title = f"minus the first, rms {', '.join(f'{value:.3g}' for value in rms)} {unit}"
     if not any(value >= 0 for value in rms):
-        title = "no values in common"
+        return Chart("no values in common", "", lines, zero=True)
+    if (flat := flat_range(lines, signals.lines(column, [joint], "file"))) is not None:
+        title = f"equal to the first, rms {max(rms):.1g} {unit}" if any(rms) else "equal to the first"
+        return Chart(title, "", lines, shown=flat, zero=True)
+    title = f"minus the first, rms {', '.join(f'{value:.3g}' for value in rms)} {unit}"
     shown = charts.calm(lines, 0) if compared.variable in GROWING and lines else None
     return Chart(title, "", lines, shown=shown, cut_off=shown is not None, zero=True)

@@ -48,6 +48,15 @@ FULL = 100.0
 SPARE = 1.06
 """Upper end of an axis of utilizations, relative to the largest value shown."""
 
+NEGLIGIBLE = 1e-6
+"""Largest difference of curves that count as equal, relative to their largest value.
+
+Single precision rounds by 6e-8, and interpolation between 700 samples per second by 2e-8 of a motor torque.
+"""
+
+FLAT = 0.01
+"""Half the range of an axis of negligible differences, relative to the largest value that was subtracted."""
+
 By: TypeAlias = Literal["joint", "file", "role"]
 """Property that the looks of the lines of a chart distinguish."""
 
@@ -333,8 +342,13 @@ class StoredCharts:
             for column, title, joints in columns:
                 unit = variable.quantity.unit(self.first.joint_types[joints[0]])
                 lines = apart.lines(column, joints)
+                shown = flat_range(lines, signals.lines(column, joints))
+                note = "" if shown is None else f"equal within {NEGLIGIBLE:g} of the largest value"
                 if lines:
-                    charts.append(Chart(f"difference: {title}", unit, lines, name=name))
+                    apart_chart = Chart(
+                        f"difference: {title}", unit, lines, name=name, shown=shown, note=note
+                    )
+                    charts.append(apart_chart)
         return charts
 
     def _roles(self, name: str) -> dict[str, str]:
@@ -387,6 +401,20 @@ class _Components:
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray:
         return np.asarray(self._file.read(name, start, stop), dtype=np.float64)
+
+
+def flat_range(differences: Sequence[Line], lines: Sequence[Line]) -> tuple[float, float] | None:
+    """Return the range of an axis on which negligible differences are flat; None if they are not negligible.
+
+    Args:
+        differences: differences of curves.
+        lines: the curves.
+    """
+    apart, peak = (
+        max((float(np.nanmax(np.abs(line.curve.values), initial=0.0)) for line in each), default=0.0)
+        for each in (differences, lines)
+    )
+    return (-FLAT * peak, FLAT * peak) if 0 < peak < np.inf and apart <= NEGLIGIBLE * peak else None
 
 
 def compliant_joints(actuators: Sequence[str]) -> list[int]:

@@ -24,8 +24,8 @@ from vsacli.results.store.inputs import StoredInput
 
 TEMPLATE, STYLE = "page.html", "page.css"
 
-SCRIPTS = ("marks.js", "figures.js", "charts.js", "robot.js", "scatter.js", "page.js")
-"""Scripts of this package, in the order in which they run."""
+SCRIPTS = ("marks.js", "figures.js", "charts.js", "kinematics.js", "robot.js", "scatter.js", "page.js")
+"""Scripts of pages with plots, in the order in which they run."""
 
 LIBRARY_SCRIPTS = ("bokeh.min.js", "bokeh-api.min.js")
 """BokehJS and its API for scripts, without widgets, tables, WebGL and MathJax."""
@@ -133,32 +133,39 @@ def rendered(
         data: JSON values for the scripts.
         packed: arrays for the scripts.
     """
-    scripts = [*library.scripts, *map(_own_file, SCRIPTS)]
-    return filled(
-        TEMPLATE,
-        title=title,
-        texts=texts,
-        data=as_script({**data, "library": library.name}),
-        arrays=packed.texts,
-        scripts=scripts,
-        allowed=" ".join(map(_hash, scripts)),
-    )
+    scripts = [*library.scripts, *map(own_file, SCRIPTS)]
+    named = {**data, "library": library.name}
+    return filled(TEMPLATE, scripts, named, title=title, texts=texts, arrays=packed.texts)
 
 
-def filled(template: str, **values: Any) -> str:
-    """Return a template of this package filled with values, every text escaped; `style` is given."""
+def filled(template: str, scripts: Sequence[str], data: Mapping[str, Any], **values: Any) -> str:
+    """Return a template of this package filled with values, every text escaped.
+
+    Args:
+        template: name of the template.
+        scripts: scripts of the page, in the order in which they run; the page allows no others.
+        data: JSON values for the scripts.
+        values: further values, by their names in the template; `style` is the style sheet.
+    """
     import jinja2  # a dependency of bokeh
 
     environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(_own_file),
+        loader=jinja2.FunctionLoader(own_file),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
     )
-    return environment.get_template(template).render(style=_own_file(STYLE), **values)
+    return environment.get_template(template).render(
+        style=own_file(STYLE),
+        scripts=scripts,
+        allowed=" ".join(map(_hash, scripts)),
+        data=as_script(data),
+        **values,
+    )
 
 
-def _own_file(name: str) -> str:
+def own_file(name: str) -> str:
+    """Return a file of this package: a template, a style sheet or a script."""
     return (files(__package__) / name).read_text(encoding="utf-8")
 
 

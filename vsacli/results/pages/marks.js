@@ -76,11 +76,12 @@ const vsacli = (() => {
   const state = {
     window: data.span ? [...data.span] : [0, 1],
     cursor: data.span ? data.span[0] : 0,
+    positions: (data.joints || []).map(({ home }) => home),
     joints: new Set((data.joints || []).keys()),
     files: new Set((data.files || []).keys()),
   };
 
-  /* Call a function whenever something changes: "window", "cursor", "shown", "scheme", "reset"; and when the
+  /* Call a function whenever something changes: "window", "cursor", "pose", "shown", "scheme", "reset"; and when the
      page goes to "paper" or comes back to the "screen". */
   function listen(topic, heard) {
     if (!listeners.has(topic)) listeners.set(topic, []);

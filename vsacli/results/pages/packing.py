@@ -1,16 +1,21 @@
-"""Charts and numbers for the scripts of a page: arrays in base64, everything else as JSON."""
+"""Charts, robots and numbers for the scripts of a page: arrays in base64, everything else as JSON."""
 
 from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import json_value
+from vsacli.results.charts.arm_chart import direction_of
 from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Chart, ShadedArea
+from vsacli.robot.joint import Pose
+from vsacli.robot.kinematics import Geometry, rotation_matrix
 
 BEYOND = 5.0
 """Height up to which the attainable range extends beyond the initial view, in heights of that view."""
@@ -83,6 +88,42 @@ class Packed:
             spare = BEYOND * (chart.shown[1] - chart.shown[0])
             low, high = np.maximum(low, chart.shown[0] - spare), np.minimum(high, chart.shown[1] + spare)
         return self.add(low), self.add(high)
+
+
+def arm_values(geometry: Geometry, gravity: FloatArray, tool_names: Sequence[str]) -> dict[str, Any]:
+    """Return the values of a robot for `kinematics.js`.
+
+    Args:
+        geometry: poses, rows and mounts of the robot.
+        gravity: acceleration of gravity in the base frame, (3,).
+        tool_names: names of the tools.
+
+    Returns:
+        The frame `base`; for each of the `joints` its Denavit-Hartenberg row, its mount, and whether it is
+        prismatic; for each of the `tools` its name and frame; both with the index of the carrying DH frame,
+        0 for frame 0; and the unit vector `down` along gravity, zero without it.
+    """
+    joints = [
+        {
+            "carrier": parent + 1,
+            "mount": None if joint.mount is None else _frame(joint.mount),
+            "dh": {name: getattr(joint.dh, name) for name in ("a", "alpha", "d", "theta")},
+            "sliding": not joint.is_revolute,
+        }
+        for joint, parent in zip(geometry.joints, geometry.parents, strict=True)
+    ]
+    tools = [
+        {"name": name, "carrier": carrier + 1, "frame": _frame(pose)}
+        for name, carrier, pose in zip(tool_names, geometry.tool_joints, geometry.end_effectors, strict=True)
+    ]
+    down = direction_of(gravity).tolist()
+    return {"base": _frame(geometry.base), "joints": joints, "tools": tools, "down": down}
+
+
+def _frame(pose: Pose) -> list[list[float]]:
+    """Return the axes x, y and z and the origin of a frame."""
+    rotation = np.array(rotation_matrix(pose), dtype=np.float64)
+    return [*rotation.T.tolist(), list(pose.xyz)]
 
 
 def as_script(content: Any) -> str:

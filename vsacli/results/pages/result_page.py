@@ -20,7 +20,6 @@ from vsacli.base.simulation_variables import ERRORS, SIMULATED_NAMES, error
 from vsacli.base.tables import ReportText
 from vsacli.base.texts import counted, one_line
 from vsacli.base.variables import TIP_COMPLIANCE, deviation
-from vsacli.results.charts.arm_chart import ArmPoints, direction_of
 from vsacli.results.charts.comparison import check_comparable, distinct_labels
 from vsacli.results.charts.figures import result_title
 from vsacli.results.charts.measured import MeasuredCurve
@@ -35,7 +34,7 @@ from vsacli.results.pages.document import (
     rendered,
     tone_of,
 )
-from vsacli.results.pages.packing import Packed
+from vsacli.results.pages.packing import Packed, arm_values
 from vsacli.results.store.damage import reporting_damage
 from vsacli.results.store.reader import StoredResult
 
@@ -213,7 +212,7 @@ def unreliable(result: StoredResult) -> list[list[float]]:
 
 
 def arm_motion(result: StoredResult, start: float, packed: Packed) -> dict[str, Any] | None:
-    """Return the motion of the links, for the animation; None if positions are not stored.
+    """Return the robot and its motion, for the animation; None if positions are not stored.
 
     Args:
         result: result or simulation file.
@@ -221,30 +220,17 @@ def arm_motion(result: StoredResult, start: float, packed: Packed) -> dict[str, 
         packed: store of the arrays.
 
     Returns:
-        Numbers of the arrays `time`, (instants,), s after the start of the page, and of the `ArmPoints` at
-        these instants: `origins`, those of the tools last, `elbows`, `axes`, and `seats` if a joint has a
-        mount; lists `carriers` and `tool_carriers`; names of several `tools`; and the unit vector `down`
-        along gravity, zero without it.
+        `arm_values`, with the numbers of the arrays of its `motion`: `time`, (instants,), s after the start
+        of the page, and the positions `q` at these instants, (instants, joints).
     """
     if "q" not in result.variables:
         return None
     steps = evenly(result.samples, MOST_FRAMES)
-    geometry = result.geometry()
-    positions = np.asarray(result.read("q"), dtype=np.float64)[steps]
-    with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-        points = ArmPoints.of(geometry, positions)
-    mounted = any(row.mount is not None for row in geometry.joints)
-    return {
+    motion = {
         "time": packed.add(result.time[steps] - start),
-        "origins": packed.add(np.concatenate((points.origins, points.tools), axis=1)),
-        "elbows": packed.add(points.elbows),
-        "axes": packed.add(points.axes),
-        "seats": packed.add(points.seats) if mounted else None,
-        "carriers": points.carriers,
-        "tool_carriers": points.tool_carriers,
-        "tools": result.tool_names if len(result.tool_names) > 1 else (),
-        "down": direction_of(result.gravity()).tolist(),
+        "q": packed.add(np.asarray(result.read("q"), dtype=np.float64)[steps]),
     }
+    return {**arm_values(result.geometry(), result.gravity(), result.tool_names), "motion": motion}
 
 
 def measured_page(

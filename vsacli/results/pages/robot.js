@@ -1,7 +1,8 @@
 "use strict";
-/* The robot at the time cursor: prisms in orthographic view, painted from the back to the front. Up is against gravity. */
+/* The robot at the time cursor, or at the positions of sliders: prisms in orthographic view, painted from the back to the front. Up is against gravity. */
 vsacli.robot = (() => {
   const { data, state, array, after, color, curveColor } = vsacli;
+  const { add, dot, cross, scaled, size, pointsOf, sphere } = vsacli.kinematics;
   const THICK = 0.034, THIN = 0.014;  // radii of joints and links, relative to the size of the motion
   const SHORTEST = 0.3;  // share of its length below which the arrow of gravity is left out
   const ISOMETRIC = { turn: -0.75 * Math.PI, tilt: 0.6155 };
@@ -9,21 +10,18 @@ vsacli.robot = (() => {
   const canvas = document.getElementById("arm"), note = document.getElementById("arm-note");
   const arms = data.files ? data.files.map((file) => file.arm).map(unpacked).filter(Boolean) : [];
   const joints = data.joints || [];
-  const add = (a, b, share = 1) => [a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]];
-  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-  const scaled = (a, factor) => a.map((each) => factor * each);
-  const size = (a) => Math.sqrt(dot(a, a));
   const down = (arms.find((arm) => size(arm.down) > 0) || { down: [0, 0, 0] }).down;
   const frame = level(size(down) > 0 ? scaled(down, -1) : [0, 0, 1]);
   const box = bounds();
 
-  /* Points of the frames, those of the tools last; joints sit at `seats`, else at the frames that carry them. */
+  /* An arm with its positions over time, if it moves, and the origins of its frames at each instant, those of the tools
+     last. */
   function unpacked(arm, file) {
     if (!arm) return null;
-    const [time, origins, elbows, axes] = [arm.time, arm.origins, arm.elbows, arm.axes].map(array);
-    const seats = arm.seats === null ? null : array(arm.seats), count = arm.carriers.length;
-    return { ...arm, file, time, origins, elbows, axes, seats, count, points: origins.length / time.length / 3 };
+    if (arm.motion === null) return { ...arm, file, passed: [] };
+    const time = array(arm.motion.time), q = array(arm.motion.q), count = arm.joints.length;
+    const motion = Array.from(time, (_, instant) => q.subarray(instant * count, (instant + 1) * count));
+    return { ...arm, file, time, motion, passed: motion.map((positions) => pointsOf(arm, positions).origins) };
   }
 
   /* Upright unit vector, and two level ones: of a base frame that stands upright its axes x and y. */
@@ -33,33 +31,32 @@ vsacli.robot = (() => {
     return { first, second: cross(up, first), up };
   }
 
-  /* Middle and radius of all points that any arm passes, and the height of the lowest. */
+  /* Middle and radius of all points that any arm passes, and the height of the lowest; without a motion, of all that
+     sliders reach, and the height of the base. */
   function bounds() {
+    const still = arms.find((arm) => arm.motion === null);
+    if (still) return { ...sphere(still, joints.map(({ range }) => range)), lowest: dot(still.base[3], frame.up) };
     const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
     let lowest = Infinity;
-    for (const { origins } of arms) {
-      for (let at = 0; at < origins.length; at += 3) {
-        const point = [...origins.subarray(at, at + 3)], height = dot(point, frame.up);
-        if (height < lowest) lowest = height;
-        point.forEach((value, axis) => {
-          if (value < low[axis]) low[axis] = value;
-          if (value > high[axis]) high[axis] = value;
-        });
-      }
+    for (const point of arms.flatMap(({ passed }) => passed.flat())) {
+      const height = dot(point, frame.up);
+      if (height < lowest) lowest = height;
+      point.forEach((value, axis) => {
+        if (value < low[axis]) low[axis] = value;
+        if (value > high[axis]) high[axis] = value;
+      });
     }
     const middle = low.map((value, axis) => (value + high[axis]) / 2);
     return { middle, radius: Math.hypot(...low.map((value, axis) => (high[axis] - value) / 2)) || 1, lowest };
   }
 
-  /* Points of an array at the cursor, linear between instants. */
-  function pointsAt(arm, values, count) {
+  /* Points of an arm now: at the cursor with positions linear between instants, without a motion at those of sliders. */
+  function pointsNow(arm) {
+    if (arm.motion === null) return pointsOf(arm, state.positions);
     const next = Math.min(Math.max(after(arm.time, state.cursor), 1), arm.time.length - 1), before = Math.max(next - 1, 0);
     const span = arm.time[next] - arm.time[before];
     const share = span > 0 ? Math.min(Math.max((state.cursor - arm.time[before]) / span, 0), 1) : 0;
-    return Array.from({ length: count }, (_, point) => [0, 1, 2].map((axis) => {
-      const [a, b] = [before, next].map((instant) => values[(instant * count + point) * 3 + axis]);
-      return a + share * (b - a);
-    }));
+    return pointsOf(arm, arm.motion[before].map((value, joint) => value + share * (arm.motion[next][joint] - value)));
   }
 
   function camera() {
@@ -108,29 +105,27 @@ vsacli.robot = (() => {
     return Object.keys(troubles).filter((kind) => inside(troubles[kind][joint]));
   }
 
-  function armFaces(arm, eye) {
+  function armFaces(arm, { origins, seats, elbows, axes }, eye) {
     const faces = [], radius = box.radius;
-    const origins = pointsAt(arm, arm.origins, arm.points);
-    const elbows = pointsAt(arm, arm.elbows, arm.count), axes = pointsAt(arm, arm.axes, arm.count);
     const link = { fill: color("soft") };
     const [base, upright] = [origins[0], axes[0]];  // the plate stands across the first axis
     prism(add(base, upright, -2.4 * THICK * radius), add(base, upright, -THICK * radius), 2 * THICK * radius, 4, link, faces, eye);
-    const seats = arm.seats ? pointsAt(arm, arm.seats, arm.count) : arm.carriers.map((carrier) => origins[carrier]);
-    axes.forEach((axis, joint) => {
+    arm.joints.forEach(({ carrier, sliding }, joint) => {
       const bad = trouble(arm.file, joint)[0];
       const paint = { fill: bad ? color("bad") : curveColor(joint) }, wide = THICK * radius * (bad ? 1.35 : 1);
-      const here = seats[joint], sleeve = scaled(axis, 1.3 * THICK * radius);
-      const sliding = joints[joint].type === "prismatic";
+      const here = seats[joint], sleeve = scaled(axes[joint], 1.3 * THICK * radius);
       prism(add(here, sleeve, -1), add(here, sleeve), sliding ? 1.2 * wide : wide, sliding ? 4 : 18, paint, faces, eye);
-      prism(origins[arm.carriers[joint]], here, THIN * radius, 10, link, faces, eye);
+      prism(origins[carrier], here, THIN * radius, 10, link, faces, eye);
       prism(here, elbows[joint], (sliding ? 0.75 : 1) * THIN * radius, sliding ? 4 : 10, sliding ? paint : link, faces, eye);
       prism(elbows[joint], origins[joint + 1], THIN * radius, 10, link, faces, eye);
     });
-    arm.tool_carriers.forEach((carrier, tool) => {
-      prism(origins[carrier], origins[arm.count + 1 + tool], 0.6 * THIN * radius, 8, link, faces, eye);
+    arm.tools.forEach(({ carrier }, tool) => {
+      prism(origins[carrier], origins[toolPoint(arm, tool)], 0.6 * THIN * radius, 8, link, faces, eye);
     });
     return faces;
   }
+
+  const toolPoint = (arm, tool) => arm.joints.length + 1 + tool;  // among the origins
 
   function shaded(fill, bright) {
     const [r, g, b] = fill.match(/[0-9a-f]{2}/gi).map((pair) => parseInt(pair, 16));
@@ -159,9 +154,14 @@ vsacli.robot = (() => {
     }
   }
 
+  const LARGEST = 4;  // pixels, of a unit of lettering
+
+  /* Unit of texts and of the arrow of gravity, which grow with the picture up to the size of texts around it. */
+  const lettering = () => Math.min(0.01 * Math.min(canvas.width, canvas.height), LARGEST * devicePixelRatio);
+
   /* The direction of gravity, unless it is seen from its end. */
   function drawGravity(context, eye) {
-    const unit = 0.01 * Math.min(canvas.width, canvas.height), length = -12 * unit * dot(down, eye.up);
+    const unit = lettering(), length = -12 * unit * dot(down, eye.up);
     if (length < SHORTEST * 12 * unit) return;
     const x = 7 * unit, start = 5 * unit, end = start + length;
     context.strokeStyle = context.fillStyle = color("ink");
@@ -176,24 +176,20 @@ vsacli.robot = (() => {
   }
 
   function drawTrace(context, arm, point, flat) {
-    const trace = [];
-    for (let instant = 0; instant < arm.time.length; instant += 1) {
-      const at = (instant * arm.points + point) * 3;
-      trace.push([arm.origins[at], arm.origins[at + 1], arm.origins[at + 2]]);
-    }
-    path(context, trace.filter((place) => place.every(Number.isFinite)), flat);
+    path(context, arm.passed.map((origins) => origins[point]).filter((place) => place.every(Number.isFinite)), flat);
     context.strokeStyle = color("accent");
     context.lineWidth = 1.2 * devicePixelRatio;
     context.stroke();
   }
 
   /* Names of several tools, next to them. */
-  function drawNames(context, arm, flat) {
-    const unit = 0.01 * Math.min(canvas.width, canvas.height), points = pointsAt(arm, arm.origins, arm.points);
+  function drawNames(context, arm, origins, flat) {
+    if (arm.tools.length < 2) return;
+    const unit = lettering();
     context.fillStyle = color("ink");
     context.font = `${3.2 * unit}px system-ui, sans-serif`;
-    arm.tools.forEach((name, tool) => {
-      const [x, y] = flat(points[arm.count + 1 + tool]);
+    arm.tools.forEach(({ name }, tool) => {
+      const [x, y] = flat(origins[toolPoint(arm, tool)]);
       const outside = x + 1.5 * unit + context.measureText(name).width > canvas.width;
       context.textAlign = outside ? "right" : "left";
       context.fillText(name, x + (outside ? -1.5 : 1.5) * unit, y - 1.5 * unit);
@@ -213,8 +209,9 @@ vsacli.robot = (() => {
     drawGround(context, eye.flat);
     arms.filter((arm) => state.files.has(arm.file)).forEach((arm, order) => {
       context.globalAlpha = order ? 0.45 : 1;
-      arm.tool_carriers.forEach((_, tool) => drawTrace(context, arm, arm.count + 1 + tool, eye.flat));
-      for (const { corners, bright, paint } of armFaces(arm, eye).sort((a, b) => a.depth - b.depth)) {
+      const points = pointsNow(arm);
+      arm.tools.forEach((_, tool) => drawTrace(context, arm, toolPoint(arm, tool), eye.flat));
+      for (const { corners, bright, paint } of armFaces(arm, points, eye).sort((a, b) => a.depth - b.depth)) {
         path(context, corners, eye.flat);
         context.closePath();
         context.fillStyle = context.strokeStyle = shaded(paint.fill, bright);
@@ -222,7 +219,7 @@ vsacli.robot = (() => {
         context.fill();
         context.stroke();
       }
-      drawNames(context, arm, eye.flat);
+      drawNames(context, arm, points.origins, eye.flat);
     });
     context.globalAlpha = 1;
     drawGravity(context, eye);
@@ -263,14 +260,14 @@ vsacli.robot = (() => {
       event.stopPropagation();
     });
     new ResizeObserver(drawSoon).observe(canvas);
-    ["cursor", "shown", "scheme"].forEach((topic) => vsacli.listen(topic, drawSoon));
+    ["cursor", "pose", "shown", "scheme"].forEach((topic) => vsacli.listen(topic, drawSoon));
     ["paper", "screen"].forEach((topic) => vsacli.listen(topic, draw));
   }
 
   if (arms.length) {
     document.getElementById("robot").hidden = false;
-    document.getElementById("columns").className = "beside";
+    document.getElementById("columns").classList.add("beside");
     follow();
   }
-  return { draw, view, down, eye: camera, ground };
+  return { arms, pointsNow, draw, view, down, eye: camera, ground };
 })();

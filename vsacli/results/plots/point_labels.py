@@ -1,16 +1,23 @@
-"""Labels next to points of a panel, none on top of another."""
+"""Labels next to points of a panel, none on top of another, and on as few points as possible."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
 
 from vsacli.base.arrays import FloatArray
 from vsacli.results.charts.look import current_look
 from vsacli.results.plots.long_texts import POINTS_PER_INCH
+
+BELOW_MARKS = 1.9
+"""Order of drawing, in which curves have 2."""
+
+_LEADER: dict[str, Any] = {"arrowstyle": "-", "color": "0.4", "linewidth": 0.6, "shrinkA": 0, "shrinkB": 2}
 
 SIZE = 8
 """Size of the font at the usual font size, points."""
@@ -21,6 +28,12 @@ LETTER, LINE = 0.075, 0.14
 GAP = 5.0
 """Distance between a point and its label at the usual font size, points."""
 
+DISTANCES = (1.0, 3.0, 5.0)
+"""Distances to try, in gaps; beyond the first a line leads to the point."""
+
+FARTHER = 6.0
+"""Further distance, in gaps, that is as bad as a covered point."""
+
 
 class _Side(NamedTuple):
     """A place for a label: its direction from the point, and the alignment of its text."""
@@ -30,9 +43,9 @@ class _Side(NamedTuple):
     align: str
     valign: str
 
-    def box(self, point: FloatArray, width: float) -> FloatArray:
-        """Return the corners of a label, [[left, bottom], [right, top]], inches."""
-        gap, size = GAP / POINTS_PER_INCH, np.array([width, LINE])
+    def box(self, point: FloatArray, width: float, distance: float) -> FloatArray:
+        """Return the corners of a label some gaps from a point, [[left, bottom], [right, top]], inches."""
+        gap, size = distance * GAP / POINTS_PER_INCH, np.array([width, LINE])
         center = point + np.array([self.across, self.up]) * (gap + size / 2)
         return np.array([center - size / 2, center + size / 2])
 
@@ -54,7 +67,9 @@ def label_points(
 ) -> None:
     """Write a label next to each point, on a side where it overlaps no other; else leave it out.
 
-    Points at the same place share a label. All points of the panel must be drawn before.
+    Of these sides it is on the one where it covers the fewest points of the panel, if need be farther away.
+    Points at the same place share a label. The figure must be complete, since the places depend on its
+    layout.
 
     Args:
         axes: panel with linear axes.
@@ -64,23 +79,30 @@ def label_points(
     """
     figure = axes.get_figure(root=True)
     assert figure is not None, "panels belong to figures"
-    axes.autoscale_view()  # else the transformation below has not seen the last curves
+    figure.draw_without_rendering()
     size = np.asarray(axes.get_position().size) * figure.get_size_inches() / _scale()
     points = [axes.transLimits.transform(place) * size for place in places]
-    marks = [
-        np.array([point - GAP / POINTS_PER_INCH / 2, point + GAP / POINTS_PER_INCH / 2]) for point in points
-    ]
-    taken = list(marks)
+    taken = list(map(_mark, points))
+    marked = [line.get_xydata() for line in axes.get_lines() if line.get_marker() != "None"]
+    marks = [_mark(axes.transLimits.transform(place) * size) for line in marked for place in np.asarray(line)]
     for text, members in _grouped(points, labels):
         own = members[0]
-        for side in sides:
-            box = side.box(points[own], LETTER * len(text))
+        others = [each for number, each in enumerate(taken) if number not in members]
+        free = []
+        for distance, side in product(DISTANCES, sides):
+            box = side.box(points[own], LETTER * len(text), distance)
             inside = (box[0] >= 0).all() and (box[1] <= size).all()
-            others = [each for number, each in enumerate(taken) if number not in members]
-            if inside and not any(map(_overlapping, [box] * len(others), others)):
-                taken.append(box)
-                _write(axes, text, places[own], side)
-                break
+            if inside and not _count_overlapping(box, others):
+                free.append((_count_overlapping(box, marks) + distance / FARTHER, distance, side, box))
+        if free:
+            _, distance, side, box = min(free, key=lambda place: place[0])
+            taken.append(box)
+            _write(axes, text, places[own], side, distance)
+
+
+def _mark(point: FloatArray) -> FloatArray:
+    """Return the corners of a mark, inches."""
+    return np.array([point - GAP / POINTS_PER_INCH / 2, point + GAP / POINTS_PER_INCH / 2])
 
 
 def _scale() -> float:
@@ -99,12 +121,23 @@ def _grouped(points: Sequence[FloatArray], labels: Sequence[str]) -> Iterator[tu
         yield ", ".join(labels[at] for at in members), members
 
 
-def _overlapping(one: FloatArray, other: FloatArray) -> bool:
-    return bool((one[0] < other[1]).all() and (other[0] < one[1]).all())
+def _count_overlapping(box: FloatArray, boxes: Sequence[FloatArray]) -> int:
+    """Return the number of boxes that overlap one."""
+    low, high = np.swapaxes(np.reshape(boxes, (-1, 2, 2)), 0, 1)
+    return int(np.count_nonzero((box[0] < high).all(axis=1) & (low < box[1]).all(axis=1)))
 
 
-def _write(axes: Axes, text: str, place: tuple[float, float], side: _Side) -> None:
-    aligned: dict[str, Any] = {"ha": side.align, "va": side.valign}
-    gap = GAP * _scale()
+def _write(axes: Axes, text: str, place: tuple[float, float], side: _Side, distance: float) -> None:
+    aligned: dict[str, Any] = {"ha": side.align, "va": side.valign, "zorder": BELOW_MARKS}
+    gap = distance * GAP * _scale()
     offset = (gap * side.across, gap * side.up)
-    axes.annotate(text, place, offset, textcoords="offset points", fontsize=SIZE * _scale(), **aligned)
+    written = axes.annotate(
+        text,
+        place,
+        offset,
+        textcoords="offset points",
+        fontsize=SIZE * _scale(),
+        arrowprops=_LEADER if distance > DISTANCES[0] else None,
+        **aligned,
+    )
+    written.set_path_effects([withStroke(linewidth=2 * _scale(), foreground="white")])

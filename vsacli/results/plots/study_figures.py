@@ -156,7 +156,11 @@ def _over_numbers(points: StudyPoints) -> Figure:
                 column[-1].set_ylabel(_fitting(points.cost_words))
             if not points.optimized:
                 column[0].set_ylabel("smallest margin [%]")
-        return complete(figure, points.title, handles)
+        complete(figure, points.title, handles)
+        if not points.optimized:
+            for column, path in zip(panels, paths, strict=True):
+                _name_worst(column[0], points, points.varying[path])
+        return figure
 
 
 def _columns_over(figure: Figure, count: int, rows: int, columns: int) -> AxesGrid:
@@ -194,15 +198,18 @@ def _most_followed(points: StudyPoints) -> list[str]:
 
 
 def _margins_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Artist]:
-    """Draw margins with the numbers of the worst runs; yield legend entries."""
+    """Draw margins; yield legend entries."""
     margin = 100 * points.margin
     yield from _runs_by_verdict(axes, points, x, margin)
     axes.axhline(0.0, **scaled(ZERO))
-    worst = points.worst
-    if worst.size:
-        places = [(float(x[row]), float(margin[row])) for row in worst]
-        label_points(axes, places, [str(points.runs[row]) for row in worst])
+    if points.worst.size:
         yield Line2D([], [], **scaled(_NAMED), label="runs of the smallest margins")
+
+
+def _name_worst(axes: Axes, points: StudyPoints, x: FloatArray) -> None:
+    """Write the numbers of the runs with the smallest margins."""
+    places = [(float(x[row]), float(100 * points.margin[row])) for row in points.worst]
+    label_points(axes, places, [str(points.runs[row]) for row in points.worst])
 
 
 def _costs_over(axes: Axes, points: StudyPoints, x: FloatArray) -> Iterator[Artist]:
@@ -335,12 +342,13 @@ def _pareto(points: StudyPoints) -> Figure:
         runs = list(_runs_by_verdict(axes, points, margin, cost, **_PALE))
         axes.plot(margin[front], cost[front], **line_style(2).words)
         axes.margins(ROOM_FOR_RUNS)
+        axes.set_xlabel("smallest margin [%]")
+        axes.set_ylabel(_fitting(words))
+        complete(figure, points.title, [*runs, line_handle(line_style(2), "Pareto front")])
         named = list(dict.fromkeys([front[0], front[-1], front[len(front) // 2]]))
         places = [(float(margin[row]), float(cost[row])) for row in named]
         label_points(axes, places, [f"run {points.runs[row]}" for row in named], BELOW)
-        axes.set_xlabel("smallest margin [%]")
-        axes.set_ylabel(_fitting(words))
-        return complete(figure, points.title, [*runs, line_handle(line_style(2), "Pareto front")])
+        return figure
 
 
 def _feasibility(studies: Sequence[StudyPoints], labels: Sequence[str], title: str) -> Figure:
