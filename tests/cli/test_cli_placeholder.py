@@ -63,7 +63,7 @@ def test_generated_code_says_so(vsacli, arm, tmp_path):
     assert vsacli("codegen", arm, "-o", "controller").code == 0
     build = {"Makefile", "CMakeLists.txt"}
     files = [path for path in (tmp_path / "controller").iterdir() if path.name not in build]
-    assert len(files) == 5
+    assert len(files) == 7
     for path in files:
         text = path.read_text().replace("\\", "")  # with which Markdown says that a letter is only a letter
         assert OF_PLACEHOLDERS in re.sub(r"\s+(# )?", " ", text)
