@@ -16,8 +16,7 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, evenly
 from vsacli.studies.search.acceptance import ImpossibleError
 from vsacli.studies.search.changed_motion import rate_of
-from vsacli.studies.search.cutting_planes import first_accepted, scanned_numbers
-from vsacli.studies.search.few_samples import FEW, SAME_RANGE, Required
+from vsacli.studies.search.cutting_planes import FEW, SAME_RANGE, Required, first_accepted, scanned_numbers
 from vsacli.studies.search.loads import TaskSamples
 from vsacli.studies.search.task import Combination, Task
 from vsacli.trajectory.trajectory import Trajectory

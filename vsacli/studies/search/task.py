@@ -25,8 +25,7 @@ from vsacli.studies.search.changed_motion import (
     with_kept_rate,
     with_raised_stiffness,
 )
-from vsacli.studies.search.cutting_planes import smallest_offset, smallest_transition
-from vsacli.studies.search.few_samples import FEW, FewSamples
+from vsacli.studies.search.cutting_planes import FEW, FewSamples, smallest_offset, smallest_transition
 from vsacli.studies.search.fix_report import (
     Fix,
     JointChange,
