@@ -23,6 +23,7 @@ from samples.wrenches import held
 from vsacli import inverse_dynamics, load_robot
 from vsacli.files.info.robot_info import load_sizes, static_load
 from vsacli.results.charts.arm_chart import ArmPoints, arm_chart, home_position
+from vsacli.results.charts.look import STYLES, drawing_with
 from vsacli.results.charts.robot_charts import LIMITS, ActuatorChart, StiffnessMap, actuator_charts
 from vsacli.results.plots import actuators_figure, arm_figure, stiffness_figure
 from vsacli.robot.model import Robot
@@ -248,6 +249,23 @@ def test_all_joints_of_a_hand_are_named() -> None:
 def test_a_flat_arm_needs_no_top_view() -> None:
     assert len(arm_chart(shipped_robot("planar_2r")).views) == 2
     assert len(arm_chart(shipped_robot("puma_560")).views) == 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["vsa_3r", "planar_2r", "scara_4", "panda_7r"])
+def test_an_arm_fills_a_column_of_a_paper(name: str) -> None:
+    """Boxes around links and joints take a seventh of it or more, at about one scale in all views."""
+    with drawing_with(STYLES["paper"]):
+        figure = arm_figure(arm_chart(shipped_robot(name)))
+    figure.draw_without_rendering()
+    area = 0.0
+    for axes in figure.axes:
+        solids = [path.vertices for each in axes.collections for path in each.get_paths()]
+        links = [line.get_xydata() for line in axes.get_lines() if line.get_zorder() >= 2]
+        area += np.prod(np.ptp(axes.transData.transform(np.concatenate([*solids, *links])), axis=0))
+    assert area > 0.14 * figure.bbox.width * figure.bbox.height
+    scales = [float(axes.transData.get_matrix()[0, 0]) for axes in figure.axes]
+    np.testing.assert_allclose(scales, np.mean(scales), rtol=0.2)  # labels of axes take some of it
 
 
 def test_ticks_count_along_the_axes_of_the_base_frame_on_a_ceiling() -> None:

@@ -21,7 +21,7 @@ from matplotlib.patches import Patch
 from vsacli.base.arrays import FloatArray
 from vsacli.results.charts.arm_chart import ROOM, ArmChart, View
 from vsacli.results.charts.chart import PANEL_WIDTH
-from vsacli.results.charts.look import current_look
+from vsacli.results.charts.look import CM_PER_INCH, current_look
 from vsacli.results.charts.tool_charts import ToolPath
 from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.long_texts import POINTS_PER_INCH
@@ -29,11 +29,17 @@ from vsacli.results.plots.panels import add_title
 from vsacli.results.plots.sheets import complete
 from vsacli.results.plots.styles import line_style, new_figure, scaled, shortened
 
-LABEL_WIDTH = 0.55
-"""Width of the column of names, relative to a view."""
+LABEL_WIDTH = 0.8
+"""Width of the column of names, relative to the size of the arm."""
 
 NARROWEST_VIEW, VIEW_HEIGHT = 2.0, 2.6
 """Smallest width of a view, and its height where one is above the others, at the usual font size, inches."""
+
+LABELED, AROUND = 0.75, 1.1
+"""Height of the title and the labels of a view, and of legend and title, at the usual font size, inches."""
+
+MARGIN, BESIDE_GRAVITY = 0.04, 0.15
+"""Space around the arm, and at its left for the arrow of gravity, relative to the size of the arm."""
 
 NAME_LENGTH, MOST_NAMES = 18, 14
 """Characters in the name of a joint, and number of names that fit into the column."""
@@ -60,7 +66,7 @@ NAME_SIZE, ARROW_SIZE = 9, 8
 """Sizes of the names of joints and arrows at the usual font size, points."""
 
 NAME_LINE = 1.5
-"""Height of the line of a name relative to its size, where the legend is not yet drawn."""
+"""Height of the line of a name relative to its size."""
 
 EDGE = 0.7
 """Width of edges, points."""
@@ -83,39 +89,77 @@ _ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": "black", "linewidth": 1.
 
 
 def arm_figure(chart: ArmChart) -> Figure:
-    """Draw the views of an arm at one scale; the first one names the joints."""
-    widths, larger = [1 + LABEL_WIDTH, *(1.0 for _ in chart.views[1:])], _crowding(chart)
+    """Draw the views of an arm at one scale, each as large as its content; the first one names the joints."""
+    windows = [_window(chart, view) for view in chart.views]
+    windows[0][1, 0] += LABEL_WIDTH * chart.size
+    widths, heights = np.array([high - low for low, high in windows]).T.tolist()
+    look, larger = current_look(), _crowding(chart)
+
+    def scale(columns: int) -> float:
+        """Return the inches of a meter, at the usual font size."""
+        if look.width is None or look.height is not None:
+            return larger * PANEL_WIDTH / (ROOM * chart.size)
+        rows = (widths,) if columns == len(widths) else (widths[:1], widths[1:])
+        room = look.width / CM_PER_INCH / look.scale
+        return min((room - LABELED * len(row)) / sum(row) for row in rows)
+
+    def first(columns: int) -> float:
+        """Return the height of the first view, m, in which all names fit."""
+        return max(heights[0], (_most_names(chart) + 1) * _line_height(chart) / scale(columns))
 
     def natural(columns: int) -> tuple[float, float]:
         if columns == len(widths):
-            return larger * PANEL_WIDTH * sum(widths), larger * PANEL_WIDTH + 1.4
-        return larger * PANEL_WIDTH * 2, larger * VIEW_HEIGHT * 2 + 1.0
+            broad, high, rows = sum(widths), max(first(columns), *heights), 1
+        else:
+            broad, high, rows = max(widths[0], sum(widths[1:])), first(columns) + max(heights[1:]), 2
+        return (
+            scale(columns) * broad + LABELED * (len(widths) + 1 - rows),
+            scale(columns) * high + LABELED * rows + AROUND,
+        )
 
-    columns = columns_of_panels(len(widths), natural, NARROWEST_VIEW * sum(widths) / len(widths))
+    columns = columns_of_panels(len(widths), natural, NARROWEST_VIEW * (1 + LABEL_WIDTH / ROOM / len(widths)))
     with new_figure(natural(columns)) as figure:
-        panels = panels_of_views(figure, widths, stacked=columns < len(widths))
-        for axes, view in zip(panels, chart.views, strict=True):
-            frame_view(axes, chart, view, named=view is chart.views[0])
+        windows[0][:, 1] += (first(columns) - heights[0]) / 2 * np.array([-1, 1])
+        shares = [first(columns), max(heights[1:])]
+        panels = panels_of_views(figure, widths, shares, stacked=columns < len(widths))
+        for axes, view, window in zip(panels, chart.views, windows, strict=True):
+            frame_view(axes, view, window)
             _draw_arm(axes, chart, view)
-        _name_joints(panels[0], chart, chart.views[0])
+        _name_joints(panels[0], chart, chart.views[0], _line_height(chart) / scale(columns))
         return complete(figure, chart.title, _handles(chart))
 
 
-def panels_of_views(figure: Figure, widths: Sequence[float], *, stacked: bool) -> list[Axes]:
-    """Return panels of these widths side by side, or the first one above the others."""
+def _window(chart: ArmChart, view: View) -> FloatArray:
+    """Return the lower left and the upper right corner of what a view shows, (2, 2), m."""
+    points, arrow = chart.points, 1.4 * ARROW_SHARE * chart.size * (SEVERAL if chart.tool_names else 1.0)
+    axes = AXIS_LENGTH * chart.joint_length * points.axes[0]
+    tips = points.tools[0][..., None] + arrow * points.tool_axes[0]
+    faces = [corners for solid in _solids(chart) for corners in solid.faces]
+    drawn = [*chart.lines, chart.centers + axes, chart.centers - axes, *faces]
+    drawn.append(np.swapaxes(tips, -1, -2).reshape(-1, 3))
+    places = view.project(np.concatenate(drawn))
+    low, high = places.min(axis=0) - MARGIN * chart.size, places.max(axis=0) + MARGIN * chart.size
+    if np.linalg.norm(view.project(chart.down)) > SHORTEST_ARROW:
+        low[0] -= BESIDE_GRAVITY * chart.size
+        high[1] = max(high[1], low[1] + 1.7 * ARROW_SHARE * chart.size)
+    return np.stack((low, high))
+
+
+def panels_of_views(
+    figure: Figure, widths: Sequence[float], heights: Sequence[float] = (1.0, 1.0), *, stacked: bool
+) -> list[Axes]:
+    """Return panels of these widths side by side, or the first above the others in rows of these heights."""
     if not stacked:
         return list(figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0])
-    places = figure.add_gridspec(2, len(widths) - 1)
+    places = figure.add_gridspec(2, len(widths) - 1, width_ratios=widths[1:], height_ratios=heights)
     first = figure.add_subplot(places[0, :])
     return [first, *(figure.add_subplot(places[1, column]) for column in range(len(widths) - 1))]
 
 
-def frame_view(axes: Axes, chart: ArmChart | ToolPath, view: View, *, named: bool = False) -> None:
+def frame_view(axes: Axes, view: View, window: FloatArray) -> None:
     """Set limits of equal scale, and labels and ticks where lengths are not foreshortened."""
-    half = ROOM / 2 * chart.size
-    x, y = view.project(chart.middle)
-    axes.set_xlim(x - half, x + half * (1 + 2 * LABEL_WIDTH * named))
-    axes.set_ylim(y - half, y + half)
+    axes.set_xlim(window[:, 0])
+    axes.set_ylim(window[:, 1])
     axes.set_aspect("equal")
     add_title(axes, view.name)
     if view.labels is None:
@@ -149,7 +193,8 @@ def _draw_arm(axes: Axes, chart: ArmChart, view: View) -> None:
     for origin, tool_axes in zip(points.tools[0], points.tool_axes[0], strict=True):
         for direction, name in zip(tool_axes.T, "xyz", strict=True):
             _draw_arrow(axes, view, origin, share * arrow * direction, name, share)
-    start = chart.middle + ROOM / 2 * chart.size * (0.75 * view.up - 0.85 * view.right)
+    corner = (axes.get_xlim()[0] + BESIDE_GRAVITY / 2 * chart.size, axes.get_ylim()[1] - MARGIN * chart.size)
+    start = corner[0] * view.right + corner[1] * view.up
     _draw_arrow(axes, view, start, arrow * chart.down, "g")
 
 
@@ -238,18 +283,22 @@ def _draw_arrow(
     axes.text(x, y, name, fontsize=size, ha="center", va="center", zorder=5)
 
 
-def _name_joints(axes: Axes, chart: ArmChart, view: View) -> None:
-    """Write names in a column at the right, each with a line to its joint or tool; of many only some."""
-    crowding = _crowding(chart)
-    size = current_look().points(NAME_SIZE / crowding)
-    most = _names_that_fit(axes, size, math.ceil(MOST_NAMES * crowding**2 - 1e-9))
-    every = math.ceil(len(_names(chart)) / most)
+def _name_joints(axes: Axes, chart: ArmChart, view: View, gap: float) -> None:
+    """Write names in a column at the right, each with a line to its joint or tool; of many only some.
+
+    Args:
+        axes: panel of the view.
+        chart: arm.
+        view: first view.
+        gap: distance of lines of names, m.
+    """
+    (_, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    size = current_look().points(NAME_SIZE / _crowding(chart))
+    every = math.ceil(len(_names(chart)) / _most_names(chart))
     tools = chart.points.tools[0, : len(chart.tool_names)]
     places = view.project(np.concatenate((chart.centers, tools)))[::every]
     names = [shortened(name, NAME_LENGTH) for name in _names(chart)[::every]]
-    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-    column = left + (right - left) / (1 + LABEL_WIDTH)
-    gap = (top - bottom) / (most + 1)
+    column = right - LABEL_WIDTH * chart.size
     heights = _spread(places[:, 1], gap, bottom + gap / 2, top - gap / 2)
     for (x, y), height, name in zip(places, heights, names, strict=True):
         axes.plot([x, column, column + gap / 2], [y, height, height], **scaled(_LEADER), zorder=1)
@@ -261,19 +310,20 @@ def _names(chart: ArmChart) -> list[str]:
     return [*(joint.name for joint in chart.joints), *chart.tool_names]
 
 
+def _most_names(chart: ArmChart) -> int:
+    """Return the number of names that the column has room for."""
+    return min(len(_names(chart)), math.ceil(MOST_NAMES * _crowding(chart) ** 2 - 1e-9))
+
+
+def _line_height(chart: ArmChart) -> float:
+    """Return the height of a line of the column of names at the usual font size, inches."""
+    look = current_look()
+    return NAME_LINE * look.points(NAME_SIZE / _crowding(chart)) / look.scale / POINTS_PER_INCH
+
+
 def _crowding(chart: ArmChart) -> float:
     """Return by which factor the figure of a tree grows, and its names shrink, so that all names fit."""
     return 1.0 if len(chart.lines) == 1 else max(1.0, len(_names(chart)) / MOST_NAMES) ** 0.5
-
-
-def _names_that_fit(axes: Axes, size: float, most: int) -> int:
-    """Return the number of names of some size, points, that fit into the column, at most `most`."""
-    look, figure = current_look(), axes.get_figure(root=True)
-    if look.width is None or figure is None:
-        return most
-    figure.draw_without_rendering()
-    height = axes.get_window_extent().height / figure.dpi * POINTS_PER_INCH
-    return min(most, max(1, int(height / (NAME_LINE * size)) - 1))
 
 
 def _spread(heights: FloatArray, gap: float, low: float, high: float) -> FloatArray:
@@ -317,7 +367,7 @@ def tool_path_figure(path: ToolPath) -> Figure:
     with new_figure(natural(2 if stacked else views)) as figure:
         panels = panels_of_views(figure, [1.0] * views, stacked=stacked)
         for axes, view in zip(panels, path.views, strict=True):
-            frame_view(axes, path, view)
+            frame_view(axes, view, view.project(path.middle) + ROOM / 2 * path.size * np.array([[-1], [1]]))
             for line in path.links:
                 axes.plot(*view.project(line).T, **scaled(_PATH_LINK), zorder=1)
             for look, points in enumerate(path.paths.values()):
