@@ -101,11 +101,11 @@ def arm_figure(chart: ArmChart) -> Figure:
             return larger * PANEL_WIDTH / (ROOM * chart.size)
         rows = (widths,) if columns == len(widths) else (widths[:1], widths[1:])
         room = look.width / CM_PER_INCH / look.scale
-        return min((room - LABELED * len(row)) / sum(row) for row in rows)
+        return float(min((room - LABELED * len(row)) / sum(row) for row in rows))
 
     def first(columns: int) -> float:
         """Return the height of the first view, m, in which all names fit."""
-        return max(heights[0], (_most_names(chart) + 1) * _line_height(chart) / scale(columns))
+        return float(max(heights[0], (_most_names(chart) + 1) * _line_height(chart) / scale(columns)))
 
     def natural(columns: int) -> tuple[float, float]:
         if columns == len(widths):
@@ -158,8 +158,8 @@ def panels_of_views(
 
 def frame_view(axes: Axes, view: View, window: FloatArray) -> None:
     """Set limits of equal scale, and labels and ticks where lengths are not foreshortened."""
-    axes.set_xlim(window[:, 0])
-    axes.set_ylim(window[:, 1])
+    axes.set_xlim(*window[:, 0].tolist())
+    axes.set_ylim(*window[:, 1].tolist())
     axes.set_aspect("equal")
     add_title(axes, view.name)
     if view.labels is None:

@@ -97,7 +97,7 @@ def label_points(
         if free:
             _, distance, side, box = min(free, key=lambda place: place[0])
             taken.append(box)
-            _write(axes, text, places[own], side, distance)
+            _write_label(axes, text, places[own], side, distance)
 
 
 def _mark(point: FloatArray) -> FloatArray:
@@ -127,7 +127,7 @@ def _count_overlapping(box: FloatArray, boxes: Sequence[FloatArray]) -> int:
     return int(np.count_nonzero((box[0] < high).all(axis=1) & (low < box[1]).all(axis=1)))
 
 
-def _write(axes: Axes, text: str, place: tuple[float, float], side: _Side, distance: float) -> None:
+def _write_label(axes: Axes, text: str, place: tuple[float, float], side: _Side, distance: float) -> None:
     aligned: dict[str, Any] = {"ha": side.align, "va": side.valign, "zorder": BELOW_MARKS}
     gap = distance * GAP * _scale()
     offset = (gap * side.across, gap * side.up)
