@@ -292,7 +292,7 @@ def _mark_peaks(axes: Axes, lines: Sequence[Line], floor: float) -> list[Artist]
     for sign, end, edge in zip((-1, 1), (floor, high), edges, strict=True):
         peaks = [peak for line in lines for peak in _peaks(line, sign, end)]
         if peaks:
-            _mark_peaks(axes, peaks, sign, middle, edge)
+            _mark_at_edge(axes, peaks, sign, middle, edge)
     return [Line2D([], [], marker="^", color="0.4", **scaled(_MARK), label="cut off, near-singular")]
 
 
@@ -306,7 +306,7 @@ def _peaks(line: Line, sign: int, end: float) -> list[_ClippedPeak]:
     return [_ClippedPeak(float(time[at]), float(values[at]), color) for at in points]
 
 
-def _mark_peaks(axes: Axes, peaks: Sequence[_ClippedPeak], sign: int, middle: float, edge: float) -> None:
+def _mark_at_edge(axes: Axes, peaks: Sequence[_ClippedPeak], sign: int, middle: float, edge: float) -> None:
     """Draw a triangle for each peak at an edge of the panel, and write the value of the largest."""
     place = axes.get_xaxis_transform()
     marker = "^" if sign > 0 else "v"
