@@ -92,40 +92,41 @@ def arm_figure(chart: ArmChart) -> Figure:
     """Draw the views of an arm at one scale, each as large as its content; the first one names the joints."""
     windows = [_window(chart, view) for view in chart.views]
     windows[0][1, 0] += LABEL_WIDTH * chart.size
-    widths, heights = np.array([high - low for low, high in windows]).T.tolist()
+    extents: list[list[float]] = np.array([high - low for low, high in windows]).T.tolist()
+    widths, heights = extents
     look, larger = current_look(), _crowding(chart)
 
-    def scale(columns: int) -> float:
+    def view_scale(columns: int) -> float:
         """Return the inches of a meter, at the usual font size."""
         if look.width is None or look.height is not None:
             return larger * PANEL_WIDTH / (ROOM * chart.size)
         rows = (widths,) if columns == len(widths) else (widths[:1], widths[1:])
         room = look.width / CM_PER_INCH / look.scale
-        return float(min((room - LABELED * len(row)) / sum(row) for row in rows))
+        return min(max(room - LABELED * len(row), room / 2) / sum(row) for row in rows)
 
-    def first(columns: int) -> float:
+    def first_height(columns: int) -> float:
         """Return the height of the first view, m, in which all names fit."""
-        return float(max(heights[0], (_most_names(chart) + 1) * _line_height(chart) / scale(columns)))
+        return max(heights[0], (_most_names(chart) + 1) * _line_height(chart) / view_scale(columns))
 
     def natural(columns: int) -> tuple[float, float]:
         if columns == len(widths):
-            broad, high, rows = sum(widths), max(first(columns), *heights), 1
+            broad, high, rows = sum(widths), max(first_height(columns), *heights), 1
         else:
-            broad, high, rows = max(widths[0], sum(widths[1:])), first(columns) + max(heights[1:]), 2
+            broad, high, rows = max(widths[0], sum(widths[1:])), first_height(columns) + max(heights[1:]), 2
         return (
-            scale(columns) * broad + LABELED * (len(widths) + 1 - rows),
-            scale(columns) * high + LABELED * rows + AROUND,
+            view_scale(columns) * broad + LABELED * (len(widths) + 1 - rows),
+            view_scale(columns) * high + LABELED * rows + AROUND,
         )
 
     columns = columns_of_panels(len(widths), natural, NARROWEST_VIEW * (1 + LABEL_WIDTH / ROOM / len(widths)))
     with new_figure(natural(columns)) as figure:
-        windows[0][:, 1] += (first(columns) - heights[0]) / 2 * np.array([-1, 1])
-        shares = [first(columns), max(heights[1:])]
+        windows[0][:, 1] += (first_height(columns) - heights[0]) / 2 * np.array([-1, 1])
+        shares = [first_height(columns), max(heights[1:])]
         panels = panels_of_views(figure, widths, shares, stacked=columns < len(widths))
         for axes, view, window in zip(panels, chart.views, windows, strict=True):
             frame_view(axes, view, window)
             _draw_arm(axes, chart, view)
-        _name_joints(panels[0], chart, chart.views[0], _line_height(chart) / scale(columns))
+        _name_joints(panels[0], chart, chart.views[0], _line_height(chart) / view_scale(columns))
         return complete(figure, chart.title, _handles(chart))
 
 
@@ -158,8 +159,9 @@ def panels_of_views(
 
 def frame_view(axes: Axes, view: View, window: FloatArray) -> None:
     """Set limits of equal scale, and labels and ticks where lengths are not foreshortened."""
-    axes.set_xlim(*window[:, 0].tolist())
-    axes.set_ylim(*window[:, 1].tolist())
+    (left, bottom), (right, top) = window.tolist()
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
     axes.set_aspect("equal")
     add_title(axes, view.name)
     if view.labels is None:

@@ -82,9 +82,11 @@ def label_points(
     figure.draw_without_rendering()
     size = np.asarray(axes.get_position().size) * figure.get_size_inches() / _scale()
     points = [axes.transLimits.transform(place) * size for place in places]
-    taken = list(map(_mark, points))
+    taken = list(map(_mark_box, points))
     marked = [line.get_xydata() for line in axes.get_lines() if line.get_marker() != "None"]
-    marks = [_mark(axes.transLimits.transform(place) * size) for line in marked for place in np.asarray(line)]
+    marks = [
+        _mark_box(axes.transLimits.transform(place) * size) for line in marked for place in np.asarray(line)
+    ]
     for text, members in _grouped(points, labels):
         own = members[0]
         others = [each for number, each in enumerate(taken) if number not in members]
@@ -100,7 +102,7 @@ def label_points(
             _write_label(axes, text, places[own], side, distance)
 
 
-def _mark(point: FloatArray) -> FloatArray:
+def _mark_box(point: FloatArray) -> FloatArray:
     """Return the corners of a mark, inches."""
     return np.array([point - GAP / POINTS_PER_INCH / 2, point + GAP / POINTS_PER_INCH / 2])
 
