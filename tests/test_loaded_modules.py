@@ -55,7 +55,7 @@ TASKS = {
     "invdyn --plot": Task(
         ("invdyn", "-q", ROBOT, TRAJECTORY, "--plot", "figures"),
         ("studies", "control", "files", "trajectory.fits", "trajectory.recorded"),
-        30_600,
+        31_100,
     ),
     "check-feasibility": Task(
         ("check-feasibility", ROBOT, TRAJECTORY),

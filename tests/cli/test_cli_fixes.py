@@ -142,7 +142,7 @@ def test_another_fix_is_written_by_its_number(vsacli, tmp_path, too_soft):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--write-fix", 2, "-o", "fixed.yaml")
     assert (done.code, done.err) == (0, "fix 2 goes to fixed.yaml\nwrote fixed.yaml\n")
     assert "INFEASIBLE" not in done.out  # the report was read before
-    assert re.search(r"^fixes; with any of them [^:]*:\n1\. .*\n2\. ", done.out, re.MULTILINE)
+    assert re.search(r"^fixes; with any of them [^:]*:\n1\. .*\n   peak .*\n2\. ", done.out, re.MULTILINE)
     assert contents(tmp_path).keys() == {"soft.yaml", "fixed.yaml"}
     again = vsacli("check-feasibility", ROBOT, "fixed.yaml")
     assert again.code == 0

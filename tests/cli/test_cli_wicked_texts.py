@@ -155,7 +155,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (
 
 ENDINGS = {"ROBOT": ".yaml", "MOVE": ".move.yaml", "SOFT": ".soft.yaml", "RESULT": ".h5", "CHAIN": ".urdf"}
 
-CODES = {"check-feasibility": (3,), "simulate": (3,)}
+CODES = {"simulate": (3,)}
 
 TOO_LONG = 4
 """Exit code where two names of 200 letters make one that the file system does not take."""

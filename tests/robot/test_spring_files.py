@@ -255,6 +255,7 @@ ROUGH = f"{DEFLECTIONS[3]:g},{1.001 * TORQUES[3]:.12g}"
 @pytest.mark.slow
 def test_misfit_is_a_warning_that_names_the_joint(vsacli, rig: Path):
     (rig.parent / "spring.csv").write_text(rows(row_3=ROUGH))
+    rig.write_text(rig.read_text().replace("joints:", "gravity: [0, -9.81, 0]\njoints:"))
     (warning,) = load_robot(rig).warnings
     assert warning.startswith(f"spring of joint swing: the curve through {rig.parent / 'spring.csv'} misses")
     assert "spring of joint swing: the curve through" in vsacli("check-feasibility", rig, "still.yaml").out
@@ -275,7 +276,8 @@ def test_misfit_of_either_side_is_told(rig: Path):
 @pytest.mark.slow
 def test_shared_table_is_one_source(rig: Path):
     joint = ROBOT.split("joints:\n")[1]
-    rig.write_text((ROBOT + joint.replace("swing", "turn")).replace("SPRING", TABLE))
+    arm = (ROBOT + joint.replace("swing", "turn")).replace("SPRING", TABLE)
+    rig.write_text(arm.replace("joints:", "gravity: [0, -9.81, 0]\njoints:"))
     (rig.parent / "spring.csv").write_text(rows(row_3=ROUGH))
     robot = load_robot(rig)
     assert len(robot.joints) == len(robot.warnings) == len(robot.sources) == 2

@@ -233,18 +233,23 @@ class RecordedEquations(LoopEquations):
             if shared:
                 self._load(recording, *loop_code(recording), lambda _code: False)
             if self._compiled is None:
-                yield from self._improving_on(recording)
+                yield from self._improving_on(recording, looked=shared)
 
-    def _improving_on(self, recording: LoopPrograms) -> Iterator[float]:
-        """Use a program on plain numbers, then compiled code; yield like `_improving`."""
+    def _improving_on(self, recording: LoopPrograms, *, looked: bool) -> Iterator[float]:
+        """Use a program on plain numbers, then compiled code; yield like `_improving`.
+
+        With `looked`, compiled code is not in the cache.
+        """
         with suppress(NotImplementedError):  # raised for programs with loops
             self._program = NumberProgram(recording.rates)
             self._law = NumberProgram(recording.torques)
         begin, seconds = self.budget.used, self._seconds(recording) * self._computing.runs
         if self._computing.engine == "auto":
-            yield begin + LOOK_SECONDS / seconds
+            if not looked:
+                yield begin + LOOK_SECONDS / seconds
             code, numbers = loop_code(recording)
-            self._load(recording, code, numbers, lambda _code: False)
+            if not looked:
+                self._load(recording, code, numbers, lambda _code: False)
             if self._compiled is None:
                 yield begin + code.compiling_seconds / seconds
                 self._load(recording, code, numbers, lambda _code: True)

@@ -75,7 +75,7 @@ def _measure_numbers(
     """
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
-        for number in checked.numbers_by_unit.get(unit, ()):
+        for number in checked.of_unit(unit):
             on_path = {*number.path}
             if (not keys or on_path & {*keys}) and not on_path & {*without}:
                 yield number if size is None else number._replace(size=size(checked, number.value))

@@ -120,13 +120,16 @@ class CheckedRobot:
         """Joints with their indices; none if springs and motors are placeholders."""
         return enumerate(() if self.placeholder else self.joints)
 
+    def of_unit(self, unit: str) -> Iterator[Measured]:
+        """Yield the numbers with a unit, each with its magnitude as size."""
+        for path, value in self._numbers_by_unit.get(unit, ()):
+            yield Measured(path, value, unit, abs(value))
+
     @cached_property
-    def numbers_by_unit(self) -> Mapping[str, Sequence[Measured]]:
-        """Numbers by their unit, each with its magnitude as size."""
-        numbers: defaultdict[str, list[Measured]] = defaultdict(list)
+    def _numbers_by_unit(self) -> Mapping[str, Sequence[tuple[NumberPath, float]]]:
+        numbers: defaultdict[str, list[tuple[NumberPath, float]]] = defaultdict(list)
         for path, quantity, value, _ in self.numbers:
-            unit = quantity.unit(self._variant(path))
-            numbers[unit].append(Measured(path, value, unit, abs(value)))
+            numbers[quantity.unit(self._variant(path))].append((path, value))
         return numbers
 
     def _variant(self, path: NumberPath) -> str:
