@@ -95,7 +95,7 @@ class LimitCheck(NamedTuple):
 
     @property
     def exists(self) -> bool:
-        """Whether either end bounds anything."""
+        """Return whether either end bounds anything."""
         return any(map(_is_bound, self.range))
 
     def outside(self, values: FloatArray) -> FloatArray:

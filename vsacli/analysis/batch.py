@@ -161,10 +161,11 @@ class Batch:
 
     def _with_tools(self, block: Block) -> Block:
         """Return a block with the variables of the tools, if they are computed."""
-        parts = zip(self._tools, block.divided(len(self.variants)), strict=True)
-        added = [tools.add(part) for tools, part in parts if tools is not None]
-        if not added:
+        computed = [tools for tools in self._tools if tools is not None]  # of all variants, or of none
+        if not computed:
             return block
+        parts = zip(computed, block.divided(len(computed)), strict=True)
+        added = [tools.add(part) for tools, part in parts]
         return block.replaced(**{name: np.concatenate([each[name] for each in added]) for name in added[0]})
 
     def _until_infeasible(self, block: Block, between: list[Minima]) -> tuple[Block, list[Minima]]:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.texts import one_line
 from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.tracing import Program, is_of_calls
 from vsacli.compute.tracing.c_code import Dialect
@@ -32,7 +31,7 @@ from vsacli.control.codegen.kernels import (
 from vsacli.control.codegen.parameters import PARAMETERS, Maker, with_parameters
 from vsacli.control.codegen.robot_functions import state_structure, variable_array
 from vsacli.control.codegen.scalar import WIDTH, further_definitions, scalar_dialect
-from vsacli.control.codegen.texts import NUMPY_TYPES, comment, filled, structure_text
+from vsacli.control.codegen.texts import NUMPY_TYPES, comment, filled, python_head, structure_text
 from vsacli.dynamics.forward import Plant
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
@@ -211,7 +210,7 @@ def _loader(
     return filled(
         "robot_gpu.py",
         prefix,
-        head=textwrap.fill(one_line(about), WIDTH, initial_indent="# ", subsequent_indent="# "),
+        head=python_head(about),
         call=f"{loop.name}({', '.join(name for name, _ in loop.arguments if name != PARAMETERS)})",
         real=NUMPY_TYPES[precision],
         convert=_CONVERSIONS[precision],

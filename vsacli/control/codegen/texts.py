@@ -192,6 +192,11 @@ def _comparisons(function: Function, reference: ReferenceResults) -> Iterator[st
             yield f'        failures += differs("{name}", n, {", ".join(both)}, {digits(scale)});'
 
 
+def python_head(about: str) -> str:
+    """Return the comment with which a file in Python begins."""
+    return textwrap.fill(one_line(about), WIDTH, initial_indent="# ", subsequent_indent="# ")
+
+
 def binding_text(prefix: str, functions: Sequence[Function], precision: str, about: str) -> str:
     """Return the Python module that calls the functions; for arguments see `source_text`."""
     used = structures(functions)
@@ -201,7 +206,7 @@ def binding_text(prefix: str, functions: Sequence[Function], precision: str, abo
     return filled(
         "robot.py",
         prefix,
-        head=textwrap.fill(one_line(about), WIDTH, initial_indent="# ", subsequent_indent="# "),
+        head=python_head(about),
         call=f"{loop.name}({_names(loop)})",
         real=NUMPY_TYPES[precision],
         flags="\n".join(f"    {flag.name} = {flag.value}  # {flag.meaning}" for flag in Flag),

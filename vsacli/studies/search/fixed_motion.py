@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.actuators.motor import SHAFT
 from vsacli.actuators.transmission import JointVariables
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.flags import MIN_MARGIN
@@ -134,8 +133,8 @@ def _with_friction_of(joint: Joint, width: float) -> Joint:
     actuator: Any = joint.actuator
     motors = []
     for motor in actuator.motor:
-        ratio = abs(motor.gear_ratio or 1.0) if motor.side == SHAFT else 1.0
-        friction = motor.friction and replace(motor.friction, width=max(motor.friction.width, ratio * width))
+        least = abs(motor.ratio_of_side) * width
+        friction = motor.friction and replace(motor.friction, width=max(motor.friction.width, least))
         motors.append(replace(motor, friction=friction))
     return replace(joint, actuator=replace(actuator, motor=tuple(motors)))
 
