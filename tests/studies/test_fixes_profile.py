@@ -17,6 +17,7 @@ from samples.fixes import (
     pendulum,
     rest_to_rest,
 )
+from samples.marks import slow
 from samples.robots import vsa_3r
 from scipy.integrate import trapezoid
 
@@ -30,6 +31,7 @@ from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.fix_report import NotPossible
 from vsacli.studies.search.nearest_profile import Bounds, NoSplineError, nearest_spline
 from vsacli.studies.search.task import AS_IT_IS, Task
+from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -238,6 +240,27 @@ def test_deflection_limit_bounds_the_profile_from_above():
     fixed, found = profile(robot, rest_to_rest(4.0, (850.0, 900.0, 850.0)))
     assert accepted(robot, fixed, MARGIN)
     assert found.changes[0].largest < 0
+
+
+def rising(end: float) -> Trajectory:
+    """A motion of the pendulum that starts near its least stiffness, 800 N m/rad, and ends stiffer."""
+    asked = rest_to_rest(2.0, start=(0.0,), end=(0.5,))
+    profile = RestToRest(signal=STIFFNESS, span=asked.times.span, degree=5, start=(840.0,), end=(end,))
+    return Trajectory(asked.times, asked.position, {"stiffness": profile}, name="rising")
+
+
+@pytest.mark.parametrize("end", [1400.0, slow(2500.0)])
+def test_torque_limits_bound_the_profile_from_above_where_no_constant_helps(end):
+    robot = changed(0, robot=pendulum(), motor={"max_torque": 100.0})
+    found = fixes(robot, rising(end), MARGIN)
+    assert isinstance(found.stiffness_offset, NotPossible)
+    (cause,) = found.causes
+    assert "since lowered by" in cause.text or "since raised by" in cause.text
+    fixed = found.fixes[0].trajectory
+    assert accepted(robot, fixed, MARGIN)
+    held = inverse_dynamics(robot, fixed)
+    # Its end uses the torque that there is, but for the thousandth left to the rates of the profile.
+    assert 0.998 < np.abs(held.tau_motor[-1]).max() / 100.0 <= 1.0
 
 
 def test_stiffness_limit_below_what_the_load_needs():

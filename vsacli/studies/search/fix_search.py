@@ -307,6 +307,8 @@ def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
     if worst is None:
         return ""
     asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
-    constant = asked.min() == asked.max()
-    least = significant(asked[0] + offset, toward=math.inf) if constant else f"{offset:+.4g}"
-    return f", since with {least} {unit}, the least it may have, {worst.text}"
+    if asked.min() == asked.max():
+        least = significant(asked[0] + offset, toward=math.inf)
+        return f", since with {least} {unit}, the least it may have, {worst.text}"
+    moved, by = ("raised", "as little as") if offset > 0 else ("lowered", "as far as")
+    return f", since {moved} by {abs(offset):.4g} {unit} throughout, {by} its minimum permits, {worst.text}"

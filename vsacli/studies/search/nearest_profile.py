@@ -7,9 +7,9 @@ Here no such profile is known, and none exists where bounds touch; in return, th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,7 @@ from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import (
     Acceptance,
     ImpossibleError,
+    Range,
     admissible_stiffness,
     checked_range,
     variable_stiffness_actuator,
@@ -216,6 +217,18 @@ MARGIN_FACTORS = (1, 2, 4, 8)
 SMOOTHING_FACTORS = (1, 2, 4, 8)
 """Multiples of the smoothing time to try then: torques grow with the second derivative."""
 
+MOST_CHANGES = 4
+"""Changes to try one after the other between bounds that depend on the rates of the last one."""
+
+RATES_RESERVE = 1e-3
+"""Share of a limit that is left to the difference between the rates of two successive changes."""
+
+GRID = 24
+"""Values of stiffness at which an instant is tried to find those that it accepts."""
+
+GRID_HALVINGS = 12
+"""Halvings of the interval of the grid at the end of the accepted range, to 1e-5 of the command."""
+
 RESONANCE_SHARE = 0.7
 """Smoothing time as a share of that of the resonance."""
 
@@ -257,8 +270,8 @@ def nearest_change(
 ) -> Change:
     """Return the smoothed C2 change of least mean square that fixes a joint; the constant one if nearer.
 
-    If the limits of the motors refuse it, the nearest of several others is returned that are smoother or keep
-    further away from the ends of the attainable range.
+    If the limits of the motors refuse it, the nearest of several others is returned: those that are smoother
+    or keep further away from the ends of the attainable range, and one within the limits of each instant.
 
     Args:
         acceptance: acceptance rule.
@@ -277,6 +290,7 @@ def nearest_change(
         tried.append(Change.constant(load.time, smallest_offset(acceptance, joint, judged(load))))
     if not _accepted(acceptance, joint, load, change):
         tried += [_change_with_margins(acceptance, joint, load, *factors) for factors in others]
+        tried += _changes_within_limits(acceptance, joint, load)
     accepted = [each for each in tried if each is not None and _accepted(acceptance, joint, load, each)]
     if not accepted:
         raise ImpossibleError(_refusal_reason(acceptance, joint, load, change))
@@ -302,7 +316,11 @@ def _change_with_margins(
     min_margin = margins * acceptance.min_margin
     if min_margin >= 1:
         return None
-    admissible = admissible_stiffness(joint, load.command, min_margin)
+    return _change_within(admissible_stiffness(joint, load.command, min_margin), joint, load, smoothings)
+
+
+def _change_within(admissible: Range, joint: Joint, load: Load, smoothings: float) -> Change | None:
+    """Return the nearest change to a stiffness within a range; None if no spline is found."""
     asked = load.command.commanded["stiffness"]
     bounds = _narrowed(load.time, admissible.low - asked, admissible.high - asked)
     if np.any(bounds.low > bounds.high):
@@ -315,6 +333,63 @@ def _change_with_margins(
     except NoSplineError:
         return None
     return Change(load.time, np.stack([spline(load.time, nu=order) for order in range(STIFFNESS.orders)]))
+
+
+def _changes_within_limits(acceptance: Acceptance, joint: Joint, load: Load) -> Iterator[Change]:
+    """Yield changes within the stiffness that each instant accepts at the rates of the change before."""
+    rates, reserved = (
+        np.zeros((2, len(load.time))),
+        replace(acceptance, reserve=acceptance.reserve + RATES_RESERVE),
+    )
+    for _ in range(MOST_CHANGES):
+        admissible = _accepted_stiffness(reserved, joint, load, rates)
+        change = None if admissible is None else _change_within(admissible, joint, load, 1)
+        if change is None:
+            return
+        yield change
+        if _accepted(acceptance, joint, load, change):
+            return
+        rates = change.rows[1:]
+
+
+def _accepted_stiffness(acceptance: Acceptance, joint: Joint, load: Load, rates: FloatArray) -> Range | None:
+    """Return the accepted range of stiffness nearest to the command, with rates added; None without one.
+
+    Ranges, or gaps in them, between two neighbors of a grid are not seen: a profile is checked as a whole.
+
+    Args:
+        acceptance: acceptance rule.
+        joint: joint whose stiffness can be chosen.
+        load: load of the joint at all instants.
+        rates: addition to the first two derivatives of the stiffness, (2, instants).
+    """
+    instants = np.arange(len(load.time))
+    asked = load.command.commanded["stiffness"]
+
+    def accepts(stiffness: FloatArray) -> BoolArray:
+        rows = (stiffness - asked).ravel(), *np.tile(rates, len(stiffness))
+        changed = load.at(np.tile(instants, len(stiffness))).changed(*rows)
+        return ~acceptance.refused_steps(joint, changed).reshape(stiffness.shape)
+
+    low, high = admissible_stiffness(joint, load.command, acceptance.min_margin)
+    shares = np.arange(GRID)[:, None] / GRID
+    grid = np.minimum(low + asked * shares / (1 - shares), high)
+    grid = np.sort(np.concatenate([grid, np.clip(asked, low, high)[None]]), axis=0)
+    accepted = accepts(grid)
+    if not accepted.any(axis=0).all():
+        return None
+    nearest = np.where(accepted, np.abs(grid - asked), np.inf).argmin(axis=0)
+    rows = np.arange(len(grid))[:, None]
+    refused_below = np.where(~accepted & (rows < nearest), rows, -1).max(axis=0)
+    refused_above = np.where(~accepted & (rows > nearest), rows, len(grid)).min(axis=0)
+    inside = np.stack([grid[refused_below + 1, instants], grid[refused_above - 1, instants]])
+    outside = np.stack(
+        [grid[np.maximum(refused_below, 0), instants], grid[np.minimum(refused_above, GRID), instants]]
+    )
+    for _ in range(GRID_HALVINGS):
+        middle = (inside + outside) / 2
+        inside, outside = np.where(accepts(middle), (middle, outside), (inside, middle))
+    return Range(*inside)
 
 
 def _narrowed(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
