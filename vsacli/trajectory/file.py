@@ -56,7 +56,7 @@ class TrajectoryFile(DeclaredRecord):
     rate: float | None = number(
         units.RATE,
         f"sampling rate, {DEFAULT_RATE:g} by default; a recorded signal is taken at its own times without "
-        "this key, and at equally spaced ones with it; the rate of a recording that has no times",
+        "this key, and at equally spaced ones with it; for a recording without times, rate of its rows",
         check=POSITIVE,
         default=None,
     )
