@@ -38,7 +38,7 @@ class Serial(VariableStiffness):
     coupled_inertia: float = number(
         units.MOTOR_INERTIA,
         "coupling inertia B_12 between the accelerations of the motors if motor 2 is mounted on motor 1; "
-        "joint side of the gears, or, of a motor with side: shaft, its shaft",
+        "joint side of the gears, or, for a motor with side: shaft, its shaft",
         default=0.0,
     )
     mechanism: Mechanism = value(

@@ -111,8 +111,8 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     type=Number("an angle in rad, e.g. 1e-4", least=0.0, most=0.1),
     default=1e-4,
     show_default=True,
-    help="Largest angle, at most 0.1, between axes that are made parallel if their common normal is far "
-    "away.",
+    help="Largest angle, at most 0.1, by which an axis is turned to be parallel to the one before if their "
+    "common normal is far away.",
 )
 @overwrite_option
 @talk_options
@@ -134,8 +134,8 @@ def import_urdf(
 ) -> None:
     """Convert a URDF to a robot file with standard Denavit-Hartenberg rows.
 
-    All joints below the base move, or those between it and each --tip. Links behind fixed joints, and joints
-    that are held, are merged with their parent links. The command prints the rows, the elements that were
+    All joints below the base move, or only those between the base and each --tip. Links behind fixed or held
+    joints are merged with their parent links. The command prints the rows, the elements that were
     ignored or changed, and the largest deviation from the kinematics of the URDF. A URDF does not describe
     motors and springs: the robot file has placeholders, marked as such, which are sized to the load of each
     joint.

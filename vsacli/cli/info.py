@@ -62,15 +62,15 @@ def info(
 ) -> None:
     """Describe the content of FILE: a robot, a trajectory, a recording, a result, a simulation or a study.
 
-    Robot: Denavit-Hartenberg rows, links, actuators, reach, static load and attainable stiffness.
-    Trajectory: ranges and peaks. Recording (a CSV file with any columns): columns, sampling rate, faults of
-    sensors and logging, and a trajectory file to begin with (--field trajectory, or --field mapping for
-    --columns of other commands). Result or simulation: provenance, variables and report. Table of a study:
-    findings, provenance and varied parameters.
+    Robot: Denavit-Hartenberg rows, links, actuators, reach, static load and attainable stiffness. Trajectory:
+    ranges and peaks. Recording (a CSV file with any columns): columns, sampling rate, faults of sensors and
+    logging, and a trajectory file to begin with; --field trajectory prints this file alone, and --field
+    mapping prints a file for --columns of other commands. Result or simulation: provenance, variables and
+    report. Table of a study: findings, provenance and varied parameters.
 
-    With --cache, show location and size of the cache of compiled code, and the unfinished output files of
-    interrupted or running commands in the folder FILE (default: the current folder) and in the folder for
-    temporary files.
+    With --cache, show location and size of the cache of compiled code. Also list unfinished output files of
+    interrupted or running commands, in the folder for temporary files and in the folder FILE (default: the
+    current folder).
     """
     if clear and not cache:
         raise click.UsageError("--clear empties the cache; give --cache, too")

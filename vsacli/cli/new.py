@@ -270,7 +270,7 @@ def study(robot: str, trajectory: str, output: str | None, overwrite: bool, talk
     """Write a study file, to be edited: many runs of ROBOT and TRAJECTORY with varied values.
 
     It varies the first stiffness of the springs by 20 % either way, and the duration if the trajectory gives
-    it. The file names both others relative to its own folder.
+    it. Paths in the file are relative to its folder.
     """
     from vsacli.files.study_template import study_template
 

@@ -185,7 +185,7 @@ class Joint(DeclaredRecord):
     )
     mount: Pose | None = value(
         RecordOf(Pose),
-        "where its DH row begins, in the frame of that link; by default there",
+        "pose at which its DH row begins, in the frame of that link; by default that frame",
         default=None,
     )
     dh: DenavitHartenberg = value(RecordOf(DenavitHartenberg), "Denavit-Hartenberg row; see `convention`")

@@ -56,14 +56,14 @@ class TrajectoryFile(DeclaredRecord):
     rate: float | None = number(
         units.RATE,
         f"sampling rate, {DEFAULT_RATE:g} by default; a recorded signal is taken at its own times without "
-        "this key, and at equally spaced ones with it; of a recording without times, its rate",
+        "this key, and at equally spaced ones with it; for a recording without times, rate of its rows",
         check=POSITIVE,
         default=None,
     )
     slow_down: float = number(
         units.DIMENSIONLESS,
-        "factor by which the motion is slower than declared and recorded here; a fit at equally "
-        "spaced times keeps its `rate`",
+        "factor by which the motion is slower than declared and recorded here; it does not change the "
+        "`rate` at which a fit is taken",
         check=POSITIVE,
         default=1.0,
     )

@@ -22,7 +22,7 @@ _GRAMMAR = "expected a number in rad (m) such as 0.01, or a share of each joint'
 
 @dataclass(frozen=True)
 class GoalTolerance:
-    """Largest error of a joint's position at the end of a run with which it counts as on target.
+    """Largest position error at the end of a run with which a joint counts as on target.
 
     Attributes:
         share: relative part, as a share of the range over which the joint is commanded, from 0 to 1.

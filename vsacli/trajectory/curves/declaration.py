@@ -170,7 +170,7 @@ class Recorded(Declaration):
 
         doc = (
             "spline for derivatives that are not given: interpolation of the samples, least squares "
-            "for noisy ones, or smoothing for noise of any color; by default chosen by the noise"
+            "for noisy ones, or smoothing for noise of any color; by default the noise decides"
         )
         file = text("path of the CSV file, relative to the trajectory file")
         bandwidth = "bandwidth of the motion in Hz; by default estimated from the recording"

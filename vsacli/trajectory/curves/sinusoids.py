@@ -228,7 +228,7 @@ class SumOfSinusoids(Formula):
         """Return the meaning for users."""
         if use.signal is POSITION:
             return super().meaning(use)
-        positive = ", and must stay positive" if use.signal.positive else ""
+        positive = ", which must stay positive" if use.signal.positive else ""
         return f"A sum of sinusoids as above{positive}. Without `ramp` it does not start at rest."
 
     def _problems(self) -> Iterator[FieldProblem]:
