@@ -77,8 +77,7 @@ class Chosen:
 
     def of_columns(self, values: FloatArray | FlagArray) -> npt.NDArray[Any]:
         """Return the existing columns, (columns, samples), of values (samples, ...)."""
-        flat: npt.NDArray[Any] = values.reshape(len(values), -1).T[self.there.ravel()]
-        return flat
+        return values.reshape(len(values), -1).T[self.there.ravel()]
 
     def places(self, labels: Labels) -> list[str]:
         """Return names of the rows of `there`: the variable at each joint, or the columns of the wrench."""

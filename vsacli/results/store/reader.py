@@ -342,8 +342,7 @@ class StoredResult(StoredFile):
         variable = self.declared[name]
         with np.errstate(over="ignore"):
             stored = split_axes(values, variable, self.labels).astype(storage_type(variable, self.precision))
-        read: FloatArray | FlagArray = stored.astype(storage_type(variable))
-        return read
+        return stored.astype(storage_type(variable))
 
     def _check_layout(self, name: str) -> None:
         """Refuse a variable whose shape or type does not fit the file, so that it can be read in parts."""

@@ -262,8 +262,7 @@ def _last_frame(frame: FloatArray, tip: FloatArray) -> FloatArray:
 def _perpendicular_part(vector: FloatArray, axis: FloatArray) -> FloatArray:
     """Return the unit vector along the component of a vector normal to an axis."""
     part = vector - (vector @ axis) * axis
-    result: FloatArray = part / np.linalg.norm(part)
-    return result
+    return part / np.linalg.norm(part)
 
 
 def _frame_from_axes(z: FloatArray, x: FloatArray, origin: FloatArray) -> FloatArray:

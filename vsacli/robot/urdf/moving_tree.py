@@ -195,8 +195,7 @@ class MovingJoint:
     @property
     def direction(self) -> FloatArray:
         """Unit vector along the joint axis, (3,)."""
-        result: FloatArray = self.frame[:3, :3] @ self.urdf.axis
-        return result
+        return self.frame[:3, :3] @ self.urdf.axis
 
 
 class Tip(NamedTuple):
