@@ -12,20 +12,16 @@ from collections.abc import Hashable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
-import numpy as np
-
 from vsacli.actuators.elasticity import Components, Elasticity, ElasticState
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import SHAFT, JointMotor, Motor
 from vsacli.actuators.reach import LimitCheck
-from vsacli.actuators.spring_elements import LeverSpring, SpringElement
+from vsacli.actuators.spring_elements import SpringAssembly, SpringElement
 from vsacli.actuators.transmission import Command, JointVariables
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag
 from vsacli.base.variables import MOTORS, SPRINGS, Variable
-from vsacli.documents.record_checks import DeclaredRecord
-from vsacli.documents.source import Source
 
 
 class PlaceholderConstants(NamedTuple):
@@ -60,7 +56,7 @@ class PlaceholderConstants(NamedTuple):
         )
 
 
-class Actuator(DeclaredRecord, ABC):
+class Actuator(SpringAssembly, ABC):
     """The drive of a joint: motors, and springs between them and the link.
 
     A kind is a frozen dataclass of declared fields that derives from this class, and a line in `ACTUATORS`.
@@ -142,24 +138,9 @@ class Actuator(DeclaredRecord, ABC):
         return ((-math.inf, math.inf),) * self.motor_count
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings to the user about the springs, as sentences."""
-        return ()
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files that the springs were read from."""
-        return ()
-
-    @property
     def spring_elements(self) -> tuple[SpringElement, ...] | None:
         """Springs whose deflections are weighted sums of positions; None if there are others."""
         return None if self.sprung else ()
-
-    @property
-    def lever_spring(self) -> LeverSpring | None:
-        """Spring between a lever and a point of the link, if it is the only spring; else None."""
-        return None
 
     @cached_property
     def limits(self) -> tuple[LimitCheck, ...]:
@@ -232,17 +213,8 @@ class Actuator(DeclaredRecord, ABC):
         """
         raise NotImplementedError(f"{type(self).__name__} takes no stiffness")
 
-    @property
-    def opposite_branch(self) -> str | None:
-        """The other value of the branch field; None if there is no other branch."""
-        return None
-
     branch_field: ClassVar[str] = "branch"
     """Path to the branch field."""
-
-    def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """Return where the stiffness is attainable on another branch, (samples,)."""
-        return np.zeros(tau_e.shape, dtype=bool)
 
 
 def _bound_of(largest: float | None) -> float:
