@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from vsacli.actuators.laws.inversion import deflection_at_torque, with_sign_of
-from vsacli.actuators.laws.law import LawByDerivatives, SpringState
+from vsacli.actuators.laws.law import SpringLaw, SpringState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.compute.vector import is_zero
@@ -19,7 +19,7 @@ from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, number
 
 
 @dataclass(frozen=True)
-class Polynomial(LawByDerivatives):
+class Polynomial(SpringLaw):
     """Spring tau = c1 phi + c3 phi^3 + c5 phi^5 + c7 phi^7 + c9 phi^9; with c1 alone, a linear spring."""
 
     c1: float = number(units.STIFFNESS, "linear coefficient", check=POSITIVE)
@@ -54,6 +54,22 @@ class Polynomial(LawByDerivatives):
         squared = phi * phi
         even = [self._derivative(each, squared) for each in range(order + 1)]
         return tuple(value if each % 2 else phi * value for each, value in enumerate(even))
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Return the torque c1 phi + c3 phi^3 + ..."""
+        return phi * self._derivative(0, phi * phi)
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Return the stiffness."""
+        return self._derivative(1, phi * phi)
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Return the slope."""
+        return phi * self._derivative(2, phi * phi)
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Return the curvature."""
+        return self._derivative(3, phi * phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy, the integral of the torque."""

@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 
 from vsacli.actuators.laws.law import (
-    LawByDerivatives,
     Pair,
     PairSolution,
     SpringLaw,
@@ -47,7 +46,7 @@ class Tendon(SpringLaw):
 
 
 @dataclass(frozen=True)
-class Mirrored(LawByDerivatives):
+class Mirrored(SpringLaw):
     """A law reflected in the origin, tau(phi) = -law.tau(-phi)."""
 
     law: SpringLaw = field(kw_only=True)
@@ -91,6 +90,22 @@ class Mirrored(LawByDerivatives):
         """Return the energy, even in the deflection."""
         energy, state = self.law.energy_and_state(-phi)
         return energy, _mirrored_state(state)
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Return the torque, odd in the deflection."""
+        return -self.law.torque(-phi)
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Return the stiffness, even in the deflection."""
+        return self.law.stiffness(-phi)
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Return the slope, odd in the deflection."""
+        return -self.law.slope(-phi)
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Return the curvature, even in the deflection."""
+        return self.law.curvature(-phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy, even in the deflection."""
@@ -173,7 +188,7 @@ class QuadraticTwins(Pair):
 
 
 @dataclass(frozen=True)
-class Exponential(LawByDerivatives, Tendon):
+class Exponential(Tendon):
     """Tendon tau = c (exp(a phi) - 1) for phi >= 0, so that sigma = a (tau + c)."""
 
     c: float = number(units.TORQUE, "torque scale c", check=POSITIVE)
@@ -190,9 +205,25 @@ class Exponential(LawByDerivatives, Tendon):
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Return torque and stiffness, and the slope and curvature, each a times the one before."""
-        torque = self.c * np.expm1(self.a * phi)
+        torque = self.torque(phi)
         stiffness = self.a * (torque + self.c)
         return (torque, stiffness, self.a * stiffness, self.a**2 * stiffness)[: order + 1]
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """Return the torque c (exp(a phi) - 1)."""
+        return self.c * np.expm1(self.a * phi)
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """Return the stiffness a (tau + c)."""
+        return self.a * (self.torque(phi) + self.c)
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """Return the slope a sigma."""
+        return self.a * self.stiffness(phi)
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """Return the curvature a^2 sigma."""
+        return self.a**2 * self.stiffness(phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy tau/a - c phi."""
