@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.flags import MIN_MARGIN
+from vsacli.base.outputs import Outputs
+from vsacli.base.progress import ProgressBar
 from vsacli.base.texts import one_line
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import FIXABLE, result_line
@@ -17,14 +19,11 @@ from vsacli.documents.reading import format_changes
 from vsacli.files.info.result_info import stored_report
 from vsacli.results.pages import FixText, result_page, study_page
 from vsacli.results.store.excerpt import Excerpt
-from vsacli.results.store.reader import open_stored
+from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.results.store.study_table import StoredStudy
 
 if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs
-    from vsacli.base.progress import ProgressBar
     from vsacli.cli.figure_options import FigureTarget
-    from vsacli.results.store.reader import StoredResult
     from vsacli.studies.search import Fixes
 
 LONG_PAGE = 2_000_000
