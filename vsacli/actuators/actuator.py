@@ -64,12 +64,14 @@ class Actuator(SpringAssembly, ABC):
     that the kind chooses.
 
     Attributes:
+        motor: Motor of the joint, or motors 1 and 2; a declared field of each kind.
         motor_count: Number of motors of the joint, 1 or 2.
         commanded: Keys of the signals that a trajectory commands in addition to the motion of the joint.
         uncommanded: Reasons why a trajectory does not command other signals, by key; clauses.
         sprung: Whether springs lie between motors and link; otherwise the motor moves with the joint.
     """
 
+    motor: Motor | tuple[Motor, ...]
     motor_count: ClassVar[int] = 1
     commanded: ClassVar[tuple[str, ...]] = ()
     uncommanded: ClassVar[Mapping[str, str]] = {}
@@ -108,9 +110,10 @@ class Actuator(SpringAssembly, ABC):
         return None
 
     @cached_property
-    @abstractmethod
     def motors(self) -> tuple[JointMotor, ...]:
-        """Motors, on the joint side."""
+        """Motors, on the joint side of their gears."""
+        declared = self.motor if isinstance(self.motor, tuple) else (self.motor,)
+        return tuple(motor.at_joint for motor in declared)
 
     @property
     def coupled_rotors(self) -> float:

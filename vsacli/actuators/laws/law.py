@@ -142,14 +142,19 @@ class SpringRecord(DeclaredRecord):
     """A record about springs, which may come from tables."""
 
     @property
+    def parts(self) -> tuple[SpringRecord, ...]:
+        """Records about springs of which this one consists, each once; none if it is about one spring."""
+        return ()
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings to the user, as sentences, that the record deviates from the springs it describes."""
-        return ()
+        return tuple(warning for part in self.parts for warning in part.warnings)
 
     @property
     def sources(self) -> tuple[Source, ...]:
         """Files that the springs were read from."""
-        return ()
+        return tuple(source for part in self.parts for source in part.sources)
 
 
 @dataclass(frozen=True)
