@@ -159,7 +159,8 @@ class Batch:
         for variant, part in enumerate(block.divided(len(self.variants))):
             self._summarize(variant, part, [each.where(each.variant == variant) for each in between])
         self._samples += len(block.time) // len(self.variants)
-        return self._without_balances(block)
+        stored = {name: array for name, array in block.arrays().items() if name not in BALANCES}
+        return Block(**stored, motor_energy=self._energy.add(block))
 
     def _with_tools(self, block: Block) -> Block:
         """Return a block with the variables of the tools, if they are computed."""
@@ -190,11 +191,6 @@ class Batch:
             summary.add(block)
         for drift in self._drifts:
             drift.add(block)
-
-    def _without_balances(self, block: Block) -> Block:
-        """Return a block without the quantities of the self-check, and with the energy of its motors."""
-        stored = {name: array for name, array in block.arrays().items() if name not in BALANCES}
-        return Block(**stored, motor_energy=self._energy.add(block))
 
     @property
     def provenance(self) -> dict[str, str]:

@@ -203,7 +203,7 @@ class StoredResult(StoredFile):
                 name for name, variable in self.declared.items() if variable.dims and name in file
             )
             self.samples = self._samples()
-            self.report_json = self._json("report/json")
+            self.report_json = self._report()
         self._whole: set[str] = set()
 
     @property
@@ -291,10 +291,10 @@ class StoredResult(StoredFile):
             return not np.isnan(self.motor_constant(variable.requires)).all()
         return variable.requires in OF_ANY_ROBOT or variable.name in self.variables
 
-    def _json(self, name: str) -> dict[str, Any]:
-        content = json.loads(own_dataset(self._file, name).asstr()[()])
+    def _report(self) -> dict[str, Any]:
+        content = json.loads(own_dataset(self._file, "report/json").asstr()[()])
         if not isinstance(content, dict):
-            raise DamageError(f"{name} is no JSON object")
+            raise DamageError("report/json is no JSON object")
         return cast("dict[str, Any]", shown(content))
 
     def _samples(self) -> int:
