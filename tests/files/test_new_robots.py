@@ -23,10 +23,9 @@ from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.errors import InputError
 from vsacli.cli.new import new
 from vsacli.documents.fields import declared_fields
-from vsacli.files.data_sheets import SOURCES
 from vsacli.files.device_actuators import DEVICES
 from vsacli.files.examples import example_tables
-from vsacli.files.robot_template import robot_template
+from vsacli.files.robot_template import SOURCES, robot_template
 from vsacli.files.templates import trajectory_template
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import DenavitHartenberg, Joint, Limits, Link

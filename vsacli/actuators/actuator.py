@@ -12,20 +12,16 @@ from collections.abc import Hashable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple, Self
 
-import numpy as np
-
 from vsacli.actuators.elasticity import Components, Elasticity, ElasticState
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.motor import SHAFT, JointMotor, Motor
 from vsacli.actuators.reach import LimitCheck
-from vsacli.actuators.spring_elements import LeverSpring, SpringElement
+from vsacli.actuators.spring_elements import SpringAssembly, SpringElement
 from vsacli.actuators.transmission import Command, JointVariables
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag
 from vsacli.base.variables import MOTORS, SPRINGS, Variable
-from vsacli.documents.record_checks import DeclaredRecord
-from vsacli.documents.source import Source
 
 
 class PlaceholderConstants(NamedTuple):
@@ -60,7 +56,7 @@ class PlaceholderConstants(NamedTuple):
         )
 
 
-class Actuator(DeclaredRecord, ABC):
+class Actuator(SpringAssembly, ABC):
     """The drive of a joint: motors, and springs between them and the link.
 
     A kind is a frozen dataclass of declared fields that derives from this class, and a line in `ACTUATORS`.
@@ -68,12 +64,14 @@ class Actuator(DeclaredRecord, ABC):
     that the kind chooses.
 
     Attributes:
+        motor: Motor of the joint, or motors 1 and 2; a declared field of each kind.
         motor_count: Number of motors of the joint, 1 or 2.
         commanded: Keys of the signals that a trajectory commands in addition to the motion of the joint.
         uncommanded: Reasons why a trajectory does not command other signals, by key; clauses.
         sprung: Whether springs lie between motors and link; otherwise the motor moves with the joint.
     """
 
+    motor: Motor | tuple[Motor, ...]
     motor_count: ClassVar[int] = 1
     commanded: ClassVar[tuple[str, ...]] = ()
     uncommanded: ClassVar[Mapping[str, str]] = {}
@@ -112,9 +110,10 @@ class Actuator(DeclaredRecord, ABC):
         return None
 
     @cached_property
-    @abstractmethod
     def motors(self) -> tuple[JointMotor, ...]:
-        """Motors, on the joint side."""
+        """Motors, on the joint side of their gears."""
+        declared = self.motor if isinstance(self.motor, tuple) else (self.motor,)
+        return tuple(motor.at_joint for motor in declared)
 
     @property
     def coupled_rotors(self) -> float:
@@ -142,24 +141,9 @@ class Actuator(DeclaredRecord, ABC):
         return ((-math.inf, math.inf),) * self.motor_count
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings to the user about the springs, as sentences."""
-        return ()
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files that the springs were read from."""
-        return ()
-
-    @property
     def spring_elements(self) -> tuple[SpringElement, ...] | None:
         """Springs whose deflections are weighted sums of positions; None if there are others."""
         return None if self.sprung else ()
-
-    @property
-    def lever_spring(self) -> LeverSpring | None:
-        """Spring between a lever and a point of the link, if it is the only spring; else None."""
-        return None
 
     @cached_property
     def limits(self) -> tuple[LimitCheck, ...]:
@@ -232,17 +216,8 @@ class Actuator(DeclaredRecord, ABC):
         """
         raise NotImplementedError(f"{type(self).__name__} takes no stiffness")
 
-    @property
-    def opposite_branch(self) -> str | None:
-        """The other value of the branch field; None if there is no other branch."""
-        return None
-
     branch_field: ClassVar[str] = "branch"
     """Path to the branch field."""
-
-    def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """Return where the stiffness is attainable on another branch, (samples,)."""
-        return np.zeros(tau_e.shape, dtype=bool)
 
 
 def _bound_of(largest: float | None) -> float:

@@ -24,7 +24,6 @@ from vsacli.actuators.variable_stiffness import VariableStiffness
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import OneOf, PairOf, RecordOf, choice, value
-from vsacli.documents.source import Source
 
 
 @dataclass(frozen=True)
@@ -104,14 +103,9 @@ class Antagonistic(VariableStiffness):
         return self.coupling is None
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings of the springs, without repetition if one law serves both sides."""
-        return tuple(warning for law in self._distinct_springs for warning in law.warnings)
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files that the springs were read from."""
-        return tuple(source for law in self._distinct_springs for source in law.sources)
+    def parts(self) -> tuple[SpringLaw, ...]:
+        """The laws of the springs, once if one law serves both sides."""
+        return (*self.pair.distinct, *(() if self.coupling is None else (self.coupling,)))
 
     @property
     def spring_elements(self) -> tuple[SpringElement, ...]:
@@ -119,10 +113,6 @@ class Antagonistic(VariableStiffness):
         one, two = self.laws
         sides = (SpringElement(one, -1.0, (1.0, 0.0)), SpringElement(two, -1.0, (0.0, 1.0)))
         return sides if self.coupling is None else (*sides, SpringElement(self.coupling, 0.0, (1.0, -1.0)))
-
-    @property
-    def _distinct_springs(self) -> tuple[SpringLaw, ...]:
-        return (*self.pair.distinct, *(() if self.coupling is None else (self.coupling,)))
 
     def springs(self, unknowns: Components, _q: FloatArray) -> PairSprings:
         """Return both springs at their deflections, with the coupling at the difference."""

@@ -202,8 +202,7 @@ class DampedSprings:
             self._coordinate_rates(0 * stiffness, self._rates_at_constant_spread(stiffness))
         )
         divisor = 2 * stiffness * np.abs(curvature)
-        margin: FloatArray = springs.pivot * springs.pivot / np.where(divisor > 0, divisor, np.nan)
-        return margin
+        return springs.pivot * springs.pivot / np.where(divisor > 0, divisor, np.nan)
 
     def _rates_at_constant_spread(self, like: FloatArray) -> FloatArray:
         """Return motor velocities that leave the spread unchanged, (motors, samples)."""

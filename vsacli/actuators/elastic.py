@@ -14,7 +14,7 @@ from vsacli.actuators.actuator import Actuator, PlaceholderConstants
 from vsacli.actuators.elasticity import Components, Elasticity
 from vsacli.actuators.laws import LAWS, SpringLaw
 from vsacli.actuators.laws.law import PairSolution, SpringRows
-from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import LimitCheck, Reach
 from vsacli.actuators.single_springs import LinearRows, SingleSpring, SingleSprings
 from vsacli.actuators.spring_elements import SpringElement
@@ -25,7 +25,6 @@ from vsacli.base.errors import FieldProblem
 from vsacli.base.flags import Flag, has_flag
 from vsacli.documents.fields import POSITIVE, OneOf, RecordOf, number, value
 from vsacli.documents.record_checks import construct_unchecked
-from vsacli.documents.source import Source
 
 EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
 
@@ -76,11 +75,6 @@ class Elastic(Actuator):
         """Return one motor, which drives the joint alone, behind a linear spring."""
         return cls(motor=constants.only_motor, stiffness=constants.stiffness)
 
-    @cached_property
-    def motors(self) -> tuple[JointMotor, ...]:
-        """The one motor."""
-        return (self.motor.at_joint,)
-
     @property
     def max_deflections(self) -> tuple[float, ...]:
         """Largest deflection of the spring; none for a linear one."""
@@ -92,14 +86,9 @@ class Elastic(Actuator):
         return (self.law.domain,)
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings of the spring."""
-        return self.law.warnings
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files of the spring."""
-        return self.law.sources
+    def parts(self) -> tuple[SpringLaw, ...]:
+        """The law of the spring."""
+        return (self.law,)
 
     @property
     def spring_elements(self) -> tuple[SpringElement, ...]:

@@ -80,8 +80,7 @@ class LimitCheck(NamedTuple):
 
     def clearance(self, of_joint: OfJoint) -> FloatArray:
         """Return the distance to the nearer bound relative to the larger one; negative outside the range."""
-        clearance: FloatArray = self.outside(self.values(of_joint)) / -(self.largest or 1.0)
-        return clearance
+        return self.outside(self.values(of_joint)) / -(self.largest or 1.0)
 
     @property
     def tolerance(self) -> float:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator, PlaceholderConstants
-from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command, JointVariables, single_motor
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.documents.fields import RecordOf, value
@@ -34,11 +33,6 @@ class Rigid(Actuator):
     def placeholder(cls, constants: PlaceholderConstants) -> Self:
         """Return one motor, which drives the joint alone."""
         return cls(motor=constants.only_motor)
-
-    @cached_property
-    def motors(self) -> tuple[JointMotor, ...]:
-        """The one motor."""
-        return (self.motor.at_joint,)
 
     def transmit(
         self, command: Command, _min_margin: float, _prescribed: FloatArray | None

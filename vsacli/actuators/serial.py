@@ -25,7 +25,6 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.variables import Variable
 from vsacli.documents.fields import OneOf, PairOf, RecordOf, number, value
-from vsacli.documents.source import Source
 
 
 @dataclass(frozen=True)
@@ -100,14 +99,9 @@ class Serial(VariableStiffness):
         return self.mechanism.ranges
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings of the mechanism."""
-        return self.mechanism.warnings
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files of the mechanism."""
-        return self.mechanism.sources
+    def parts(self) -> tuple[Mechanism, ...]:
+        """The mechanism."""
+        return (self.mechanism,)
 
     @property
     def spring_elements(self) -> tuple[SpringElement, ...] | None:

@@ -92,8 +92,7 @@ class LinearRows:
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy of the spring."""
-        energy: FloatArray = phi * phi * (self._stiffness / 2)
-        return energy
+        return phi * phi * (self._stiffness / 2)
 
     def state(self, phi: FloatArray) -> SpringState:
         """Return the state of a spring of torque K phi."""

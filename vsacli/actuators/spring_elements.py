@@ -1,10 +1,13 @@
-"""Springs as elements of multibody simulators: deflection and torque of each spring."""
+"""Springs of a joint as a whole, and as elements of multibody simulators."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-from vsacli.actuators.laws.law import SpringLaw
+import numpy as np
+
+from vsacli.actuators.laws.law import SpringLaw, SpringRecord
+from vsacli.base.arrays import BoolArray, FloatArray
 
 
 class SpringElement(NamedTuple):
@@ -37,3 +40,26 @@ class LeverSpring(NamedTuple):
     arm: float
     stiffness: float
     lead: float
+
+
+class SpringAssembly(SpringRecord):
+    """The springs between the motors and the link of a joint: their elements, and branches of solutions."""
+
+    @property
+    def spring_elements(self) -> tuple[SpringElement, ...] | None:
+        """Springs whose deflections are weighted sums of positions; None if there are others."""
+        return None
+
+    @property
+    def lever_spring(self) -> LeverSpring | None:
+        """Spring between a lever and a point of the link, if it is the only spring; else None."""
+        return None
+
+    @property
+    def opposite_branch(self) -> str | None:
+        """The other value of the branch field; None if there is no other branch."""
+        return None
+
+    def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
+        """Return where the stiffness is attainable on another branch, (samples,)."""
+        return np.zeros(tau_e.shape, dtype=bool)

@@ -7,13 +7,12 @@ phi_1 and phi_2 of an antagonistic pair, deflection phi and setting theta_2 of a
 from __future__ import annotations
 
 from abc import abstractmethod
-from functools import cached_property
 
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.motor import JointMotor, Motor
+from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import deflections_within_reach
 from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import FloatArray
@@ -30,11 +29,6 @@ class VariableStiffness(Actuator):
     motor: tuple[Motor, Motor]
     motor_count = 2
     commanded = (STIFFNESS.key,)
-
-    @cached_property
-    def motors(self) -> tuple[JointMotor, ...]:
-        """Motors 1 and 2, on the joint side of their gears."""
-        return tuple(motor.at_joint for motor in self.motor)
 
     @abstractmethod
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:

@@ -102,7 +102,9 @@ class Batch:
             deflections=choose_deflections(deflection_solver, robot, trajectory),
             internal=damped_motions(robot, trajectory),
         )
-        self._ahead = trajectory.samples > self._block_samples and not _is_long(robot)
+        # where memory limits the blocks of a long chain, only one is computed at a time
+        is_long = usual_block(len(robot.joints)) < usual_block(1)
+        self._ahead = trajectory.samples > self._block_samples and not is_long
         busy = int(self._ahead)  # one thread updates the summaries while the others compute
         samples = kernel_samples or trajectory.samples * len(variants)
         self.choice = choose(engine, self._dynamics.kernel, samples, threads, tell, busy=busy)
@@ -157,7 +159,8 @@ class Batch:
         for variant, part in enumerate(block.divided(len(self.variants))):
             self._summarize(variant, part, [each.where(each.variant == variant) for each in between])
         self._samples += len(block.time) // len(self.variants)
-        return self._without_balances(block)
+        stored = {name: array for name, array in block.arrays().items() if name not in BALANCES}
+        return Block(**stored, motor_energy=self._energy.add(block))
 
     def _with_tools(self, block: Block) -> Block:
         """Return a block with the variables of the tools, if they are computed."""
@@ -188,11 +191,6 @@ class Batch:
             summary.add(block)
         for drift in self._drifts:
             drift.add(block)
-
-    def _without_balances(self, block: Block) -> Block:
-        """Return a block without the quantities of the self-check, and with the energy of its motors."""
-        stored = {name: array for name, array in block.arrays().items() if name not in BALANCES}
-        return Block(**stored, motor_energy=self._energy.add(block))
 
     @property
     def provenance(self) -> dict[str, str]:
@@ -264,11 +262,6 @@ def _mark_minima(between: Iterable[Minima], block: Block) -> None:
     """Set the flags of minima in those of the nearest samples."""
     for minima in between:
         minima.mark(block.flags)
-
-
-def _is_long(robot: Robot) -> bool:
-    """Return whether memory limits the blocks of a chain; then only one is computed at a time."""
-    return usual_block(len(robot.joints)) < usual_block(1)
 
 
 def _prepare_tools(robot: Robot, trajectory: Trajectory, asked: Collection[str]) -> ToolStiffness | None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from vsacli.actuators.friction import sign_of_motion
 from vsacli.actuators.motor import JointMotor
+from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Stored, named
 from vsacli.base.texts import counted
@@ -19,9 +20,6 @@ from vsacli.base.variables import Block
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from vsacli.analysis.run_dynamics import RunDynamics
 
 REACH = 3.0
 """Velocity, in widths, up to which smooth friction changes: tanh is within 0.5 % of its limit there."""

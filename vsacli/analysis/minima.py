@@ -296,8 +296,7 @@ class Brackets(NamedTuple):
         )
         before, after = (middle - left) * (at_right - at_middle), (right - middle) * (at_left - at_middle)
         shift = ((right - middle) * after - (middle - left) * before) / np.maximum(2 * (before + after), TINY)
-        lowest: FloatArray = np.clip(middle + shift, left, right)
-        return lowest
+        return np.clip(middle + shift, left, right)
 
     def where(self, chosen: BoolArray | IndexArray) -> Brackets:
         """Return a selection of the brackets."""

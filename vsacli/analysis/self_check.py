@@ -225,7 +225,8 @@ def ladder(run: RunDynamics) -> tuple[FloatArray, FloatArray]:
         Errors and bounds, (variants,) each.
     """
     dynamics = run.from_zero()
-    count = _number_of_times(len(run.robot.joints), len(run.variants))
+    joints = max(len(run.robot.joints), JOINTS_AT_ALL_TIMES)
+    count = max(FEWEST, PROBES * JOINTS_AT_ALL_TIMES // joints // len(run.variants))
     times, reach = np.stack(dynamics.by_trajectory(lambda each: each.check_points(count)), axis=-1)
     duration = np.array([each.duration for each in dynamics.trajectories])
     steps = np.minimum(reach / 3, duration / 500)
@@ -244,11 +245,6 @@ def ladder(run: RunDynamics) -> tuple[FloatArray, FloatArray]:
     errors = errors.reshape(bounds.shape)
     worst = np.argmax(errors / bounds, axis=0)
     return errors[worst, every], bounds[worst, every]
-
-
-def _number_of_times(joints: int, variants: int) -> int:
-    """Return the number of times to check for each variant."""
-    return max(FEWEST, PROBES * JOINTS_AT_ALL_TIMES // max(joints, JOINTS_AT_ALL_TIMES) // variants)
 
 
 def _derivative_errors(

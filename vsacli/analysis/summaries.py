@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 
 from vsacli.actuators.reach import margin, nearer_end
 from vsacli.analysis.dry_friction import dry_frictions
 from vsacli.analysis.joint_report import COUNTED, UNKNOWN, JointDrift, JointReport, JointUncertainty
-from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
+from vsacli.base.arrays import FlagArray, FloatArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag, has_flag
 from vsacli.base.variables import MOTORS, VARIABLES, Block
 from vsacli.dynamics.energy import JointEnergy
@@ -163,7 +162,8 @@ class JointSummary:
         outside = (gap < -SINGULAR_MARGIN) & ~has_flag(flags, Flag.NOT_FINITE)
         for kind, bits in REACH.items():
             hit = has_flag(flags, bits) & (outside if kind == "infeasible" else ~outside)
-            for step in _worst_step(hit, -gap):
+            if hit.any():
+                step = int(np.where(hit, -gap, -np.inf).argmax())
                 value, lower, upper = (
                     float(getattr(block, name)[step, self._index])
                     for name in ("stiffness", "stiffness_min", "stiffness_max")
@@ -245,9 +245,3 @@ def _motors_at(block: Block, step: int, joint: int) -> tuple[FloatArray, FloatAr
 def _motor_pair(values: FloatArray) -> tuple[float, float]:
     first, second = values.tolist()
     return first, second
-
-
-def _worst_step(hit: BoolArray, badness: FloatArray) -> Iterator[int]:
-    """Yield the sample with the largest badness among those hit, if there is one."""
-    if hit.any():
-        yield int(np.where(hit, badness, -np.inf).argmax())

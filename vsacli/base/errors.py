@@ -5,12 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import NamedTuple, Self
 
 from vsacli.base.texts import one_line
-
-if TYPE_CHECKING:
-    from vsacli.base.units import Quantity
+from vsacli.base.units import Quantity
 
 
 class VsacliError(Exception):

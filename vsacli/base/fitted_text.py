@@ -100,7 +100,11 @@ def _broken(line: str, width: int) -> list[str]:
     if len(line) <= width:
         return [line]
     if COMMAND.match(line):
-        *parts, last = _wrapped(QUOTED.sub(_unbroken, line), _indent(line, width), width - len(CONTINUED))
+        *parts, last = _wrapped(
+            QUOTED.sub(lambda found: found[0].replace(" ", HARD_BLANK), line),
+            _indent(line, width),
+            width - len(CONTINUED),
+        )
         return [*(part + CONTINUED for part in parts), last]
     return _wrapped(TOGETHER.sub(HARD_BLANK, line), _indent(line, width), width)
 
@@ -115,10 +119,6 @@ def _wrapped(line: str, indent: str, width: int) -> list[str]:
         break_on_hyphens=False,
     )
     return [part.replace(HARD_BLANK, " ") for part in parts]
-
-
-def _unbroken(quoted: re.Match[str]) -> str:
-    return quoted[0].replace(" ", HARD_BLANK)
 
 
 def _indent(line: str, width: int) -> str:

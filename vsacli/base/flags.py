@@ -129,8 +129,7 @@ def marked(flag: SampleFlag, where: BoolArray) -> FlagArray:
 
 def finite(arrays: Iterable[FloatArray]) -> BoolArray:
     """Return where all arrays, which have one shape, are finite."""
-    whole: BoolArray = reduce(and_, map(np.isfinite, arrays))
-    return whole
+    return reduce(and_, map(np.isfinite, arrays))
 
 
 def not_finite_flags(where: BoolArray) -> FlagArray:

@@ -74,8 +74,7 @@ def json_value(content: Any) -> Any:
 
 
 def _shape_of(cls: Any) -> Shape:
-    shape: Shape = cls.shape or named(*(field.name for field in dataclasses.fields(cls)))
-    return shape
+    return cls.shape or named(*(field.name for field in dataclasses.fields(cls)))
 
 
 @cache

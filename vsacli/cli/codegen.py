@@ -10,7 +10,7 @@ import click
 from vsacli.base.errors import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.cli.command_parts import example, overwrite_option, read_robot, robot_argument
-from vsacli.cli.console import Exit, Talk, talk_options
+from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FOLDER
 from vsacli.cli.input_errors import naming_option
 from vsacli.cli.option_types import Words
@@ -92,7 +92,7 @@ def codegen(
     no_loops: bool,
     overwrite: bool,
     talk: Talk,
-) -> int:
+) -> None:
     """Generate C code of ROBOT: link torques, inverse dynamics, feedback linearization, and the plant.
 
     The code is C99 and requires only math.h: no memory allocation, no state between calls, a bounded number
@@ -115,4 +115,3 @@ def codegen(
         talk.note(reason)
     for warning in project.warnings:
         talk.note(f"warning: {warning}")
-    return Exit.OK

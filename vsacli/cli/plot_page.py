@@ -9,22 +9,21 @@ from typing import TYPE_CHECKING
 
 from vsacli.base.errors import InputError, StorageError
 from vsacli.base.flags import MIN_MARGIN
+from vsacli.base.outputs import Outputs
+from vsacli.base.progress import ProgressBar
 from vsacli.base.texts import one_line
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import FIXABLE, result_line
 from vsacli.cli.console import Talk
 from vsacli.documents.reading import format_changes
-from vsacli.files.stored_reports import stored_report
+from vsacli.files.info.result_info import stored_report
 from vsacli.results.pages import FixText, result_page, study_page
 from vsacli.results.store.excerpt import Excerpt
-from vsacli.results.store.reader import open_stored
+from vsacli.results.store.reader import StoredResult, open_stored
 from vsacli.results.store.study_table import StoredStudy
 
 if TYPE_CHECKING:
-    from vsacli.base.outputs import Outputs
-    from vsacli.base.progress import ProgressBar
     from vsacli.cli.figure_options import FigureTarget
-    from vsacli.results.store.reader import StoredResult
     from vsacli.studies.search import Fixes
 
 LONG_PAGE = 2_000_000
@@ -81,7 +80,10 @@ def _fix(result: StoredResult, talk: Talk) -> FixText | None:
 
     try:
         provenance = result.provenance()
-        _check_version(provenance["generated_by"], result.path)
+        made_by, this = provenance["generated_by"], f"vsacli {__version__}"
+        if made_by != this:  # which may have interpreted the same inputs differently
+            reason = f"was computed by {made_by}, and this is {this}"
+            raise InputError.one(f"{reason}; check-feasibility --fixes looks for them", result.path)
         min_margin = provenance["options"].get("min_margin", MIN_MARGIN)
         found = fixes(*rebuilt(result), min_margin)
     except (InputError, StorageError) as error:
@@ -93,18 +95,6 @@ def _fix(result: StoredResult, talk: Talk) -> FixText | None:
         return FixText(lines, "")
     announced, command = _command(result, found)
     return FixText([*lines, announced], command)
-
-
-def _check_version(made_by: str, path: Path) -> None:
-    """Refuse a result of another version, which may have interpreted the same inputs differently.
-
-    Raises:
-        InputError: the result was computed by another version.
-    """
-    if made_by != (this := f"vsacli {__version__}"):
-        raise InputError.one(
-            f"was computed by {made_by}, and this is {this}; check-feasibility --fixes looks for them", path
-        )
 
 
 def _command(result: StoredResult, found: Fixes) -> tuple[str, str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from vsacli.base.errors import InputError
 from vsacli.cli.command_parts import read_robot
@@ -13,16 +12,12 @@ from vsacli.cli.drawings import RECORDING
 from vsacli.documents.source import is_table
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.files.recordings.fit_curves import recorded_curves, table_profiles
-from vsacli.results.plots import recorded_figure
-from vsacli.results.store.excerpt import WHOLE
+from vsacli.results.plots import FigureFiles, recorded_figure
+from vsacli.results.plots.figures import Figures
+from vsacli.results.store.excerpt import WHOLE, Span
+from vsacli.robot.model import Robot
 from vsacli.trajectory.file import load_trajectory
-
-if TYPE_CHECKING:
-    from vsacli.results.plots import FigureFiles
-    from vsacli.results.plots.figures import Figures
-    from vsacli.results.store.excerpt import Span
-    from vsacli.robot.model import Robot
-    from vsacli.trajectory.recorded.samples import SampledProfile
+from vsacli.trajectory.recorded.samples import SampledProfile
 
 
 def draw_recording(

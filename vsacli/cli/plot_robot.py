@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from vsacli.base.outputs import Staged
 from vsacli.cli.console import Talk
 from vsacli.files.info import render
 from vsacli.files.info.robot_info import describe_robot, load_sizes, static_load
@@ -13,15 +13,10 @@ from vsacli.results.charts.arm_chart import arm_chart
 from vsacli.results.charts.robot_charts import actuator_charts
 from vsacli.results.pages import robot_page
 from vsacli.results.pages.document import source_text
-from vsacli.results.plots import actuators_figure, arm_figure, stiffness_figure
-from vsacli.results.plots.figures import rendered_figure
+from vsacli.results.plots import FigureFiles, actuators_figure, arm_figure, stiffness_figure
+from vsacli.results.plots.figures import Figures, rendered_figure
 from vsacli.robot.file import load_robot
-
-if TYPE_CHECKING:
-    from vsacli.base.outputs import Staged
-    from vsacli.results.plots import FigureFiles
-    from vsacli.results.plots.figures import Figures
-    from vsacli.robot.model import Robot
+from vsacli.robot.model import Robot
 
 ARM, ACTUATORS, STIFFNESS = "arm", "actuators", "stiffness"
 """Names of the figures, whose files are called `<stem>-<name>`."""

@@ -241,9 +241,9 @@ def simulate(
             from vsacli.cli.drawings import draw_staged
 
             draw_staged(file, drawn, talk)
-    code = _show(report, as_json)
+    say(report, as_json)
     talk.wrote(outputs)
-    return code
+    return Exit.OK if report.verdict == "ok" else Exit.VERDICT
 
 
 def _figures(robot: Robot, target: FigureTarget, stem: str, outputs: Outputs) -> FigureFiles:
@@ -371,8 +371,3 @@ def _run(run: SimulationRun, talk: Talk, writer: SimulationWriter) -> Simulation
 def _computed_by(engine: str, compiler: str, **_further: str) -> str:
     """Return a clause about the backend that evaluated the equations of motion."""
     return f"C code computed, compiled by {compiler}" if engine == "c" else "NumPy and Python computed"
-
-
-def _show(report: SimulationReport, as_json: bool) -> Exit:
-    say(report, as_json)
-    return Exit.OK if report.verdict == "ok" else Exit.VERDICT

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
-
-if TYPE_CHECKING:
-    from vsacli.documents.source import Source
+from vsacli.documents.source import Source
 
 
 class Integral(NamedTuple):

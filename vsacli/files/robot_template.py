@@ -19,7 +19,6 @@ from vsacli.documents.commented import commented_document, three_digits
 from vsacli.documents.number import BOOLEANS
 from vsacli.documents.record_values import PathIndex
 from vsacli.documents.source import Problems
-from vsacli.files.data_sheets import SOURCES
 from vsacli.files.device_actuators import DEVICES, OF_DEVICE
 from vsacli.files.examples import example_tables, examples
 from vsacli.robot import file as robot_file
@@ -43,6 +42,34 @@ ROBOT_HEAD = (
     "commented out is optional and shown with its default. Numbers are SI; expressions such as pi/2 and",
     "90 deg may be written.",
 )
+
+
+_SPRING = "Data sheet: torque over deflection, to which the coefficients are fitted"
+
+SOURCES = {
+    "DenavitHartenberg.a": "From the drawing or CAD",
+    "Link.mass": "From CAD, or weighed",
+    "Link.com": "From CAD, in this frame",
+    "Link.inertia": "From CAD, about the center of mass",
+    "Joint.damping": "0, or measured: identify finds it",
+    "Motor.inertia": "Data sheet of the motor: rotor inertia, with side: shaft",
+    "Motor.damping": "Data sheet: torque constant * no-load current / no-load speed",
+    "Motor.max_torque": "Data sheet: peak torque of motor or gear, the smaller one",
+    "Motor.max_velocity": "Data sheet: maximum speed; 1 rpm is pi/30 rad/s",
+    "Motor.gear_ratio": "Data sheet of the gear: reduction",
+    "Motor.torque_constant": "Data sheet, or 30/pi divided by the speed constant in rpm/V",
+    "Motor.resistance": "Data sheet: terminal resistance",
+    "Motor.max_current": "Data sheet: peak current of motor or driver, the smaller one",
+    "Motor.max_voltage": "Data sheet of the driver: supply voltage",
+    "Antagonistic.spring": _SPRING,
+    "Elastic.stiffness": "Data sheet of spring, gear or torque sensor: torsional stiffness",
+    "Elastic.spring": _SPRING,
+    "Serial.mechanism": "Lengths from the drawing, stiffness from the data sheet of its springs",
+    "Limits.position": "From the drawing: mechanical stops",
+    "Limits.velocity": "Data sheet of the motor: maximum speed over gear_ratio",
+    "Limits.stiffness": "Data sheet of the actuator: stiffness range",
+}
+"""Source of the value of a field, by `Class.field`."""
 
 
 class LinkSizes(NamedTuple):

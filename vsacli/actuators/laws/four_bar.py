@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from vsacli.actuators.laws.inversion import FirstGuess, deflection_at_torque, with_sign_of
-from vsacli.actuators.laws.law import SpringLaw, SpringState
+from vsacli.actuators.laws.law import LawByDerivatives, SpringState
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import POSITIVE, Check, number
@@ -29,7 +29,7 @@ GUESS_NODES = 20
 
 
 @dataclass(frozen=True)
-class FourBar(SpringLaw):
+class FourBar(LawByDerivatives):
     """Linear spring behind a four-bar linkage: U = k beta^2/2, beta = asin(C sin(phi/2)) - phi/2, C > 1.
 
     The form of the VSA-II, Schiavi, Grioli, Sen & Bicchi, ICRA 2008. Its domain ends where the linkage is
@@ -61,22 +61,6 @@ class FourBar(SpringLaw):
         """Return energy and all derivatives, which share the angles."""
         beta = self._angle(phi, 4)
         return self.k / 2 * beta[0] * beta[0], SpringState(*_energy_derivatives(self.k, beta))
-
-    def torque(self, phi: FloatArray) -> FloatArray:
-        """Return the torque k beta beta'."""
-        return self.derivatives(phi, 0)[0]
-
-    def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Return the stiffness k (beta'^2 + beta beta'')."""
-        return self.derivatives(phi, 1)[1]
-
-    def slope(self, phi: FloatArray) -> FloatArray:
-        """Return the slope k (3 beta' beta'' + beta beta''')."""
-        return self.derivatives(phi, 2)[2]
-
-    def curvature(self, phi: FloatArray) -> FloatArray:
-        """Return the curvature k (3 beta''^2 + 4 beta' beta''' + beta beta'''')."""
-        return self.derivatives(phi, 3)[3]
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy k beta^2/2."""
@@ -131,7 +115,11 @@ class FourBar(SpringLaw):
 
 
 def _energy_derivatives(k: float, beta: list[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return the derivatives of k beta^2/2 from beta and its derivatives, one fewer than these."""
+    """Return the derivatives of k beta^2/2 from beta and its derivatives, one fewer than these.
+
+    They are k beta beta', k (beta'^2 + beta beta''), k (3 beta' beta'' + beta beta''') and
+    k (3 beta''^2 + 4 beta' beta''' + beta beta'''').
+    """
     k_beta, k_rate = k * beta[0], k * beta[1]
     derivatives = [k_beta * beta[1]]
     if len(beta) > 2:

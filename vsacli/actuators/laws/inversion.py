@@ -78,8 +78,7 @@ def _halley_step(
 
 def _converges(torque: FloatArray, error: FloatArray) -> BoolArray:
     """Return whether one more step converges to rounding, from the error of the torque."""
-    converges: BoolArray = np.abs(error) <= HALLEY_RTOL * np.abs(torque)
-    return converges
+    return np.abs(error) <= HALLEY_RTOL * np.abs(torque)
 
 
 def _halley_in_bracket(

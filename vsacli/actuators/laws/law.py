@@ -138,8 +138,27 @@ def same_number(number: float, other: float) -> bool:
     return number is other or number == other
 
 
+class SpringRecord(DeclaredRecord):
+    """A record about springs, which may come from tables."""
+
+    @property
+    def parts(self) -> tuple[SpringRecord, ...]:
+        """Records about springs of which this one consists, each once; none if it is about one spring."""
+        return ()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings to the user, as sentences, that the record deviates from the springs it describes."""
+        return tuple(warning for part in self.parts for warning in part.warnings)
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """Files that the springs were read from."""
+        return tuple(source for part in self.parts for source in part.sources)
+
+
 @dataclass(frozen=True)
-class SpringLaw(DeclaredRecord, ABC):
+class SpringLaw(SpringRecord, ABC):
     """A torque tau(phi) of a transmission: zero at zero, strictly increasing, hardening away from zero.
 
     So sigma > 0 on the domain, and zeta has the sign of phi. The methods take and return arrays of any one
@@ -182,16 +201,6 @@ class SpringLaw(DeclaredRecord, ABC):
     def pulls_only(self) -> bool:
         """Whether the spring is a tendon, which goes slack at zero deflection instead of pushing."""
         return False
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings, as sentences, that the law deviates from the spring it describes."""
-        return ()
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files that the law was read from."""
-        return ()
 
     @property
     def is_linear(self) -> bool:
@@ -256,6 +265,31 @@ class SpringLaw(DeclaredRecord, ABC):
     @abstractmethod
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Return the deflection phi with tau(phi) = torque, the inverse of `torque`."""
+
+
+@dataclass(frozen=True)
+class LawByDerivatives(SpringLaw):
+    """A law whose torque, stiffness, slope and curvature share work, and are stated together."""
+
+    @abstractmethod
+    def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
+        """See `SpringLaw.derivatives`."""
+
+    def torque(self, phi: FloatArray) -> FloatArray:
+        """See `SpringLaw.torque`."""
+        return self.derivatives(phi, 0)[0]
+
+    def stiffness(self, phi: FloatArray) -> FloatArray:
+        """See `SpringLaw.stiffness`."""
+        return self.derivatives(phi, 1)[1]
+
+    def slope(self, phi: FloatArray) -> FloatArray:
+        """See `SpringLaw.slope`."""
+        return self.derivatives(phi, 2)[2]
+
+    def curvature(self, phi: FloatArray) -> FloatArray:
+        """See `SpringLaw.curvature`."""
+        return self.derivatives(phi, 3)[3]
 
 
 def spring_state(law: SpringLaw, phi: FloatArray) -> SpringState:

@@ -7,14 +7,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from vsacli.actuators.laws.law import Pair, PairSolution, SpringLaw, same_number
+from vsacli.actuators.laws.law import LawByDerivatives, Pair, PairSolution, SpringLaw, same_number
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.documents.fields import POSITIVE, number
 
 
 @dataclass(frozen=True)
-class Sinh(SpringLaw):
+class Sinh(LawByDerivatives):
     """Spring tau = k sinh(a phi) of qbmove and VSA-CubeBot; qbmove Advanced manual (April 2021), 3.2.2."""
 
     k: float = number(units.TORQUE, "torque scale k", check=POSITIVE)
@@ -34,22 +34,6 @@ class Sinh(SpringLaw):
         torque = np.copysign(half * (1 + shrunk), phi)
         stiffness = self.a * (self.k + half * (1 - shrunk))
         return (torque, stiffness, self.a**2 * torque, self.a**2 * stiffness)[: order + 1]
-
-    def torque(self, phi: FloatArray) -> FloatArray:
-        """Return the torque k sinh(a phi)."""
-        return self.derivatives(phi, 0)[0]
-
-    def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Return the stiffness k a cosh(a phi)."""
-        return self.derivatives(phi, 1)[1]
-
-    def slope(self, phi: FloatArray) -> FloatArray:
-        """Return the slope a^2 tau."""
-        return self.a**2 * self.torque(phi)
-
-    def curvature(self, phi: FloatArray) -> FloatArray:
-        """Return the curvature a^2 sigma."""
-        return self.a**2 * self.stiffness(phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy k (cosh(a phi) - 1)/a, without cancellation near zero."""

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 from vsacli.actuators.laws.inversion import FirstGuess, deflection_at_torque
-from vsacli.actuators.laws.law import SpringLaw, SpringState
+from vsacli.actuators.laws.law import LawByDerivatives, SpringLaw, SpringState
 from vsacli.actuators.laws.spline_curve import SplineCurve, spline_curve, spline_knots, times_deflection
 from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.base.arrays import FloatArray
@@ -74,7 +74,7 @@ stay below the second, while a kink in 20 to 120 points causes 1 to 6 %."""
 
 
 @dataclass(frozen=True)
-class MeasuredSpring(SpringLaw):
+class MeasuredSpring(LawByDerivatives):
     """Torques measured over deflections, fitted by a smooth hardening curve, without extrapolation.
 
     A table that begins at zero deflection describes a tendon.
@@ -141,22 +141,6 @@ class MeasuredSpring(SpringLaw):
     def state(self, phi: FloatArray) -> SpringState:
         """Return the state of the fitted curve, as a subroutine of compiled code."""
         return SpringState(*subroutine(lambda phi: self.derivatives(phi, 3), (phi,)))
-
-    def torque(self, phi: FloatArray) -> FloatArray:
-        """Return the torque of the fitted curve."""
-        return self._curve(phi, 1, 1)[0]
-
-    def stiffness(self, phi: FloatArray) -> FloatArray:
-        """Return the stiffness of the fitted curve."""
-        return self.derivatives(phi, 1)[1]
-
-    def slope(self, phi: FloatArray) -> FloatArray:
-        """Return the slope of the fitted curve."""
-        return self.derivatives(phi, 2)[2]
-
-    def curvature(self, phi: FloatArray) -> FloatArray:
-        """Return the curvature of the fitted curve."""
-        return self.derivatives(phi, 3)[3]
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy of the fitted curve."""

@@ -12,10 +12,8 @@ import numpy as np
 
 from vsacli.actuators.elasticity import Components, ElasticState, MotorMatrix
 from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.spring_elements import LeverSpring, SpringElement
-from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.documents.record_checks import DeclaredRecord
-from vsacli.documents.source import Source
+from vsacli.actuators.spring_elements import SpringAssembly
+from vsacli.base.arrays import FloatArray
 
 SMALL_DEFLECTION = 1e-3
 """Deflection, rad (m), whose torque is large compared with rounding. The load of motor 1 passes through zero,
@@ -132,7 +130,7 @@ Range: TypeAlias = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Mechanism(DeclaredRecord, ABC):
+class Mechanism(SpringAssembly, ABC):
     """Springs between motor 1 and the link that motor 2 adjusts; a frozen dataclass of declared fields.
 
     Equal mechanisms must compute the same. If the potential depends only on phi = theta_1 - q and the setting
@@ -176,26 +174,6 @@ class Mechanism(DeclaredRecord, ABC):
         """Return the coordinates bounded by `ranges`: phi and the setting, unless overridden."""
         return phi, s
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings, as sentences, that the mechanism deviates from the device it describes."""
-        return ()
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files that the mechanism was read from."""
-        return ()
-
-    @property
-    def spring_elements(self) -> tuple[SpringElement, ...] | None:
-        """See `Actuator.spring_elements`."""
-        return None
-
-    @property
-    def lever_spring(self) -> LeverSpring | None:
-        """See `Actuator.lever_spring`."""
-        return None
-
     @abstractmethod
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """Return the attainable range of the stiffness at an elastic torque, and phi, s for the demanded one.
@@ -209,15 +187,6 @@ class Mechanism(DeclaredRecord, ABC):
             A solution with phi as phi_1 and theta_2 as phi_2, for the stiffness clipped to the range. An end
             is critical where A is singular; the maximum of the torque and the ends of ranges are not.
         """
-
-    @property
-    def opposite_branch(self) -> str | None:
-        """The other value of the field `branch`; None if there is no other branch."""
-        return None
-
-    def other_branch(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> BoolArray:  # noqa: ARG002
-        """Return where the stiffness is attainable on the other branch of the mechanism, (samples,)."""
-        return np.zeros(tau_e.shape, dtype=bool)
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
         """Return the potential and its derivatives at deflections and settings, arrays of one shape."""

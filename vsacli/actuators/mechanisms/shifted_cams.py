@@ -18,7 +18,6 @@ from vsacli.actuators.spring_elements import SpringElement
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import OneOf, PairOf, choice, value
-from vsacli.documents.source import Source
 
 
 @dataclass(frozen=True)
@@ -78,14 +77,9 @@ class ShiftedCams(Mechanism):
         return phi + s, phi - s
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings of the cams, without repetition if one law serves both."""
-        return tuple(warning for law in self._cams.distinct for warning in law.warnings)
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files of the cams."""
-        return tuple(source for law in self._cams.distinct for source in law.sources)
+    def parts(self) -> tuple[SpringLaw, ...]:
+        """The laws of the cams, once if one law serves both."""
+        return self._cams.distinct
 
     @property
     def spring_elements(self) -> tuple[SpringElement, ...]:

@@ -93,13 +93,12 @@ class _Box(NamedTuple):
 
     def contains(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
         """Return whether deflections lie in the box, its outer sides excluded."""
-        inside: BoolArray = (
+        return (
             (self.inner_1 <= phi_1)
             & (phi_1 < self.outer_1)
             & (self.outer_2 < phi_2)
             & (phi_2 <= self.inner_2)
         )
-        return inside
 
     def confine(
         self, phi_1: FloatArray, phi_2: FloatArray, target_1: FloatArray, target_2: FloatArray

@@ -154,7 +154,7 @@ def _joint_function(robot: Robot, _frame: WrenchFrame | None, index: int) -> Fun
         name="actuation",
         meaning="Motion and torques of the motors of a joint; returns its flags.",
         arguments=arguments,
-        result=_of_one(drive_structure(robot, "drive")),
+        result=_of_one(drive_structure(robot)),
         compute=compute,
     )
 

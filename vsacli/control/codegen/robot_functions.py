@@ -181,7 +181,7 @@ def inverse_dynamics_function(robot: Robot, frame: WrenchFrame | None = None) ->
             + (" Between calls integrate internal_phi by dinternal_phi." if inside else "")
         ),
         arguments=arguments,
-        result=drive_structure(robot, "drive", further),
+        result=drive_structure(robot, further),
         compute=compute,
     )
 
@@ -193,11 +193,11 @@ def drive_rows(values: Mapping[str, Any], computed: Mapping[str, Sequence[Scalar
     return [*rows, *map(margin, *corridor), *computed["flags"]]
 
 
-def drive_structure(robot: Robot, name: str, further: tuple[Array, ...] = ()) -> Structure:
+def drive_structure(robot: Robot, further: tuple[Array, ...] = ()) -> Structure:
     """Return the structure of motions and torques of the motors, with the attainable range."""
     gap = "relative distance of the stiffness to the nearer end of the attainable range, negative outside it"
     return Structure(
-        name,
+        "drive",
         "What the motors have to do; NaN where a flag says it cannot be.",
         (
             *_arrays(robot, DRIVE_NAMES),

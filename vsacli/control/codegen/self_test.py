@@ -114,7 +114,8 @@ class ReferenceResults:
     def comparison(self, function: Function, name: str) -> ArrayComparison:
         """Return the rule by which the self-test compares an array of a function's results."""
         values = self.results(function)[name]
-        bound = BOUND * self._largest_stiffness if name == BOUNDED else np.inf
+        largest = float(np.nanmax(self._inputs["command"]["stiffness"]))
+        bound = BOUND * largest if name == BOUNDED else np.inf
         scale = float(np.abs(np.minimum(values, bound)[np.isfinite(values)]).max(initial=0.0))
         bits = next(array.bits for array in function.result.arrays if array.name == name)
         return ArrayComparison(0.0 if bits else scale, scale if name == BOUNDED else np.inf)
@@ -127,10 +128,6 @@ class ReferenceResults:
             for member in structure.arrays
         ]
         return np.concatenate(entries, axis=1)
-
-    @property
-    def _largest_stiffness(self) -> float:
-        return float(np.nanmax(self._inputs["command"]["stiffness"]))
 
     def _drawn(self, scale: float) -> FloatArray:
         return self._rng.uniform(-scale, scale, (CASES, len(self._robot.joints)))

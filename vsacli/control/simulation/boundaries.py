@@ -62,8 +62,7 @@ class Singularity(Boundary):
 
     def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return det A as a share of its initial value, minus `NEARLY_SINGULAR`."""
-        shares: FloatArray = self._determinant(q, theta) / self._first_value - NEARLY_SINGULAR
-        return shares
+        return self._determinant(q, theta) / self._first_value - NEARLY_SINGULAR
 
     def _determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         return self._plant.drivetrain.determinant(q, theta)[..., self.joints]

@@ -32,8 +32,7 @@ def difference_jacobian(function: Derivative, time: float, vector: FloatArray) -
 
 def rounding(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the effect of a rounded state on a function, (values,), by its Jacobian, (values, entries)."""
-    changes: FloatArray = _EPSILON * (np.abs(matrix) @ np.maximum(np.abs(vector), 1.0))
-    return changes
+    return _EPSILON * (np.abs(matrix) @ np.maximum(np.abs(vector), 1.0))
 
 
 def resolved_tolerances(matrix: FloatArray, vector: FloatArray, rtol: float) -> FloatArray:

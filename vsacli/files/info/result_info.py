@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from vsacli.base.tables import aligned
+from vsacli.analysis.report import Report
+from vsacli.base.tables import ReportText, aligned
 from vsacli.base.texts import counted
 from vsacli.base.units import Quantity
 from vsacli.documents.reading import format_changes
-from vsacli.files.stored_reports import stored_report
 from vsacli.results.store.reader import StoredResult
 from vsacli.robot.model import END_EFFECTOR
 
@@ -91,3 +91,20 @@ def _left(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         yield "   ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+
+
+def stored_report(kind: str, content: Mapping[str, Any]) -> ReportText:
+    """Return the report as printed by the command that made the file.
+
+    Args:
+        kind: kind of the file, "result" or "simulation".
+        content: report as JSON, of any version.
+    """
+    from vsacli.control.simulation.simulation_report import SimulationReport
+
+    try:
+        if kind == "simulation":
+            return SimulationReport.from_json(content).as_text()
+        return Report.from_json(content).as_text()
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError):
+        return ReportText("its report has another form than this version writes; --json shows it")

@@ -11,7 +11,7 @@ from vsacli.base.tables import aligned
 from vsacli.base.texts import counted, together, warnings_and_notes
 from vsacli.base.units import DAMPING, DIMENSIONLESS, POSITION, STIFFNESS, TORQUE, Quantity
 from vsacli.documents.fields import Field, declared_fields, variant_inside
-from vsacli.files.info.numbers_in_text import row, short, span
+from vsacli.files.info.text import row, short, span
 
 Values = Mapping[str, Any]
 """Values of a record by field, as in JSON."""

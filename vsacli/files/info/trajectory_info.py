@@ -17,7 +17,7 @@ from vsacli.base.tables import aligned
 from vsacli.base.texts import counted, for_yaml, warnings_and_notes
 from vsacli.base.units import POSITION
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
-from vsacli.files.info.numbers_in_text import range_text, short
+from vsacli.files.info.text import range_text, short
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.robot.file import load_robot
 from vsacli.trajectory.file import load_trajectory

@@ -15,7 +15,7 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.base.texts import counted, one_line
-from vsacli.results.charts.chart import PANEL_WIDTH, Chart, PanelGrid, Sheet
+from vsacli.results.charts.chart import PANEL_WIDTH, Chart, PanelGrid, Row, Sheet
 from vsacli.results.charts.figures import (
     axis_label,
     drawable_variables,
@@ -133,11 +133,18 @@ def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
     there = there[:, : int(np.count_nonzero(np.any(there, axis=0)))]
     signals = charts.signals({compared.variable: "computed"}, uncertain=False)
     differences = charts.differences(compared.variable)
-    rows: list[list[Chart | None]] = []
+    rows: list[Row] = []
     for joint, of_joint in enumerate(there):
-        there_in = [column if has_it else None for column, has_it in enumerate(of_joint)]
-        rows.append([_over(charts, compared, signals, joint, column) for column in there_in])
-        rows.append([_apart(charts, compared, signals, differences, joint, column) for column in there_in])
+        panels = (
+            (
+                _over(charts, compared, signals, joint, column),
+                _apart(charts, compared, signals, differences, joint, column),
+            )
+            if has_it
+            else (None, None)
+            for column, has_it in enumerate(of_joint)
+        )
+        rows += zip(*panels, strict=True)
     time = np.sort(np.concatenate([file.time[[0, -1]] for file in charts.files]))
     block = PanelGrid(time, rows, HEIGHTS, MOST_ROWS)
     size = (max(2, block.columns) * PANEL_WIDTH, block.height + 1.2)
@@ -148,10 +155,8 @@ def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
 
 
 def _over(
-    charts: StoredCharts, compared: _Compared, signals: StoredSignals, joint: int, column: int | None
-) -> Chart | None:
-    if column is None:
-        return None
+    charts: StoredCharts, compared: _Compared, signals: StoredSignals, joint: int, column: int
+) -> Chart:
     first, motors = charts.first, "motor" in charts.first.declared[compared.variable].dims
     chart = charts.chart(compared.variable, signals, column, [joint], "file")
     return replace(
@@ -169,10 +174,8 @@ def _apart(
     signals: StoredSignals,
     differences: StoredSignals,
     joint: int,
-    column: int | None,
-) -> Chart | None:
-    if column is None:
-        return None
+    column: int,
+) -> Chart:
     lines = differences.lines(column, [joint], "file")
     unit = charts.first.declared[compared.variable].quantity.unit(charts.first.joint_types[joint])
     rms = [line.rms for line in lines if line.rms is not None]

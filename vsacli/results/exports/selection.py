@@ -77,8 +77,7 @@ class Chosen:
 
     def of_columns(self, values: FloatArray | FlagArray) -> npt.NDArray[Any]:
         """Return the existing columns, (columns, samples), of values (samples, ...)."""
-        flat: npt.NDArray[Any] = values.reshape(len(values), -1).T[self.there.ravel()]
-        return flat
+        return values.reshape(len(values), -1).T[self.there.ravel()]
 
     def places(self, labels: Labels) -> list[str]:
         """Return names of the rows of `there`: the variable at each joint, or the columns of the wrench."""
@@ -252,14 +251,10 @@ def _stored_rate(result: StoredResult) -> float:
     error = np.abs(time - (time[0] + step * np.arange(result.samples)))
     if error.max() > STEP_TOLERANCE * step:
         place = f"near t = {time_text(float(time[error.argmax()]))}"
+        rate = float(f"{1 / step:.3g}")
         message = (
-            f"the stored times are not equally spaced ({place}); set rate: {_round(1 / step):g} in the"
+            f"the stored times are not equally spaced ({place}); set rate: {rate:g} in the"
             f" trajectory file and run {result.command} again, or export without --rate"
         )
         raise InputError.one(message, result.path)
     return 1 / step
-
-
-def _round(rate: float) -> float:
-    """Round a rate to three digits, for a proposal."""
-    return float(f"{rate:.3g}")

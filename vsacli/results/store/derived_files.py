@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 
 from vsacli.base import file_formats
-from vsacli.base.arrays import AnyArray, FloatArray
+from vsacli.base.arrays import AnyArray
 from vsacli.base.outputs import Staged
 from vsacli.base.simulation_variables import MEASURED, SIMULATION_VARIABLES, measured
-from vsacli.base.variables import MOTORS, Block
+from vsacli.base.variables import MOTORS
 from vsacli.results.store.layout import attach_scales, create_labels
 from vsacli.results.store.new_file import ChunkFiller, chunk_rows
 from vsacli.results.store.writer import ResultWriter
@@ -60,21 +60,6 @@ class ParameterValue(NamedTuple):
     path: str
     value: float
     unit: str
-
-
-class Sloped(Protocol):
-    """Consecutive samples with derivatives."""
-
-    @property
-    def time(self) -> FloatArray:
-        """Times, (samples,), s."""
-
-    @property
-    def block(self) -> Block:
-        """Variables at these samples."""
-
-    def over_time(self, name: str) -> FloatArray:
-        """Return derivatives of a variable, (samples, parameters, joints[, 2])."""
 
 
 class SensitivityWriter(ResultWriter):
@@ -130,7 +115,7 @@ class SensitivityWriter(ResultWriter):
         return dataset
 
     def _values(self, block: Any, name: str) -> AnyArray:
-        """Return the values of a `Sloped` block for a dataset."""
+        """Return the values of a block, or of its derivatives, for a dataset."""
         variable = name.removesuffix(_SLOPE)
         return super()._values(block.block, name) if variable == name else block.over_time(variable)
 

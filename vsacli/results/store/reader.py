@@ -203,7 +203,7 @@ class StoredResult(StoredFile):
                 name for name, variable in self.declared.items() if variable.dims and name in file
             )
             self.samples = self._samples()
-            self.report_json = self._json("report/json")
+            self.report_json = self._report()
         self._whole: set[str] = set()
 
     @property
@@ -291,10 +291,10 @@ class StoredResult(StoredFile):
             return not np.isnan(self.motor_constant(variable.requires)).all()
         return variable.requires in OF_ANY_ROBOT or variable.name in self.variables
 
-    def _json(self, name: str) -> dict[str, Any]:
-        content = json.loads(own_dataset(self._file, name).asstr()[()])
+    def _report(self) -> dict[str, Any]:
+        content = json.loads(own_dataset(self._file, "report/json").asstr()[()])
         if not isinstance(content, dict):
-            raise DamageError(f"{name} is no JSON object")
+            raise DamageError("report/json is no JSON object")
         return cast("dict[str, Any]", shown(content))
 
     def _samples(self) -> int:
@@ -342,8 +342,7 @@ class StoredResult(StoredFile):
         variable = self.declared[name]
         with np.errstate(over="ignore"):
             stored = split_axes(values, variable, self.labels).astype(storage_type(variable, self.precision))
-        read: FloatArray | FlagArray = stored.astype(storage_type(variable))
-        return read
+        return stored.astype(storage_type(variable))
 
     def _check_layout(self, name: str) -> None:
         """Refuse a variable whose shape or type does not fit the file, so that it can be read in parts."""

@@ -10,10 +10,9 @@ from vsacli.documents import tree
 from vsacli.documents.plausibility import ValuesInFile, implausible_measurements, implausible_values
 from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.documents.source import Source
-from vsacli.robot.plausibility.bodies import BODY_RULES, WHOLE_ROBOT_RULES
+from vsacli.robot.plausibility.bodies import BODY_RULES, WHOLE_ROBOT_RULES, impossible_links
 from vsacli.robot.plausibility.checked_robot import CheckedRobot
 from vsacli.robot.plausibility.drives import DRIVE_RULES, RULES_OF_MOTORS_AND_SPRINGS
-from vsacli.robot.plausibility.links import impossible_links
 from vsacli.robot.plausibility.springs import SPRING_RULES
 
 SUBTREE_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES, *RULES_OF_MOTORS_AND_SPRINGS)

@@ -119,12 +119,9 @@ def _joints_on_links(joints: Sequence[MovingJoint]) -> dict[int, list[int]]:
 
 def tidy(numbers: FloatArray, scale: float) -> FloatArray:
     """Return numbers, replaced by short ones from which they differ by rounding; `scale` is the largest."""
-    short = np.round(numbers, SHORT_DECIMALS - _exponent(scale))
+    exponent = math.ceil(math.log10(scale)) if scale > 0 else 0
+    short = np.round(numbers, SHORT_DECIMALS - exponent)
     return np.where(abs(numbers - short) <= FILE_ROUNDING * scale, short, numbers) + 0.0  # no negative zero
-
-
-def _exponent(scale: float) -> int:
-    return math.ceil(math.log10(scale)) if scale > 0 else 0
 
 
 def tidy_angle(angle: float) -> float:
@@ -187,11 +184,6 @@ def _common_normal_feet(first: Axis, second: Axis) -> tuple[float, float]:
     )
 
 
-def _axis_of(frame: FloatArray) -> Axis:
-    """Return the z axis of a frame."""
-    return Axis(frame[:3, 3], frame[:3, 2])
-
-
 def _seat_on_axis(carrying: FloatArray | None, axis: Axis, is_near: bool) -> FloatArray:
     """Return the frame at which the row of a joint begins: on its axis, where the frames before suggest.
 
@@ -215,7 +207,7 @@ def _frame_facing(frame: FloatArray, axis: Axis) -> FloatArray:
 
 def _next_frame(frame: FloatArray, axis: Axis) -> FloatArray:
     """Return the frame on an axis, at the common normal with the z axis of the frame before."""
-    before = _axis_of(frame)
+    before = Axis(frame[:3, 3], frame[:3, 2])
     normal = np.cross(before.direction, axis.direction)
     if np.linalg.norm(normal) <= FILE_ROUNDING:
         return _parallel_frame(frame, axis)
@@ -262,8 +254,7 @@ def _last_frame(frame: FloatArray, tip: FloatArray) -> FloatArray:
 def _perpendicular_part(vector: FloatArray, axis: FloatArray) -> FloatArray:
     """Return the unit vector along the component of a vector normal to an axis."""
     part = vector - (vector @ axis) * axis
-    result: FloatArray = part / np.linalg.norm(part)
-    return result
+    return part / np.linalg.norm(part)
 
 
 def _frame_from_axes(z: FloatArray, x: FloatArray, origin: FloatArray) -> FloatArray:

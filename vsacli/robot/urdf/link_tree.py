@@ -92,8 +92,7 @@ def weld_bodies(bodies: list[RigidBody]) -> RigidBody:
 
 def _parallel_axis_inertia(mass: float, arm: FloatArray) -> FloatArray:
     cross = cross_matrix(arm)
-    result: FloatArray = -mass * cross @ cross
-    return result
+    return -mass * cross @ cross
 
 
 ROTATING = ("revolute", "continuous")

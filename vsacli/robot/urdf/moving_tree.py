@@ -195,8 +195,7 @@ class MovingJoint:
     @property
     def direction(self) -> FloatArray:
         """Unit vector along the joint axis, (3,)."""
-        result: FloatArray = self.frame[:3, :3] @ self.urdf.axis
-        return result
+        return self.frame[:3, :3] @ self.urdf.axis
 
 
 class Tip(NamedTuple):
@@ -290,12 +289,23 @@ def moving_tree(
                 carriers[joint.parent],
                 to_base @ poses[joint.child],
                 links,
-                _rigid_body_of(links, poses, to_base),
+                weld_bodies(
+                    [
+                        link.body.in_outer_frame(to_base @ poses[link.name])
+                        for link in links
+                        if link.body is not None
+                    ]
+                ),
             )
             for joint, links in zip(moving.joints, carried, strict=True)
         ),
         tips=tuple(
-            Tip(link, carriers[link], to_base @ poses[link], _ends_beyond(urdf, moving, link))
+            Tip(
+                link,
+                carriers[link],
+                to_base @ poses[link],
+                tuple(fixed_ends(urdf, link)) if moving.whole else (),
+            )
             for link in moving.tips
         ),
         held_below=tuple(held[: len(below_base)]),
@@ -303,11 +313,6 @@ def moving_tree(
         immobile=tuple(joint for joint in beside if moving.whole and joint.type not in MOVING),
         followers=tuple(joint for joint in side if follow[joint.name]),
     )
-
-
-def _ends_beyond(urdf: Urdf, moving: MovingJoints, tip: str) -> tuple[str, ...]:
-    """Return links that could be the tool instead of a tip that was not chosen."""
-    return tuple(fixed_ends(urdf, tip)) if moving.whole else ()
 
 
 def _check_joints(
@@ -384,11 +389,3 @@ def _side_joints(urdf: Urdf, carriers: Mapping[str, int], moving: MovingJoints) 
         for joint in urdf.joints.values()
         if not joint.is_fixed and joint.name not in moving.names and carriers.get(joint.child, -2) >= nearest
     ]
-
-
-def _rigid_body_of(
-    links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray
-) -> RigidBody:
-    return weld_bodies(
-        [link.body.in_outer_frame(to_base @ poses[link.name]) for link in links if link.body is not None]
-    )

@@ -313,7 +313,7 @@ class _Reader:
 
     def _bound(self, element: Element, name: str) -> float:
         """Return a limit, clipped; files write infinite or very large ones for no limit."""
-        return max(-LARGEST_NUMBER, min(LARGEST_NUMBER, self._float(element, name, 0.0, math.inf)))
+        return max(-LARGEST_NUMBER, min(LARGEST_NUMBER, self._number(element, name, 0.0, math.inf)))
 
     def _origin(self, element: Element) -> FloatArray:
         origin = self._child(element, "origin")
@@ -354,16 +354,15 @@ class _Reader:
             return [0.0] * (length - 1) + [float(length == 4)]
         return numbers
 
-    def _number(self, element: Element, name: str, default: float | None = None) -> float:
-        return self._float(element, name, default, LARGEST_NUMBER)
-
     def _non_negative(self, element: Element, name: str, default: float | None = None) -> float:
         number = self._number(element, name, default)
         if number < 0:
             self._problems.add(element.line, f"{element.tag}: must be zero or positive, not {number:g}")
         return abs(number)
 
-    def _float(self, element: Element, name: str, default: float | None, largest: float) -> float:
+    def _number(
+        self, element: Element, name: str, default: float | None = None, largest: float = LARGEST_NUMBER
+    ) -> float:
         if name in element.attributes:
             return self._parse_number(element, name, element.attributes[name], largest)
         if default is None:

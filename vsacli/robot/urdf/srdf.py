@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
@@ -106,7 +106,11 @@ class _Groups:
         group = self._groups[name]
         if name in around:
             self._problems.fail(group.line, f"the group {quoted(name)} contains itself")
-        joints = [self._joint(element) for element in group.children_with_tag("joint")]
+        named = [
+            self._check_name(element, "name", "joint", self._urdf.joints)
+            for element in group.children_with_tag("joint")
+        ]
+        joints = [self._urdf.joints[joint] for joint in named]
         for element in group.children_with_tag("link"):
             joints += self._urdf.joints_above(self._link(element, "name"))[-1:]
         for element in group.children_with_tag("chain"):
@@ -119,19 +123,16 @@ class _Groups:
             by_name |= self._joints(inner, (*around, name))
         return by_name
 
-    def _joint(self, element: Element) -> UrdfJoint:
-        name = element.attributes.get("name", "")
-        if name not in self._urdf.joints:
-            near = did_you_mean(name, self._urdf.joints)
-            self._problems.fail(element.line, f"{self._urdf.file} has no joint {quoted(name)}{near}")
-        return self._urdf.joints[name]
+    def _check_name(self, element: Element, attribute: str, kind: str, names: Collection[str]) -> str:
+        """Return the name of a link or joint of the robot in an attribute of an element."""
+        name = element.attributes.get(attribute, "")
+        if name not in names:
+            near = did_you_mean(name, names)
+            self._problems.fail(element.line, f"{self._urdf.file} has no {kind} {quoted(name)}{near}")
+        return name
 
     def _link(self, element: Element, attribute: str) -> str:
-        name = element.attributes.get(attribute, "")
-        if name not in self._urdf.links:
-            near = did_you_mean(name, self._urdf.links)
-            self._problems.fail(element.line, f"{self._urdf.file} has no link {quoted(name)}{near}")
-        return name
+        return self._check_name(element, attribute, "link", self._urdf.links)
 
     def _chain(self, element: Element) -> list[UrdfJoint]:
         base, tip = self._link(element, "base_link"), self._link(element, "tip_link")

@@ -373,11 +373,9 @@ class ContinuedBranch:
         return point
 
     def _is_solved(self, point: LevelPoint, demand: FloatArray, tau_e: FloatArray) -> BoolArray:
-        solved: BoolArray = (np.abs(tau_e - point.tau_e) <= RESIDUAL * point.steepness) & (
+        return (np.abs(tau_e - point.tau_e) <= RESIDUAL * point.steepness) & (
             np.abs(demand - point.stiffness) <= RESIDUAL * (self.start.stiffness + demand)
         )
-        return solved
 
     def _is_critical(self, point: LevelPoint) -> BoolArray:
-        critical: BoolArray = np.abs(point.sine) / 10 <= LEAST_SINE
-        return critical
+        return np.abs(point.sine) / 10 <= LEAST_SINE

@@ -104,18 +104,16 @@ def map_branch(
         k: Stiffness of the spring, N/m.
         pretension: Smallest and largest, m.
     """
-    sides = _CamSide(lift, domain[1], k, pretension), _CamSide(_mirror_lift(lift), -domain[0], k, pretension)
+    sides = (
+        _CamSide(lift, domain[1], k, pretension),
+        _CamSide(lambda phi: lift(-phi).mirrored(), -domain[0], k, pretension),
+    )
     symmetric = domain[0] == -domain[1] and all(map(np.array_equal, *(side.lift_at_nodes for side in sides)))
     above = sides[0].nodes()
     below = above if symmetric else sides[1].nodes()
     parts = below.mirrored().cells(), above.cells()
     cells = TorqueCells(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
     return CamBranch(cells, (-sides[1].largest_torque, sides[0].largest_torque))
-
-
-def _mirror_lift(lift: LiftOf) -> LiftOf:
-    """Return the lift of the mirrored cam."""
-    return lambda phi: lift(-phi).mirrored()
 
 
 class _Nodes(NamedTuple):

@@ -10,35 +10,23 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from vsacli.actuators.laws.law import PairSolution, SpringState
+from vsacli.actuators.laws.law import PairSolution, SpringRecord, SpringState
 from vsacli.actuators.mechanisms.mechanism import Mechanism, Partials
 from vsacli.actuators.mechanisms.ratios.scales import ScaleDerivatives
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import NON_ZERO, POSITIVE, interval, number
-from vsacli.documents.record_checks import DeclaredRecord
-from vsacli.documents.source import Source
 
 
 @dataclass(frozen=True)
-class Sine(DeclaredRecord):
+class Sine(SpringRecord):
     """A softening torque tau = (k/ratio) sin(ratio phi), up to its maximum at ratio phi = pi/2."""
 
     k: float = number(units.STIFFNESS, "stiffness at rest", check=POSITIVE)
     ratio: float = number(
         units.DIMENSIONLESS, "angle of the sine over the deflection", check=POSITIVE, default=2.0
     )
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """None."""
-        return ()
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """None."""
-        return ()
 
     @property
     def domain(self) -> tuple[float, float]:

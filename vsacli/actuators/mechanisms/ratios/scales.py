@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
+from vsacli.actuators.laws.law import SpringRecord
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.lazy import LazyRegistry
 from vsacli.compute.control_flow import Values, look_up, repeat
 from vsacli.compute.rounding import OfRounding
 from vsacli.documents.fields import NON_ZERO, TablePath, number, value
-from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.source import Source
 from vsacli.documents.table import CsvTable
 
@@ -81,13 +81,8 @@ class ScaleDerivatives(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ScaleLaw(DeclaredRecord, ABC):
+class ScaleLaw(SpringRecord, ABC):
     """K(s) of a variable ratio, a frozen dataclass of declared fields."""
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files that it was read from."""
-        return ()
 
     @abstractmethod
     def at(self, s: FloatArray) -> ScaleDerivatives:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws import LAWS, SpringLaw
-from vsacli.actuators.laws.law import PairSolution
+from vsacli.actuators.laws.law import PairSolution, SpringRecord
 from vsacli.actuators.mechanisms.mechanism import Mechanism, Partials
 from vsacli.actuators.mechanisms.ratios.ratio import Sine, ratio_partials
 from vsacli.actuators.mechanisms.ratios.scales import SCALES, ScaleLaw, increasing_root
@@ -21,7 +21,6 @@ from vsacli.base.errors import FieldProblem
 from vsacli.base.lazy import LazyRegistry
 from vsacli.compute.control_flow import Values
 from vsacli.documents.fields import OneOf, interval, value
-from vsacli.documents.source import Source
 
 TORQUES = LazyRegistry({**LAWS.homes, "sine": "vsacli.actuators.mechanisms.ratios.ratio:Sine"})
 """Torques by their name in a robot file: the spring laws, and one that softens."""
@@ -93,14 +92,9 @@ class VariableRatio(Mechanism):
         }
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings of the torque."""
-        return self.torque.warnings
-
-    @property
-    def sources(self) -> tuple[Source, ...]:
-        """Files of scale and torque."""
-        return (*self.scale.sources, *self.torque.sources)
+    def parts(self) -> tuple[SpringRecord, ...]:
+        """Scale and torque."""
+        return (self.scale, self.torque)
 
     @property
     def deflection_range(self) -> tuple[float, float]:
