@@ -17,10 +17,9 @@ from subjects import ROBOTS, TRAJECTORIES
 from timing import Seconds, cpu_seconds, medians
 
 from vsacli import load_robot, load_trajectory, optimize
-from vsacli.base.arrays import evenly
+from vsacli.base.arrays import evenly, trapezoidal
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, checked_range
-from vsacli.studies.search.criteria import trapezoidal
 from vsacli.studies.search.loads import joint_loads, periods, rests
 from vsacli.studies.search.splines import SplineSpace
 from vsacli.trajectory.trajectory import Trajectory

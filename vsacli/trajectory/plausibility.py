@@ -128,8 +128,7 @@ class CheckedTrajectory:
         assert self.motion_of_robot is not None, "of motions by a formula"
         position = self.motion_of_robot[0, list(subtree.numbers_in_robot)]
         usual = [1.0 if joint.is_revolute else subtree.sizes.extent or math.nan for joint in subtree.joints]
-        velocities: FloatArray = np.abs(np.diff(position)).sum(axis=1) / usual / self.duration
-        return velocities
+        return np.asarray(np.abs(np.diff(position)).sum(axis=1) / usual / self.duration)
 
     @property
     def duration(self) -> float:

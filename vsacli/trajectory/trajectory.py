@@ -18,7 +18,7 @@ from vsacli.base.wrench import WRENCH_AXES, Wrench, WrenchFrame
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.profile import ContinuousProfile, Profile, WrenchProfile
+from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times
 
 if TYPE_CHECKING:
@@ -42,6 +42,9 @@ class Trajectory:
         name: name for reports and for the result file.
         sources: files that the trajectory was read from.
     """
+
+    _of_functions = False
+    """Whether samples are values of smooth functions, like those at any other time."""
 
     def __init__(
         self,
@@ -202,8 +205,7 @@ class Trajectory:
         """Return the mask, (joints,), of the joints that the signal with this key commands."""
         if key not in self.commanded:
             return np.zeros(self.joints, dtype=bool)
-        chosen: BoolArray = ~np.isnan(self.block(0, 1).commanded[key][0])
-        return chosen
+        return np.asarray(~np.isnan(self.block(0, 1).commanded[key][0]))
 
     def commanding(self, signal: Signal, value: tuple[float, ...], note: str) -> Trajectory:
         """Return the trajectory with a constant as a further signal; NaN for joints it does not command."""
@@ -232,6 +234,8 @@ class Trajectory:
     def block(self, start: int, stop: int) -> Motion:
         """Return the motion at samples start..stop-1; like a slice, clipped at the last sample."""
         time = self.times.block(start, stop)
+        if self._of_functions:
+            return self.at(time)
         return self._motion(time, lambda profile: profile.samples(start, stop, time - self.start))
 
     def at(self, time: ArrayLike) -> Motion:
@@ -302,7 +306,9 @@ class Trajectory:
 
     def sampled(self, times: Times) -> Trajectory:
         """Return the same functions at other sample times, from the first time on and not beyond the last."""
-        return self._derived(lambda _, profile: ContinuousProfile(profile), times)
+        derived = self._derived(lambda _, profile: profile, times)
+        derived._of_functions = True
+        return derived
 
     def from_zero(self) -> Trajectory:
         """Return the trajectory with time zero at its first sample, where times are rounded least."""
@@ -318,7 +324,7 @@ class Trajectory:
     @property
     def known_between(self) -> bool:
         """Whether `at` agrees with the samples; False if derivatives are given there alone."""
-        return all(profile.known_between for _, profile in self.profiles())
+        return self._of_functions or all(profile.known_between for _, profile in self.profiles())
 
     @property
     def breakpoints(self) -> FloatArray:

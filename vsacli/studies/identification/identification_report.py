@@ -11,7 +11,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText, headline
+from vsacli.base.tables import ReportText, TextReport, headline
 from vsacli.base.texts import counted
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.source import Source
@@ -75,7 +75,7 @@ class Torques:
 
 
 @dataclass(frozen=True)
-class Identification(Published):
+class Identification(Published, TextReport):
     """Parameters of a robot identified from recordings of its motion.
 
     Attributes:
@@ -110,9 +110,6 @@ class Identification(Published):
     def numbers(self) -> tuple[Number, ...]:
         """Results for the parameters of all systems."""
         return tuple(number for system in self.systems for number in system.numbers)
-
-    def __str__(self) -> str:
-        return str(self.as_text())
 
     @property
     def title(self) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText, cell
+from vsacli.base.tables import ReportText, TextReport, cell
 from vsacli.documents.source import Source
 
 Still: TypeAlias = Literal["computed", "measured"]
@@ -90,7 +90,7 @@ SHOWN_LAG = 5e-4
 
 
 @dataclass(frozen=True)
-class Comparison(Published):
+class Comparison(Published, TextReport):
     """The comparison of measurements with a result.
 
     Attributes:
@@ -125,9 +125,6 @@ class Comparison(Published):
         **{name: name for name in ("found", "duration", "compared")},
         **{name: name for name in ("signals", "warnings", "notes")},
     }
-
-    def __str__(self) -> str:
-        return str(self.as_text())
 
     @property
     def title(self) -> str:

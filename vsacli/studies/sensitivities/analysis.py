@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.analysis.tool_report import unjudged_tools_text
-from vsacli.base.arrays import FLAG_TYPE, FloatArray
+from vsacli.base.arrays import FLAG_TYPE, FloatArray, trapezoidal
 from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.base.units import TORQUE
 from vsacli.robot.model import Robot
@@ -70,7 +70,7 @@ class Effects:
         """
         shape = (len(steps), joints)
         self._steps = steps
-        self._weights = _trapezoidal_weights(times)
+        self._weights = trapezoidal(times)
         self._done = 0
         self.peak = np.zeros(joints)
         self.largest, self.time, self.spent = np.zeros((3, *shape))
@@ -124,13 +124,6 @@ class Effects:
         self.largest[at, joint] = found[larger]
         self.time[at, joint] = time[worst[larger] % len(time)]
         self.motor[at, joint] = 1 + worst[larger] // len(time)
-
-
-def _trapezoidal_weights(times: FloatArray) -> FloatArray:
-    """Return the weights of the trapezoidal rule over times, (samples,) in s."""
-    halves = np.diff(times) / 2
-    weights: FloatArray = np.append(halves, 0.0) + np.append(0.0, halves)
-    return weights
 
 
 def sensitivity(

@@ -73,8 +73,7 @@ class Reversals:
     def uncertain(self, speed: FloatArray, deviation: FloatArray) -> BoolArray:
         """Return a mask of joints with a motor of uncertain direction, (samples, joints); see `variance`."""
         near = (deviation > 0) & (np.abs(speed) < NEAR * deviation)
-        found: BoolArray = np.any(near & (self._forward + self._backward > 0), axis=-1)
-        return found
+        return np.asarray(np.any(near & (self._forward + self._backward > 0), axis=-1))
 
 
 @dataclass(frozen=True)

@@ -189,8 +189,7 @@ class Derivatives:
     @property
     def time(self) -> FloatArray:
         """Times of the samples, (samples,) in s."""
-        time: FloatArray = self.block.time
-        return time
+        return np.asarray(self.block.time)
 
     @property
     def margin(self) -> FloatArray:

@@ -289,8 +289,7 @@ def _torques_of_robots(
 
 def _failed_joints(block: Block) -> BoolArray:
     """Return a mask of joints with an infeasible or singular sample, (joints,)."""
-    failed: BoolArray = np.any(has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR), axis=0)
-    return failed
+    return np.asarray(np.any(has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR), axis=0))
 
 
 def _run_torques(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:

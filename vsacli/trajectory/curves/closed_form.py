@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -31,6 +31,11 @@ class ClosedForm(ABC):
     signal: Signal
     span: tuple[float, float]
 
+    warnings: ClassVar[tuple[str, ...]] = ()
+    notes: ClassVar[tuple[str, ...]] = ()
+    known_between: ClassVar[bool] = True
+    estimate: ClassVar[None] = None
+
     def __post_init__(self) -> None:
         first, last = self.span
         if not SHORTEST <= last - first <= LONGEST:
@@ -43,24 +48,9 @@ class ClosedForm(ABC):
         """Number of components: one per joint, or six of a wrench."""
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """No warnings, since a formula leaves nothing uncertain."""
-        return ()
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """No notes, since nothing is interpreted."""
-        return ()
-
-    @property
     def breakpoints(self) -> FloatArray:
         """Ends of the span."""
         return np.array(self.span)
-
-    @property
-    def known_between(self) -> bool:
-        """True, since samples are evaluated like any other time."""
-        return True
 
     @abstractmethod
     def at(self, time: FloatArray) -> FloatArray:
@@ -69,11 +59,6 @@ class ClosedForm(ABC):
     def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
         """Return the same at samples, whose times are `time`."""
         return self.at(time)
-
-    @property
-    def estimate(self) -> None:
-        """None, since no value comes from a fit."""
-        return None
 
     def stretched(self, factor: float) -> Self:
         """Return the profile slowed down by a factor."""

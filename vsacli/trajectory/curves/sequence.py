@@ -124,8 +124,7 @@ class _Standalone(Formula, SequencePart):
     @property
     def begins(self) -> Position:
         """Position at the start."""
-        start: Position = tuple(self.profile_over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
-        return start
+        return tuple(self.profile_over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
 
     def placed(self, span: tuple[float, float], _start_position: Position) -> ClosedForm:
         """See `SequencePart.placed`."""

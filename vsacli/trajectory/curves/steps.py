@@ -120,8 +120,7 @@ class PiecewiseProfile(ClosedForm):
 
 def _peak_magnitudes(profile: ClosedForm) -> FloatArray:
     """Return the largest magnitude of each order and component, (orders, components)."""
-    peaks: FloatArray = np.abs(profile.at(np.linspace(*profile.span, PROBES))).max(axis=2)
-    return peaks
+    return np.asarray(np.abs(profile.at(np.linspace(*profile.span, PROBES))).max(axis=2))
 
 
 def profile_of_levels(

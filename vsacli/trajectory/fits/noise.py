@@ -79,8 +79,7 @@ def filtered_noise(time: FloatArray, rows: FloatArray, order: int) -> BoolArray:
     sizes = np.array([_typical(time, rows, order, stride) for stride in _strides(len(time), order)])
     least = ABOVE_FLOOR * np.maximum(sizes[0], ROUNDING * np.abs(rows).max(axis=1))
     between = (sizes > least) & (sizes < sizes.max(axis=0) / BELOW_MOTION)
-    found: BoolArray = np.any(between[:-1] & (sizes[1:] < SLOW_GROWTH * sizes[:-1]), axis=0)
-    return found
+    return np.asarray(np.any(between[:-1] & (sizes[1:] < SLOW_GROWTH * sizes[:-1]), axis=0))
 
 
 def typical_noise(time: FloatArray, rows: FloatArray, order: int) -> FloatArray:

@@ -263,8 +263,7 @@ class ExcitationFamily:
 
 def _range_share(numbers: FloatArray) -> FloatArray:
     """Return the used share of the allowed range, (joints,), which is 1 for a parameter of zero."""
-    share: FloatArray = np.exp(-np.abs(numbers[:, -2]) / 2)
-    return share
+    return np.exp(-np.abs(numbers[:, -2]) / 2)
 
 
 def _placed(
@@ -334,8 +333,7 @@ def feasible(design: ExcitationFamily, numbers: FloatArray) -> Member | None:
 
 def least_clearances(design: ExcitationFamily, block: Block) -> FloatArray:
     """Return the smallest relative distance of each `watched` quantity from its bounds."""
-    least: FloatArray = clearances(watched(design), block).min(axis=1, initial=np.inf)
-    return least
+    return np.asarray(clearances(watched(design), block).min(axis=1, initial=np.inf))
 
 
 def watched(design: ExcitationFamily) -> list[Bounded]:
