@@ -17,7 +17,8 @@ from subjects import ROBOTS, TRAJECTORIES
 from timing import Seconds, cpu_seconds, medians
 
 from vsacli import load_robot, load_trajectory, optimize
-from vsacli.base.arrays import evenly, trapezoidal
+from vsacli.base.arrays import evenly
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, checked_range
 from vsacli.studies.search.loads import joint_loads, periods, rests

@@ -75,12 +75,6 @@ def checked_shape(name: str, array: ArrayLike, *shape: int) -> FloatArray:
     return values
 
 
-def trapezoidal(time: FloatArray) -> FloatArray:
-    """Return the weights of the trapezoidal rule, (samples,) in s."""
-    halves = np.diff(time) / 2
-    return np.asarray(np.append(halves, 0.0) + np.append(0.0, halves))
-
-
 def evenly(length: int, count: int) -> IndexArray:
     """Return at most `count` evenly spaced indices of `length`, both ends included."""
     return np.linspace(0, length - 1, min(length, count)).round().astype(np.intp)

@@ -157,21 +157,15 @@ def replace_all(
     scope = Scope(Problems(file), members or {}, exempt or {})
     with suppress(InputError):
         return _Replacements(scope).in_record(record, [_NewValue.of(*each) for each in values.items()], ())
-    return _replace_in_turn(record, values, members, exempt, file)
+    return _replace_in_turn(record, values, scope)
 
 
-def _replace_in_turn(
-    record: _Record,
-    values: Mapping[str, Any],
-    members: Mapping[str, str] | None,
-    exempt: Mapping[str, Mapping[str, str]] | None,
-    file: str,
-) -> _Record:
+def _replace_in_turn(record: _Record, values: Mapping[str, Any], scope: Scope) -> _Record:
     refused: dict[str, Any] = {}
     first = None
     for path, value in values.items():
         try:
-            record = replace(record, path, value, members, exempt, file)
+            record = _Replacements(scope).in_record(record, [_NewValue.of(path, value)], ())
         except InputError as error:
             first = first or ReplacementError(error.problems, path)
             refused[path] = value
@@ -179,7 +173,7 @@ def _replace_in_turn(
         return record
     if len(refused) == len(values):
         raise first
-    return _replace_in_turn(record, refused, members, exempt, file)
+    return _replace_in_turn(record, refused, scope)
 
 
 def _node_of_value(value: Any) -> tree.Node:

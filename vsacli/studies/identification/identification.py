@@ -40,14 +40,15 @@ from vsacli.studies.identification.identification_report import (
     Identification,
     system_report,
     torque_comparisons,
+    torque_deviations,
 )
-from vsacli.studies.identification.identification_text import rounded_by_error
-from vsacli.studies.identification.identified_values import (
+from vsacli.studies.identification.identification_text import (
     Number,
     RecordReport,
     Residual,
     SystemReport,
     far_from_file,
+    rounded_by_error,
 )
 from vsacli.studies.identification.link_equations import link_system, without_links
 from vsacli.studies.identification.motor_equations import (
@@ -76,7 +77,6 @@ from vsacli.studies.identification.recordings import (
     complete_joints,
     read_motor_recording,
 )
-from vsacli.studies.identification.torque_deviations import torque_deviations
 
 WORDS = (*GROUPS, LINKS)
 """Names of the groups of parameters."""

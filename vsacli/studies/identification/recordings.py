@@ -17,15 +17,16 @@ from vsacli.base.variables import MOTORS
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.recorded_columns import (
+from vsacli.studies.identification.recording_faults import (
     MOTOR,
     POSITION,
     TORQUE,
     RecordedColumn,
     Where,
     recorded_columns,
+    stopping_faults,
+    unreliable_fit_sentences,
 )
-from vsacli.studies.identification.recording_faults import stopping_faults, unreliable_fit_sentences
 
 INTERPOLATION = 3
 """Degree of the spline that resamples a column."""

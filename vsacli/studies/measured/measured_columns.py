@@ -19,10 +19,9 @@ from vsacli.documents.csv_file import split_heading
 from vsacli.documents.table import CsvTable, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
-from vsacli.trajectory.recorded.disorder import replace_stamps
 from vsacli.trajectory.recorded.header_problems import ColumnNames, misspellings
 from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
-from vsacli.trajectory.recorded.problems import time_problems
+from vsacli.trajectory.recorded.problems import replace_stamps, time_problems
 
 USUAL = ("q", "tau_motor")
 """Variables that a message names as examples of columns."""

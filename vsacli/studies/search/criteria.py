@@ -15,12 +15,13 @@ import numpy as np
 from vsacli.actuators.reach import LimitCheck
 from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray, trapezoidal
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.units import ENERGY, TORQUE, Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import drive
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import with_copied_actuator

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, IndexArray, trapezoidal
+from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.duals import Dual
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.studies.search.acceptance import Range
 from vsacli.studies.search.interior_point import minimize
 from vsacli.studies.search.separable import Group, SeparableProblem, interior

@@ -12,9 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.analysis.tool_report import unjudged_tools_text
-from vsacli.base.arrays import FLAG_TYPE, FloatArray, trapezoidal
+from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.base.units import TORQUE
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
 from vsacli.studies.sensitivities.band import Band

@@ -26,8 +26,7 @@ from vsacli.dynamics.recursion_inputs import RecursionInputs
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters, seeded
 from vsacli.studies.sensitivities.joint_derivatives import MARGIN, OF_MOTORS, drive_derivatives
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 
 class TorqueSlopes(NamedTuple):

@@ -14,8 +14,17 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import POSITIVE, Items, OneOf, integer, number, value
-from vsacli.trajectory.curves.closed_form import DEGREES, LONGEST, SHORTEST, ClosedForm, ConstantProfile
-from vsacli.trajectory.curves.declaration import Declaration, Formula, Use, same_time
+from vsacli.trajectory.curves.closed_form import (
+    DEGREES,
+    LONGEST,
+    SHORTEST,
+    ClosedForm,
+    ConstantProfile,
+    Declaration,
+    Formula,
+    Use,
+    same_time,
+)
 from vsacli.trajectory.curves.polynomial import RestToRest
 from vsacli.trajectory.curves.sinusoids import SumOfSinusoids
 from vsacli.trajectory.curves.steps import Jump, PiecewiseProfile

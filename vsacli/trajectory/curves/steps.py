@@ -15,8 +15,17 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import WRENCH, Signal
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, NumberWithUnit, integer, number, value
-from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile
-from vsacli.trajectory.curves.declaration import SAME_TIME, Formula, Use, Values, nan_for_none, odd
+from vsacli.trajectory.curves.closed_form import (
+    DEGREES,
+    SAME_TIME,
+    ClosedForm,
+    ConstantProfile,
+    Formula,
+    Use,
+    Values,
+    nan_for_none,
+    odd,
+)
 from vsacli.trajectory.curves.polynomial import AXES, RestToRest
 from vsacli.trajectory.times import stretch
 

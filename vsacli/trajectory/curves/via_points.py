@@ -17,8 +17,16 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, Items, NumberWithUnit, integer, value
-from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, add_constants, multiply_constants
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
+from vsacli.trajectory.curves.closed_form import (
+    VIA_DEGREES,
+    ClosedForm,
+    Formula,
+    Use,
+    Values,
+    add_constants,
+    multiply_constants,
+    nan_for_none,
+)
 
 SEAM = 1e-9
 """Largest jump between the expansions about two neighboring points, relative to the peak of each derivative;

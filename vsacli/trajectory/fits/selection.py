@@ -17,12 +17,16 @@ from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.progress import Progress, ProgressBar, unseen
 from vsacli.trajectory.fits.fit import Fit, Part, join
 from vsacli.trajectory.fits.least_squares import best_spans, fit_spline
-from vsacli.trajectory.fits.left_over import LeftOutMotion, left_out_motion
-from vsacli.trajectory.fits.noise import estimated_noise, filtered_noise, typical_noise
+from vsacli.trajectory.fits.noise import (
+    LeftOutMotion,
+    estimated_noise,
+    filtered_noise,
+    left_out_motion,
+    typical_noise,
+)
 from vsacli.trajectory.fits.resolution import KnownNoise
-from vsacli.trajectory.fits.ringing import ringing_ends
 from vsacli.trajectory.fits.smoothing import disagreement, smoothing_spline
-from vsacli.trajectory.fits.spectrum import FollowedNoise, followed_noise
+from vsacli.trajectory.fits.spectrum import FollowedNoise, followed_noise, ringing_ends
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline

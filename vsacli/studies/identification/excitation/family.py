@@ -27,10 +27,9 @@ from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffness
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.devices import set_uncommanded_dampers
-from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 MARGIN = 0.05
 """Relative distance that an excitation keeps from each limit and from the ends of the attainable stiffness:
