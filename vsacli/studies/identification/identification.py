@@ -16,6 +16,7 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.base.progress import Countdown, Progress, unseen
+from vsacli.base.texts import listed
 from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.documents.columns_file import load_columns
 from vsacli.documents.edited import edited, moved_files, texts_at, unaliased, with_errors
@@ -331,7 +332,7 @@ def _ignored(records: Sequence[Record]) -> str:
     unused = list(dict.fromkeys(column for record in records for column in record.unused))
     if not unused:
         return ""
-    return f"; ignored columns: {', '.join(unused[:MOST_IGNORED])}{', ...' if unused[MOST_IGNORED:] else ''}"
+    return f"; ignored columns: {listed(unused, MOST_IGNORED)}"
 
 
 def _explanations(

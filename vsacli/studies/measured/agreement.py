@@ -120,16 +120,15 @@ class Comparison(Published, TextReport):
 
     format: ClassVar[str] = "vsacli-comparison/2"
     shape: ClassVar = {
-        "format": "format",
-        **{name: name for name in ("result", "recording", "time_offset", "time_offset_error")},
-        **{name: name for name in ("found", "duration", "compared")},
-        **{name: name for name in ("signals", "warnings", "notes")},
+        **named("format", "result", "recording", "time_offset", "time_offset_error"),
+        **named("found", "duration", "compared", "signals", "warnings", "notes"),
     }
 
     @property
     def title(self) -> str:
         """Names, the largest relative error, and the time offset."""
-        return f"{self.result}, {self.recording}: {self._worst()}; {self._alignment()}"
+        offset = _with_error(self.time_offset, self.time_offset_error, "s", "+.4f")
+        return f"{self.result}, {self.recording}: {self._worst()}; time offset {offset}"
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""
@@ -144,10 +143,6 @@ class Comparison(Published, TextReport):
         if worst is None:
             return "no relative error, since no computed signal changes"
         return f"rms error up to {100 * worst.share:.3g} % ({worst.column})"
-
-    def _alignment(self) -> str:
-        """Return at which time in the recording the result begins."""
-        return f"time offset {_with_error(self.time_offset, self.time_offset_error, 's', '+.4f')}"
 
     def _rows(self) -> list[tuple[str, ...]]:
         header = (

@@ -18,7 +18,7 @@ from vsacli.base.units import TORQUE
 from vsacli.dynamics.losses import trapezoidal
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
-from vsacli.studies.sensitivities.band import Band
+from vsacli.studies.sensitivities.band import Band, share_of_peak
 from vsacli.studies.sensitivities.joint_derivatives import MARGIN
 from vsacli.studies.sensitivities.sensitivity_report import JointEffect, ParameterEffect, Sensitivity
 from vsacli.studies.sensitivities.slopes import Derivatives, SensitivityRun
@@ -225,7 +225,7 @@ def _effect(
     joints = {
         name: JointEffect(
             torque=float(effects.largest[place, joint]),
-            share=_share_of_peak(float(effects.largest[place, joint]), float(effects.peak[joint])),
+            share=share_of_peak(float(effects.largest[place, joint]), float(effects.peak[joint])),
             time=float(effects.time[place, joint]),
             motor=int(effects.motor[place, joint]),
             margin=float(margins[joint]),
@@ -243,7 +243,3 @@ def _effect(
         joints=joints,
         tolerance=tolerance,
     )
-
-
-def _share_of_peak(change: float, peak: float) -> float:
-    return change / peak if peak > 0 else math.nan

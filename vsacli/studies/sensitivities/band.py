@@ -221,7 +221,7 @@ def _joint_band(run: _BandBlock) -> JointBand:
     reversing = float(run.by_reversals[worst, motor]) / deviation**2 if deviation > 0 else 0.0
     of_torque = (
         deviation,
-        _spread_share(deviation, peak),
+        share_of_peak(deviation, peak),
         float(run.time[worst]),
         bool(run.uncertain.any()),
         reversing,
@@ -240,5 +240,6 @@ def _joint_band(run: _BandBlock) -> JointBand:
     )
 
 
-def _spread_share(spread: float, peak: float) -> float:
-    return spread / peak if peak > 0 else math.nan
+def share_of_peak(size: float, peak: float) -> float:
+    """Return the ratio of a size to a peak; NaN without one."""
+    return size / peak if peak > 0 else math.nan

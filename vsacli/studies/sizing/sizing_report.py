@@ -85,7 +85,8 @@ class Sizing(Published, TextReport):
             *left_out(self.outcomes),
             *warnings_and_notes(self.warnings, self.notes),
         ]
-        return ReportText(self._headline(), found, [table for table in tables if len(table) > 1])
+        first = headline(self.verdict, f"{self.title}: {self._answer()}")
+        return ReportText(first, found, [table for table in tables if len(table) > 1])
 
     @property
     def title(self) -> str:
@@ -93,9 +94,6 @@ class Sizing(Published, TextReport):
         return ", ".join(
             [self.robot, *(f"{each.trajectory} ({each.duration:g} s)" for each in self.outcomes)]
         )
-
-    def _headline(self) -> str:
-        return headline(self.verdict, f"{self.title}: {self._answer()}")
 
     def _answer(self) -> str:
         places, lacking = len(self.motors), len(self.lacking)

@@ -18,7 +18,7 @@ from vsacli.base.arrays import IndexArray
 from vsacli.base.errors import InputError, check_path
 from vsacli.base.outputs import Outputs, Staged
 from vsacli.base.progress import Progress, unheard, unseen
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, listed
 from vsacli.documents.source import Source
 from vsacli.results.store.study_table import (
     OF_RUN,
@@ -187,7 +187,7 @@ def _row_order(parts: Sequence[StoredStudy]) -> IndexArray:
         order[runs[rows]] = rows
     absent = np.flatnonzero(order < 0)
     if len(absent):
-        shown = ", ".join(map(str, absent[:MOST_NAMED])) + (", ..." if len(absent) > MOST_NAMED else "")
+        shown = listed(list(map(str, absent)), MOST_NAMED)
         missing = f"run {shown} is missing" if len(absent) == 1 else f"runs {shown} are missing"
         held = f"{parts[0].path} holds" if len(parts) == 1 else "the tables hold"
         found = f"{held} {len(order) - len(absent)} of {counted(len(order), 'run')}"

@@ -336,7 +336,8 @@ def fit_samples(
     if present.size and method == LEAST_SQUARES:
         parts += _least_squares(time, values, present, degree)
     elif present.size:
-        parts.append(_interpolation(time, values, present, degree))
+        through = scipy.interpolate.make_interp_spline(time, values[present].T, k=degree)
+        parts.append(Part(present, through, exact=True))
     if present.size and method != LEAST_SQUARES and len(time) >= FEWEST_JUDGED:
         typical = typical_noise(time, values[present], degree + 1)
         expected = np.where(np.isnan(given[present]), typical, given[present])
@@ -350,10 +351,6 @@ def fit_samples(
     if method is not None or bandwidth is not None or noise is not None:
         parts = _with_left_out_motion(parts, record)
     return join(degree, parts, time, values, estimate, given)
-
-
-def _interpolation(time: FloatArray, values: FloatArray, members: IndexArray, degree: int) -> Part:
-    return Part(members, scipy.interpolate.make_interp_spline(time, values[members].T, k=degree), exact=True)
 
 
 def _spoilt(
