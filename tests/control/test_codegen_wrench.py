@@ -28,7 +28,7 @@ from vsacli.control.gains import Gains, Integral
 from vsacli.control.linearization import FeedbackLinearization
 from vsacli.dynamics.elastic_torques import TORQUES, link_torques
 from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 pytestmark = needs_compiler
 

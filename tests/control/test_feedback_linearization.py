@@ -27,7 +27,7 @@ from vsacli.dynamics.forward import State, state_derivative
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import Pose
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 GAINS = Gains.from_poles([-9, -10, -11 + 4j, -11 - 4j], [-12, -15])
 

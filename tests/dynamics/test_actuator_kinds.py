@@ -24,7 +24,7 @@ from vsacli.dynamics.drive import drive
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 NAN = np.nan
 OF_MOTORS = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "motor_power")

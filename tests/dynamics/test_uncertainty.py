@@ -16,10 +16,9 @@ from vsacli.dynamics.inverse import compute_block
 from vsacli.dynamics.uncertainty import MARGIN, Uncertainty
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
-from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 SPAN = (0.0, 2.0)
 SIZES = 1e-5 * np.array([1.0, 10.0, 100.0, 1e3, 1e4])

@@ -16,7 +16,7 @@ from samples.random_logs import random_log
 from vsacli import load_robot, load_trajectory
 from vsacli.base.errors import InputError
 from vsacli.files.recordings import describe_recording
-from vsacli.trajectory.recorded.disorder import find_disorder
+from vsacli.trajectory.recorded.problems import find_disorder
 
 Command = Callable[..., Outcome]
 

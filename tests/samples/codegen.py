@@ -18,7 +18,7 @@ from vsacli.control.codegen.robot_functions import command_structure
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 SCALES = {"q": 1.0, "dq": 1.0, "ddq": 2.0, "d3q": 5.0, "d4q": 20.0, "dstiffness": 100.0, "ddstiffness": 500.0}
 """Half-widths of what is drawn, SI units."""

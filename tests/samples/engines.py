@@ -13,7 +13,7 @@ from vsacli.base.variables import Block
 from vsacli.base.wrench import Wrench
 from vsacli.dynamics.inverse import COMPUTED, compute_block
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 AGREEMENT = 1e-12
 """Relative to a variable's peak, where the margin exceeds `CLEAR`: rounding of 1e-16 over that margin."""

@@ -29,8 +29,7 @@ from vsacli.actuators.rigid import Rigid
 from vsacli.analysis.run import Run
 from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 FAMILIES = ("rounded", "pendulum", "controller", "ringing")
 

@@ -21,8 +21,7 @@ from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 STIFFNESS_ASKED = 1200.0
 """Of the antagonistic arm, N m/rad."""

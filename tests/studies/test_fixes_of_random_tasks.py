@@ -14,7 +14,7 @@ from samples.marks import slow_but
 from vsacli import load_robot, load_trajectory
 from vsacli.base.flags import Flag
 from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 MARGIN = 0.01
 FINER = 10

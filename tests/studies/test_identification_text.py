@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from vsacli.studies.identification.identification_text import agreement_counts
-from vsacli.studies.identification.identified_values import Number
+from vsacli.studies.identification.identification_text import Number, agreement_counts
 
 AGREES = Number("k", "N m/rad", before=400.0, value=400.1, standard_error=1.0)
 DIFFERS = Number("k", "N m/rad", before=400.0, value=500.0, standard_error=1.0)

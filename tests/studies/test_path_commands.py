@@ -15,7 +15,7 @@ from vsacli.base.signals import DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.compute.duals import seeds, tangents_of, value_of
 from vsacli.studies.search.path_commands import PathCommands, Speeds
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 TIMES = np.linspace(0.0, 1.0, 7)
 DIFFERENCE = 1e-6

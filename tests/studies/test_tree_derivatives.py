@@ -15,7 +15,7 @@ from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
 from vsacli.studies.identification.regressor import all_parameters, regressor
 from vsacli.studies.sensitivities.slopes import torque_slopes
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 ROUNDING = 1e-12
 """Of the peak of each joint; sums of some thousand terms."""

@@ -12,9 +12,8 @@ from vsacli.actuators.elastic import Elastic
 from vsacli.actuators.rigid import Rigid
 from vsacli.analysis.run import Run
 from vsacli.trajectory.fits import LEAST_SQUARES, SMOOTH, fit_samples
-from vsacli.trajectory.fits.left_over import left_out_motion
-from vsacli.trajectory.fits.noise import white_noise_level
-from vsacli.trajectory.fits.ringing import ringing_ends
+from vsacli.trajectory.fits.noise import left_out_motion, white_noise_level
+from vsacli.trajectory.fits.spectrum import ringing_ends
 from vsacli.trajectory.trajectory import Trajectory
 
 TIME = np.arange(901) / 100

@@ -12,7 +12,7 @@ from samples.recorded_torques import robot_of
 from scipy.signal import bessel, butter, cheby1, cheby2, firwin, lfilter, sosfilt
 
 from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 SEEDS = range(0, 24, 2)
 

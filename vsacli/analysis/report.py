@@ -23,7 +23,7 @@ from vsacli.analysis.trouble_text import (
 )
 from vsacli.base.json_records import JsonObject, Stored, named
 from vsacli.base.signals import STIFFNESS
-from vsacli.base.tables import ReportText, headline
+from vsacli.base.tables import ReportText, TextReport, headline
 from vsacli.base.texts import counted, warnings_and_notes
 
 _AT_A_ROW = re.compile(r":\d+: |^\w+\[\d+")
@@ -34,7 +34,7 @@ VERDICTS = ("ok", "over_limit", "singular", "infeasible", "unreliable", "self_ch
 
 
 @dataclass(frozen=True)
-class Report(Stored):
+class Report(Stored, TextReport):
     """Report of a run, with the verdict.
 
     Attributes:
@@ -123,10 +123,6 @@ class Report(Stored):
         return ReportText(
             headline(self.verdict, self._title()), entries, [text.joint_rows(self.joints)], lines
         )
-
-    def __str__(self) -> str:
-        """Return the lines that the commands print, without a final newline."""
-        return str(self.as_text())
 
     def _is_cause(self, warning: str) -> bool:
         """Return whether the findings may follow from what a warning is about.

@@ -19,8 +19,7 @@ from vsacli.dynamics.deflection_rows import IntegratedRows, InternalRows, intern
 from vsacli.dynamics.inverse import InverseDynamics, block_of, usual_block
 from vsacli.dynamics.variants import Variants
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 if TYPE_CHECKING:
     from vsacli.dynamics.integrated_deflections import IntegratedDeflections

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from typing import NamedTuple
@@ -47,6 +48,17 @@ class ReportText(NamedTuple):
         tables = ("\n".join(line.rstrip() for line in aligned(rows)) for rows in self.tables if rows)
         parts = ("\n".join([self.headline, *self.findings]), *tables, "\n".join(self.lines))
         return "\n\n".join(filter(None, parts))
+
+
+class TextReport(ABC):
+    """A report whose string is its text."""
+
+    @abstractmethod
+    def as_text(self) -> ReportText:
+        """Return the report in parts."""
+
+    def __str__(self) -> str:
+        return str(self.as_text())
 
 
 def headline(verdict: str, title: str) -> str:

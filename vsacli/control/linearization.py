@@ -22,7 +22,7 @@ from vsacli.compute.vector import add
 from vsacli.control.gains import POSITION_ORDER, RIGID_ORDER, Gains, Integral, linear_control
 from vsacli.dynamics.forward import Plant, State
 from vsacli.robot.model import Robot, check_robot
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 
 class LinkMotion(NamedTuple):

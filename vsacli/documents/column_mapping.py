@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from vsacli.base.did_you_mean import did_you_mean
@@ -105,7 +104,7 @@ class ColumnMapping:
         skip_rows: numbers of lines of the file that are neither header nor rows.
     """
 
-    columns: Mapping[str, MappedColumn] = dataclasses.field(default_factory=dict)
+    columns: Mapping[str, MappedColumn] = field(default_factory=dict)
     ignore: str | tuple[str | int, ...] = ()
     rate: float | None = None
     skip_rows: tuple[int, ...] = ()
@@ -142,7 +141,7 @@ class ColumnMapping:
         """
         for name, source in other.columns.items():
             source_above = self.columns.get(name, source)
-            if dataclasses.replace(source_above, place=source.place) != source:
+            if replace(source_above, place=source.place) != source:
                 file, line = source.place
                 raise InputError.one(
                     f"columns: {name} is mapped to another column of the same file above", file, line

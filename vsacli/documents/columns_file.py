@@ -14,7 +14,6 @@ from typing import Any
 from vsacli.base import file_formats
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.units import DIMENSIONLESS, RATE
-from vsacli.documents import tree
 from vsacli.documents.column_mapping import AS_NAMED, REST, ColumnMapping, MappedColumn
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import (
@@ -36,7 +35,7 @@ from vsacli.documents.reading import read_document
 from vsacli.documents.record_checks import DeclaredRecord, construct_unchecked
 from vsacli.documents.record_reader import read_record, read_text
 from vsacli.documents.time_column import TIME
-from vsacli.documents.tree import INVALID, Node, Scope
+from vsacli.documents.tree import INVALID, ListNode, MapNode, Node, Scope, TextNode, all_valid
 
 
 class ColumnName(OwnKind):
@@ -46,7 +45,7 @@ class ColumnName(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return a text, or an integer if the node is a whole number without quotes."""
-        if isinstance(node, tree.TextNode) and node.plain and node.text.isdecimal():
+        if isinstance(node, TextNode) and node.plain and node.text.isdecimal():
             return int(node.text)
         return read_text(self, node, label, scope)
 
@@ -94,7 +93,7 @@ class Columns(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return `ColumnSource` records by name."""
-        if not isinstance(node, tree.MapNode) or not node.entries:
+        if not isinstance(node, MapNode) or not node.entries:
             return scope.unexpected(node, "a mapping such as {time: stamp, elbow.q: position}", label)
         sources = {
             name: self._source(entry, f"{label}.{name}", scope) for name, entry in node.entries.items()
@@ -109,7 +108,7 @@ class Columns(OwnKind):
         }
 
     def _source(self, node: Node, label: str, scope: Scope) -> Any:
-        if isinstance(node, tree.MapNode):
+        if isinstance(node, MapNode):
             return read_record(ColumnSource, node, label, scope)
         column = ColumnName().read(node, label, scope)
         if column == 0:
@@ -139,9 +138,9 @@ class Ignored(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return the word `REST`, or a tuple of names."""
-        if isinstance(node, tree.ListNode):
-            return tree.all_valid([ColumnName().read(item, label, scope) for item in node.items])
-        if isinstance(node, tree.TextNode) and node.text == REST:
+        if isinstance(node, ListNode):
+            return all_valid([ColumnName().read(item, label, scope) for item in node.items])
+        if isinstance(node, TextNode) and node.text == REST:
             return REST
         return scope.unexpected(node, f"{REST} or a list of columns", label)
 

@@ -20,6 +20,7 @@ __all__ = [
     "Node",
     "ScalarNode",
     "edited",
+    "format_on_one_line",
     "moved_files",
     "node_at",
     "root_of",
@@ -114,10 +115,10 @@ def _locate_edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, 
         node = child
     entry = dict(_children_by_word(node)).get(key)
     if entry is not None:
-        return _replacement(node, entry, _format_on_one_line(value))
+        return _replacement(node, entry, format_on_one_line(value))
     if not isinstance(node, yaml.MappingNode):
         raise InputError.one(f"{'.'.join(words)}: there is no {key!r}")
-    return _insertion(node, f"{key}: {_format_on_one_line(value)}")
+    return _insertion(node, f"{key}: {format_on_one_line(value)}")
 
 
 def _replacement(node: yaml.Node, replaced: yaml.Node, written: str) -> tuple[int, int, str]:
@@ -144,15 +145,15 @@ def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
     return start, start, f"{entry}, " if node.flow_style else f"{entry}\n{' ' * first.column}"
 
 
-def _format_on_one_line(value: Any) -> str:
+def format_on_one_line(value: Any) -> str:
     """Return a value on one line: identifiers plain, other texts in quotes."""
     match value:
         case Mapping():
-            return "{" + ", ".join(f"{key}: {_format_on_one_line(each)}" for key, each in value.items()) + "}"
+            return "{" + ", ".join(f"{key}: {format_on_one_line(each)}" for key, each in value.items()) + "}"
         case str():
             return value if value.isidentifier() else for_yaml(value)
         case list():
-            return "[" + ", ".join(map(_format_on_one_line, value)) + "]"
+            return "[" + ", ".join(map(format_on_one_line, value)) + "]"
     return json.dumps(value)
 
 

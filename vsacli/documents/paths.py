@@ -13,13 +13,12 @@ from typing import Any, NamedTuple, Self, TypeVar
 from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import InputError, InvalidRecordError, Problem
 from vsacli.base.texts import on_one_line
-from vsacli.documents import tree
 from vsacli.documents.fields import Items, ItemsByName, PairOf, ValueKind, declared_fields, variant_inside
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_reader import read_value
 from vsacli.documents.record_values import entry_names
 from vsacli.documents.source import Problems
-from vsacli.documents.tree import Scope
+from vsacli.documents.tree import ListNode, MapNode, Node, Scope, TextNode, plain
 
 ALL = "*"
 SIDES = ("0", "1")
@@ -157,21 +156,15 @@ def replace_all(
     scope = Scope(Problems(file), members or {}, exempt or {})
     with suppress(InputError):
         return _Replacements(scope).in_record(record, [_NewValue.of(*each) for each in values.items()], ())
-    return _replace_in_turn(record, values, members, exempt, file)
+    return _replace_in_turn(record, values, scope)
 
 
-def _replace_in_turn(
-    record: _Record,
-    values: Mapping[str, Any],
-    members: Mapping[str, str] | None,
-    exempt: Mapping[str, Mapping[str, str]] | None,
-    file: str,
-) -> _Record:
+def _replace_in_turn(record: _Record, values: Mapping[str, Any], scope: Scope) -> _Record:
     refused: dict[str, Any] = {}
     first = None
     for path, value in values.items():
         try:
-            record = replace(record, path, value, members, exempt, file)
+            record = _Replacements(scope).in_record(record, [_NewValue.of(path, value)], ())
         except InputError as error:
             first = first or ReplacementError(error.problems, path)
             refused[path] = value
@@ -179,29 +172,29 @@ def _replace_in_turn(
         return record
     if len(refused) == len(values):
         raise first
-    return _replace_in_turn(record, refused, members, exempt, file)
+    return _replace_in_turn(record, refused, scope)
 
 
-def _node_of_value(value: Any) -> tree.Node:
+def _node_of_value(value: Any) -> Node:
     """Return a value as if it had been read from a file; texts as if in quotes."""
     match value:
         case str():
-            return tree.TextNode(0, value, plain=False)
+            return TextNode(0, value, plain=False)
         case bool():
-            return tree.TextNode(0, on_one_line(value), plain=True)
+            return TextNode(0, on_one_line(value), plain=True)
         case Mapping():
             entries = {str(key): _node_of_value(entry) for key, entry in value.items()}
-            return tree.MapNode(0, entries, dict.fromkeys(entries, 0))
+            return MapNode(0, entries, dict.fromkeys(entries, 0))
         case Iterable():
-            return tree.ListNode(0, tuple(map(_node_of_value, value)))
-    return tree.TextNode(0, "" if value is None else str(value), plain=True)
+            return ListNode(0, tuple(map(_node_of_value, value)))
+    return TextNode(0, "" if value is None else str(value), plain=True)
 
 
 class _NewValue(NamedTuple):
     """A value to be replaced: the words of the rest of the path to it, and the replacement."""
 
     words: list[str]
-    node: tree.Node
+    node: Node
 
     @classmethod
     def of(cls, path: str, value: Any) -> Self:
@@ -250,7 +243,7 @@ class _Replacements(NamedTuple):
             _check_single(changes, place)
             return self._read_value(kind, node, place)
         named = isinstance(kind, ItemsByName) and len(words) == 1 and words[0] != ALL
-        if named and isinstance(node, tree.MapNode):
+        if named and isinstance(node, MapNode):
             _check_single(changes, place)
             return self._with_entry(kind, content or (), words[0], node, place)
         if content is None:
@@ -261,15 +254,15 @@ class _Replacements(NamedTuple):
             return self._in_list(kind, kind.item, content, changes, place)
         if words == ["type"] and "" not in kind.records:
             reason = "the type cannot be changed alone, since each type has other keys"
-            example = f"'{_dotted_path(place)}={{type: {tree.plain(node)}, ...}}'"
+            example = f"'{_dotted_path(place)}={{type: {plain(node)}, ...}}'"
             raise InputError.one(f"{_dotted_path(place)}.type: {reason}; give the whole mapping, {example}")
         if kind.records:
             return self.in_record(content, changes, place)
         raise _missing_word_error(words[0], (), place)
 
-    def _read_value(self, kind: ValueKind, node: tree.Node, place: tuple[str, ...]) -> Any:
+    def _read_value(self, kind: ValueKind, node: Node, place: tuple[str, ...]) -> Any:
         label, problems = _dotted_path(place), Problems(self.scope.problems.file)
-        if kind.records and not isinstance(kind, Items | PairOf) and isinstance(node, tree.TextNode):
+        if kind.records and not isinstance(kind, Items | PairOf) and isinstance(node, TextNode):
             keys = dict.fromkeys(key for cls in kind.records.values() for key in declared_fields(cls))
             raise InputError.one(f"{label} is a mapping; set one of its keys: {', '.join(keys)}")
         content = read_value(kind, node, label, self.scope._replace(problems=problems))
@@ -324,13 +317,13 @@ class _Replacements(NamedTuple):
         return tuple(entries)
 
     def _with_entry(
-        self, kind: ValueKind, content: Any, word: str, mapping: tree.MapNode, place: tuple[str, ...]
+        self, kind: ValueKind, content: Any, word: str, mapping: MapNode, place: tuple[str, ...]
     ) -> Any:
         """Return entries by name with a mapping as the one that a word names, or as a further one."""
         names, key = entry_names(kind, content, {}), "name"
         index = _indices(names).get(word)
         name = word if index is None else names[index]
-        entries = {key: tree.TextNode(0, name, plain=False), **mapping.entries}
+        entries = {key: TextNode(0, name, plain=False), **mapping.entries}
         named = mapping._replace(entries=entries, key_lines={key: 0, **mapping.key_lines})
         entry = self._read_value(kind.item or kind, named, (*place, name))
         return tuple({**dict(zip(names, content, strict=True)), name: entry}.values())

@@ -17,12 +17,11 @@ from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from vsacli.base.errors import InputError, Problem
-from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import ANGLES, evaluate
 from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.documents.source import Problems, Source
-from vsacli.documents.tree import parse_yaml
+from vsacli.documents.tree import ListNode, MapNode, Node, TextNode, parse_yaml
 
 _Subject = TypeVar("_Subject")
 _COMPONENTS = {
@@ -151,7 +150,7 @@ def _path_to_report(path: NumberPath, other: OtherUnit | None) -> NumberPath:
     return (*path[:-1], *other.field) if other and other.field else path
 
 
-TranslatePath: TypeAlias = Callable[[tree.Node, NumberPath], NumberPath]
+TranslatePath: TypeAlias = Callable[[Node, NumberPath], NumberPath]
 """Function that returns the path in a file for its root and the path in the record made of it."""
 
 
@@ -165,13 +164,13 @@ class ValuesInFile:
         self._translate_path = translate_path
 
     @cached_property
-    def _root(self) -> tree.Node:
+    def _root(self) -> Node:
         try:
             return parse_yaml(self._text, Problems(self.path))
         except InputError:  # not a YAML file
-            return tree.MapNode(0, {}, {})
+            return MapNode(0, {}, {})
 
-    def node_along(self, path: NumberPath) -> tuple[tree.Node, NumberPath]:
+    def node_along(self, path: NumberPath) -> tuple[Node, NumberPath]:
         """Return the deepest node along a path, and the remaining steps."""
         steps = path if self._translate_path is None else self._translate_path(self._root, path)
         node = self._root
@@ -193,7 +192,7 @@ class ValuesInFile:
     def as_in_file(self, measured: Measured) -> Measured | None:
         """Return the number with the path to its scalar, which all joints may share; None if it differs."""
         node, left = self.node_along(measured.path)
-        if not isinstance(node, tree.TextNode) or math.isnan(measured.value):
+        if not isinstance(node, TextNode) or math.isnan(measured.value):
             return measured
         try:
             value = evaluate(node.text, measured.unit)
@@ -206,16 +205,16 @@ class ValuesInFile:
     def in_angles(self, measured: Measured) -> bool:
         """Return whether the file has this number as an expression with `deg` or `pi`."""
         node, _ = self.node_along(measured.path)
-        if not isinstance(node, tree.TextNode) or self.as_in_file(measured) is None:
+        if not isinstance(node, TextNode) or self.as_in_file(measured) is None:
             return False
         return bool(_EXPRESSION_OF_ANGLE.search(node.text))
 
 
-def _child_node(node: tree.Node, step: str | PathIndex) -> tree.Node | None:
+def _child_node(node: Node, step: str | PathIndex) -> Node | None:
     match node, step:
-        case tree.MapNode(entries=entries), _:
+        case MapNode(entries=entries), _:
             return entries.get(str(step))
-        case tree.ListNode(items=items), PathIndex(number=number) if number < len(items):
+        case ListNode(items=items), PathIndex(number=number) if number < len(items):
             return items[number]
     return None
 

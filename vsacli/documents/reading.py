@@ -11,11 +11,10 @@ from typing import Any, TypeAlias, TypeVar
 
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.units import Quantity
-from vsacli.documents import tree
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_reader import read_record
 from vsacli.documents.source import Problems, Source, read_source, recognizing_other_formats
-from vsacli.documents.tree import Scope, parse_yaml, quoted
+from vsacli.documents.tree import MapNode, Node, Scope, TextNode, parse_yaml, plain, quoted
 
 _Document = TypeVar("_Document", bound=DeclaredRecord)
 
@@ -52,7 +51,7 @@ def read_document(
         source, text = read_source(path, expected=expected)
         problems = Problems(source.path)
         root = parse_yaml(text, problems)
-        if not isinstance(root, tree.MapNode):
+        if not isinstance(root, MapNode):
             problems.fail(root.line, f"{expected}, found {root}")
         _check_format(root, format_name, problems)
     record = read_record(cls, root, "", Scope(problems, members or {}, exempt or {}), beside=("format",))
@@ -62,7 +61,7 @@ def read_document(
 
 def survey_document(
     path: str | os.PathLike[str], cls: type[DeclaredRecord]
-) -> tuple[tree.MapNode, list[tuple[Quantity, tree.Node]]]:
+) -> tuple[MapNode, list[tuple[Quantity, Node]]]:
     """Return the root of a YAML file, and its PerJoint values as written, for any joints.
 
     Args:
@@ -75,19 +74,19 @@ def survey_document(
     source, text = read_source(path)
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
-    if not isinstance(root, tree.MapNode):
+    if not isinstance(root, MapNode):
         problems.fail(root.line, f"expected a mapping, found {root}")
-    survey: list[tuple[Quantity, tree.Node]] = []
+    survey: list[tuple[Quantity, Node]] = []
     with suppress(InputError):  # too many problems; reading the document reports them
         read_record(cls, root, "", Scope(problems, {}, {}, survey=survey), beside=("format",))
     return root, survey
 
 
-def _check_format(root: tree.MapNode, expected: str, problems: Problems) -> None:
+def _check_format(root: MapNode, expected: str, problems: Problems) -> None:
     node = root.entries.get("format")
     if node is None:
         problems.add(root.line, f"missing key 'format'; the file must begin with `format: {expected}`")
-    elif not (isinstance(node, tree.TextNode) and node.text == expected):
+    elif not (isinstance(node, TextNode) and node.text == expected):
         problems.fail(node.line, f"format: expected {expected!r}, found {node}")
 
 
@@ -143,7 +142,7 @@ def _parse_change_value(change: str, text: str) -> Any:
         problems.check()
     except InputError as error:
         raise ChangeError.of(change, error.problems[0].message) from None
-    return tree.plain(node)
+    return plain(node)
 
 
 def check_path_of_change(path: str, change: str = "") -> None:

@@ -15,7 +15,6 @@ from vsacli.base.did_you_mean import did_you_mean, nearest
 from vsacli.base.errors import FieldProblem, InputError, InvalidRecordError
 from vsacli.base.texts import counted
 from vsacli.base.units import DIMENSIONLESS
-from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import (
     REQUIRED,
@@ -52,7 +51,7 @@ from vsacli.documents.record_checks import (
     repetitions,
     unknown_word,
 )
-from vsacli.documents.tree import INVALID, NULLS, Node, Scope, TextNode, all_valid, quoted
+from vsacli.documents.tree import INVALID, NULLS, ListNode, MapNode, Node, Scope, TextNode, all_valid, quoted
 
 TRUTHS = ("true", "false")
 WITHOUT_UNIT = NumberWithUnit(DIMENSIONLESS)
@@ -61,7 +60,7 @@ NOT_TEXTS = BOOLEANS | NULLS
 
 
 def read_record(
-    cls: type[DeclaredRecord], node: tree.MapNode, label: str, scope: Scope, beside: tuple[str, ...] = ()
+    cls: type[DeclaredRecord], node: MapNode, label: str, scope: Scope, beside: tuple[str, ...] = ()
 ) -> Any:
     """Return a mapping as a record, or INVALID; the additional keys `beside` are left to the caller."""
     prefix = f"{label}: " if label else ""
@@ -90,7 +89,7 @@ def read_record(
     return INVALID
 
 
-def scope_inside(scope: Scope, cls: type, node: tree.MapNode) -> Scope:
+def scope_inside(scope: Scope, cls: type, node: MapNode) -> Scope:
     """Return the scope of the values in a record."""
     if not hasattr(cls, "unit_variant"):
         return scope
@@ -99,13 +98,11 @@ def scope_inside(scope: Scope, cls: type, node: tree.MapNode) -> Scope:
 
 
 def _scalar_entry(node: Node, key: str) -> TextNode | None:
-    entry = node.entries.get(key) if isinstance(node, tree.MapNode) else None
+    entry = node.entries.get(key) if isinstance(node, MapNode) else None
     return entry if isinstance(entry, TextNode) else None
 
 
-def _refuse_unknown_keys(
-    cls: type, node: tree.MapNode, valid_keys: Collection[str], scope: Scope
-) -> set[str]:
+def _refuse_unknown_keys(cls: type, node: MapNode, valid_keys: Collection[str], scope: Scope) -> set[str]:
     """Note unknown keys; return the known keys probably meant, which are then not reported as missing."""
     meant: set[str] = set()
     for key, line in node.key_lines.items():
@@ -119,7 +116,7 @@ def _refuse_unknown_keys(
     return meant - node.entries.keys()
 
 
-def _note_missing(name: str, field: Field, node: tree.MapNode, prefix: str, scope: Scope) -> None:
+def _note_missing(name: str, field: Field, node: MapNode, prefix: str, scope: Scope) -> None:
     example = f", e.g. {name}: {{type: constant, value: ...}}" if "constant" in field.kind.records else ""
     scope.problems.add(node.line, f"{prefix}missing key {name!r} ({field.doc}){example}")
 
@@ -127,7 +124,7 @@ def _note_missing(name: str, field: Field, node: tree.MapNode, prefix: str, scop
 def _note_field_problems(
     problems: Iterable[FieldProblem],
     fields: Mapping[str, tuple[Field, Any]],
-    node: tree.MapNode,
+    node: MapNode,
     scope: Scope,
 ) -> None:
     """Note the problems of fields; joints with the same problem of a field share a message."""
@@ -151,9 +148,7 @@ def _joints_with_problem(joints: Sequence[str], members: Sequence[str]) -> str:
     return f" of {'joint' if len(joints) == 1 else 'joints'} {', '.join(joints)}"
 
 
-def _note_record_problems(
-    problems: Iterable[FieldProblem], node: tree.MapNode, prefix: str, scope: Scope
-) -> None:
+def _note_record_problems(problems: Iterable[FieldProblem], node: MapNode, prefix: str, scope: Scope) -> None:
     """Note the problems of a record whose fields are valid."""
     for problem in problems:
         message = problem.in_units(scope.variant).in_file(list(scope.members))
@@ -164,12 +159,12 @@ def _note_record_problems(
 def line_along(path: FieldPath, node: Node, scope: Scope) -> int:
     """Return the line of the deepest node along a path; a scalar counts for all entries of its value."""
     for step in path:
-        if isinstance(node, tree.MapNode):
+        if isinstance(node, MapNode):
             key = list(scope.members)[step] if isinstance(step, int) else step
             if key not in node.entries:
                 break
             node = node.entries[key]
-        elif isinstance(node, tree.ListNode) and isinstance(step, int):
+        elif isinstance(node, ListNode) and isinstance(step, int):
             node = node.items[step]
     return node.line
 
@@ -256,7 +251,7 @@ def _read_table_file(kind: TablePath, node: Node, label: str, scope: Scope) -> A
 
 def _read_vector(kind: NumberList, node: Node, label: str, scope: Scope) -> Any:
     """Return the numbers, which the check of the field counts."""
-    if not isinstance(node, tree.ListNode):
+    if not isinstance(node, ListNode):
         return scope.unexpected(node, f"a list of {kind.length} numbers in {kind.unit}", label)
     return all_valid(_read_number(kind.item, item, label, scope) for item in node.items)
 
@@ -265,13 +260,13 @@ def _read_interval(kind: Interval, node: Node, label: str, scope: Scope) -> Any:
     if isinstance(node, TextNode):
         upper = _read_number(kind.item, node, label, scope)
         return upper if upper is INVALID else (-upper if kind.lowest is None else kind.lowest, upper)
-    if isinstance(node, tree.ListNode) and len(node.items) == 2:
+    if isinstance(node, ListNode) and len(node.items) == 2:
         return all_valid(_read_number(kind.item, item, label, scope) for item in node.items)
     return scope.unexpected(node, "[lower, upper] or one number", label)
 
 
 def _read_named_numbers(kind: NamedNumbers, node: Node, label: str, scope: Scope) -> Any:
-    if not isinstance(node, tree.MapNode):
+    if not isinstance(node, MapNode):
         return scope.unexpected(node, "a mapping from names to numbers", label)
     numbers = all_valid(
         _read_number(kind.number, entry, f"{label}.{name}", scope) for name, entry in node.entries.items()
@@ -280,7 +275,7 @@ def _read_named_numbers(kind: NamedNumbers, node: Node, label: str, scope: Scope
 
 
 def _read_items(kind: Items, node: Node, label: str, scope: Scope) -> Any:
-    if not isinstance(node, tree.ListNode) or not node.items:
+    if not isinstance(node, ListNode) or not node.items:
         return scope.unexpected(node, "a list with at least one entry", label)
     values = all_valid([read_value(kind.item, item, label, scope) for item in node.items])
     return INVALID if kind.unique and _note_repeated(kind.unique, node, label, scope) else values
@@ -288,13 +283,13 @@ def _read_items(kind: Items, node: Node, label: str, scope: Scope) -> Any:
 
 def _read_items_by_name(kind: ItemsByName, node: Node, label: str, scope: Scope) -> Any:
     """Return the records of a mapping, each with its key as `name`."""
-    if not isinstance(node, tree.MapNode) or not node.entries:
+    if not isinstance(node, MapNode) or not node.entries:
         return scope.unexpected(node, "a mapping with at least one name", label)
     assert kind.unique is not None, "see ItemsByName"
     records = []
     for name, entry in node.entries.items():
         line, named = node.key_lines[name], entry
-        if isinstance(entry, tree.MapNode):
+        if isinstance(entry, MapNode):
             if kind.unique in entry.entries:
                 message = f"{label}.{name}: leave out {kind.unique!r}; the key {name!r} is the {kind.unique}"
                 scope.problems.add(entry.key_lines[kind.unique], message)
@@ -304,7 +299,7 @@ def _read_items_by_name(kind: ItemsByName, node: Node, label: str, scope: Scope)
     return all_valid(records)
 
 
-def _note_repeated(key: str, node: tree.ListNode, label: str, scope: Scope) -> bool:
+def _note_repeated(key: str, node: ListNode, label: str, scope: Scope) -> bool:
     """Note the entries of a list whose text under a key occurred before; return whether there are any."""
     entries = [_scalar_entry(item, key) for item in node.items]
     repeated = list(repetitions(entry.text if entry else None for entry in entries))
@@ -316,19 +311,19 @@ def _note_repeated(key: str, node: tree.ListNode, label: str, scope: Scope) -> b
 
 
 def _read_one_or_more(kind: OneOrMore, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, tree.ListNode):
+    if isinstance(node, ListNode):
         return _read_items(kind, node, label, scope)
     one = read_value(kind.item, node, label, scope)
     return one if one is INVALID else (one,)
 
 
 def _read_pair(kind: PairOf, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, tree.MapNode) and _names_sides(kind, node):
+    if isinstance(node, MapNode) and _names_sides(kind, node):
         keys = ", ".join(map(quoted, node.entries))
         expected = "one mapping for both sides or a list of two"
         scope.problems.add(node.line, f"{label}: expected {expected}, found the keys {keys}")
         return INVALID
-    if not isinstance(node, tree.ListNode):
+    if not isinstance(node, ListNode):
         both = read_value(kind.item, node, label, scope)
         return both if both is INVALID else (both, both)
     if len(node.items) != 2:
@@ -336,9 +331,9 @@ def _read_pair(kind: PairOf, node: Node, label: str, scope: Scope) -> Any:
     return all_valid([read_value(kind.item, item, label, scope) for item in node.items])
 
 
-def _names_sides(kind: PairOf, node: tree.MapNode) -> bool:
+def _names_sides(kind: PairOf, node: MapNode) -> bool:
     """Return whether mappings stand under unknown keys, as in `{flexor: {...}, extensor: {...}}`."""
-    if not node.entries or not all(isinstance(value, tree.MapNode) for value in node.entries.values()):
+    if not node.entries or not all(isinstance(value, MapNode) for value in node.entries.values()):
         return False
     item_keys = {"type", *(name for cls in kind.records.values() for name in declared_fields(cls))}
     return item_keys.isdisjoint(node.entries)
@@ -374,20 +369,20 @@ def _nodes_by_joint(
     """Return the node for each joint (a scalar for all except exempt ones); None if joints are wrong."""
     names = scope.members
     match node:
-        case tree.TextNode():
+        case TextNode():
             return {name: node for name in names if name not in exempt}
-        case tree.ListNode(items=items) if len(items) != len(names):
+        case ListNode(items=items) if len(items) != len(names):
             expected = f"{counted(len(names), 'value')}, one for each joint ({', '.join(names)})"
             mismatch = f"found {len(items)}; is the file for another robot?"
             scope.problems.add(node.line, f"{label}: expected {expected}, {mismatch}")
             return None
-        case tree.ListNode(items=items):
+        case ListNode(items=items):
             return dict(zip(names, items, strict=True))
-        case tree.MapNode(entries=entries):
+        case MapNode(entries=entries):
             return entries if _check_names(node, label, scope, exempt) else None
 
 
-def _check_names(node: tree.MapNode, label: str, scope: Scope, exempt: Mapping[str, str]) -> bool:
+def _check_names(node: MapNode, label: str, scope: Scope, exempt: Mapping[str, str]) -> bool:
     """Note names of unknown joints, and joints without a value."""
     names = scope.members
     unknown = [name for name in node.entries if name not in names]
@@ -401,7 +396,7 @@ def _check_names(node: tree.MapNode, label: str, scope: Scope, exempt: Mapping[s
 
 
 def _read_mapping(kind: RecordOf, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, tree.MapNode):
+    if isinstance(node, MapNode):
         return read_record(kind.cls, node, label, scope)
     required = (name for name, (_, default) in declared_fields(kind.cls).items() if default is REQUIRED)
     keys = [name for name in required if name != getattr(kind.cls, "keyed_by", None)]
@@ -410,7 +405,7 @@ def _read_mapping(kind: RecordOf, node: Node, label: str, scope: Scope) -> Any:
 
 
 def _read_one_of(kind: OneOf, node: Node, label: str, scope: Scope) -> Any:
-    if not isinstance(node, tree.MapNode):
+    if not isinstance(node, MapNode):
         return scope.unexpected(node, "a mapping with the key 'type'", label)
     selector = node.entries.get("type")
     if selector is None:

@@ -10,7 +10,6 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from vsacli.base.did_you_mean import nearest
 from vsacli.base.errors import InputError
-from vsacli.documents import tree
 from vsacli.documents.csv_file import (
     HEADER,
     Header,
@@ -25,7 +24,7 @@ from vsacli.documents.fields import REQUIRED, NumberWithUnit, ValueKind, declare
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_reader import read_record
 from vsacli.documents.source import Problems, Source, read_source
-from vsacli.documents.tree import INVALID, Scope
+from vsacli.documents.tree import INVALID, MapNode, Scope, TextNode, quoted
 
 MAX_BYTES = 50_000_000
 """Largest file in bytes; rows become objects, and a hundred thousand rows have some ten million bytes."""
@@ -98,7 +97,7 @@ def read_records(path: str | os.PathLike[str], cls: type[_Record], unique: str) 
             records[number] = record
             key = getattr(record, unique)
             if first.setdefault(key, number) != number:
-                problems.add(number, f"the {unique} {tree.quoted(key)} is already used in line {first[key]}")
+                problems.add(number, f"the {unique} {quoted(key)} is already used in line {first[key]}")
     problems.check()
     if not records:
         raise InputError.one("has a header but no rows of values", source.path)
@@ -122,7 +121,7 @@ def _assign_columns(header: Header, cls: type, problems: Problems) -> _ColumnsBy
             columns.unknown_columns.append(name)
             near = nearest(name, fields)
             if near is not None:
-                problems.add(header.line, f"unknown column {tree.quoted(name)}; did you mean {near!r}?")
+                problems.add(header.line, f"unknown column {quoted(name)}; did you mean {near!r}?")
                 meant.add(near)
     missing = [
         f"{name!r} ({field.doc})"
@@ -157,7 +156,7 @@ def _read_row(
         scope.problems.add(line, f"{wrong_count(columns.width, len(cells))}{hint}")
         return None
     cell_nodes = {
-        field: tree.TextNode(line, _in_si(cells[index], columns.factors[field]), plain=False)
+        field: TextNode(line, _in_si(cells[index], columns.factors[field]), plain=False)
         for field, index in columns.places.items()
         if cells[index]
     }
@@ -171,7 +170,7 @@ def _read_row(
     if missing:
         return None
     problems = Problems(scope.problems.file)
-    mapping = tree.MapNode(line, cell_nodes, dict.fromkeys(cell_nodes, line))
+    mapping = MapNode(line, cell_nodes, dict.fromkeys(cell_nodes, line))
     record = read_record(cls, mapping, "", scope._replace(problems=problems))
     try:
         problems.check()

@@ -38,8 +38,7 @@ from vsacli.robot.commanded_joints import describe_commanded_joints
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot, check_robot
 from vsacli.trajectory.devices import set_uncommanded_dampers
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 COMPUTED = (*TORQUES, *ACTUATED, *OF_DEVICES, "dissipated_power")
 """The variables that inverse dynamics computes, where the robot has them."""

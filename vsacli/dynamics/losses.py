@@ -92,6 +92,12 @@ def _linear(
     return (np.maximum(interval / 2 * high**2 / (high - low), positive),)
 
 
+def trapezoidal(time: FloatArray) -> FloatArray:
+    """Return the weights of the trapezoidal rule, (samples,) in s."""
+    halves = np.diff(time) / 2
+    return np.asarray(np.append(halves, 0.0) + np.append(0.0, halves))
+
+
 def trapezoids(intervals: FloatArray, values: FloatArray) -> FloatArray:
     """Return the time integral over each interval of a piecewise linear function; error O(h^3)."""
     integral: FloatArray = intervals / 2 * (values[..., 1:] + values[..., :-1])

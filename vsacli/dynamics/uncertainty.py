@@ -31,8 +31,7 @@ from vsacli.dynamics.inverse import (
     usual_block,
 )
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 if TYPE_CHECKING:
     from vsacli.trajectory.recorded.samples import SampledProfile

@@ -6,8 +6,7 @@ from vsacli.base.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from vsacli.trajectory.file import load_trajectory
-    from vsacli.trajectory.motion import Motion
-    from vsacli.trajectory.trajectory import Trajectory
+    from vsacli.trajectory.trajectory import Motion, Trajectory
 
 __all__ = [
     "Motion",

@@ -12,7 +12,6 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import Problem
 from vsacli.base.signals import POSITION
-from vsacli.base.units import Quantity
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule, ValuesInFile, implausible_values
 from vsacli.documents.record_values import NumberAtPath, PathIndex
 from vsacli.documents.source import Source
@@ -128,8 +127,7 @@ class CheckedTrajectory:
         assert self.motion_of_robot is not None, "of motions by a formula"
         position = self.motion_of_robot[0, list(subtree.numbers_in_robot)]
         usual = [1.0 if joint.is_revolute else subtree.sizes.extent or math.nan for joint in subtree.joints]
-        velocities: FloatArray = np.abs(np.diff(position)).sum(axis=1) / usual / self.duration
-        return velocities
+        return np.asarray(np.abs(np.diff(position)).sum(axis=1) / usual / self.duration)
 
     @property
     def duration(self) -> float:
@@ -137,7 +135,7 @@ class CheckedTrajectory:
         first, last = self.times.span
         return last - first
 
-    def of_joints(self, quantity: Quantity) -> Iterator[tuple[Measured, int]]:
+    def of_joints(self, quantity: units.Quantity) -> Iterator[tuple[Measured, int]]:
         """Yield the numbers with this quantity, with magnitude as size, and the index of the joint."""
         place = {number: joint for joint, number in enumerate(self.subtree.numbers_in_robot)}
         for path, measured, value, _ in self.numbers:
@@ -146,7 +144,9 @@ class CheckedTrajectory:
                 unit = quantity.unit(self.subtree.joints[joint].type)
                 yield Measured(path, value, unit, abs(value)), joint
 
-    def measure_timing(self, quantity: Quantity, sizes: FloatArray, **beside: str) -> Iterator[Measured]:
+    def measure_timing(
+        self, quantity: units.Quantity, sizes: FloatArray, **beside: str
+    ) -> Iterator[Measured]:
         """Yield the time or frequency that sets the timing, with the largest size of all joints."""
         of_motion = [each for each in self.numbers if each.path[0] in ("duration", POSITION.key)]
         timings = [each for each in of_motion if each.path[-1] == "frequency"]
@@ -180,7 +180,7 @@ def _measure_slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
             yield from checked.measure_timing(units.TIME, velocities)
 
 
-def _measure_accelerations(checked: CheckedTrajectory, quantity: Quantity) -> Iterator[Measured]:
+def _measure_accelerations(checked: CheckedTrajectory, quantity: units.Quantity) -> Iterator[Measured]:
     """Yield the largest acceleration of the point farthest from a joint, m/s^2."""
     if checked.sampled_motion is not None and not checked.robot.placeholder:
         levers = np.where(checked.revolute, checked.sizes.levers, 1.0)

@@ -55,55 +55,6 @@ class Profile(Protocol):
 
 
 @dataclass(frozen=True)
-class ContinuousProfile:
-    """A profile evaluated at other samples than its own, by `at` throughout."""
-
-    profile: Profile
-
-    @property
-    def components(self) -> int:
-        """Number of components: one per joint, or six of a wrench."""
-        return self.profile.components
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings about implausible values."""
-        return self.profile.warnings
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Notes on the interpretation, where that is not obvious."""
-        return self.profile.notes
-
-    @property
-    def breakpoints(self) -> FloatArray:
-        """Ascending times between which the function is analytic; the first and last are its span."""
-        return self.profile.breakpoints
-
-    @property
-    def known_between(self) -> bool:
-        """True, since samples are evaluated like any other time."""
-        return True
-
-    def at(self, time: FloatArray) -> FloatArray:
-        """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
-        return self.profile.at(time)
-
-    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
-        """Return the same at samples, whose times are `time`."""
-        return self.profile.at(time)
-
-    def stretched(self, factor: float) -> ContinuousProfile:
-        """Return the profile slowed down by a factor, with the same first time."""
-        return ContinuousProfile(self.profile.stretched(factor))
-
-    @property
-    def estimate(self) -> SampledProfile | None:
-        """The original profile if any value at its samples comes from a fit, else None."""
-        return self.profile.estimate
-
-
-@dataclass(frozen=True)
 class WrenchProfile:
     """The force and moment of the environment on each tool, over time.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
+from dataclasses import dataclass, field
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -12,19 +13,74 @@ import numpy as np
 
 from vsacli.base.arrays import BoolArray, FloatArray, over_time
 from vsacli.base.errors import InputError, Problem
-from vsacli.base.signals import COMMANDED, POSITION, WRENCH, Signal, commanded_names, wrench_on
+from vsacli.base.signals import (
+    COMMANDED,
+    POSITION,
+    WRENCH,
+    Signal,
+    commanded_names,
+    orders_of_derivation,
+    wrench_on,
+)
 from vsacli.base.variables import UNCERTAIN
-from vsacli.base.wrench import WRENCH_AXES, Wrench, WrenchFrame
+from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, WrenchFrame
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import ConstantProfile
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.profile import ContinuousProfile, Profile, WrenchProfile
+from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import Times
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from vsacli.trajectory.recorded.samples import SampledProfile
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion and commanded signals over a block of times.
+
+    Attributes:
+        time: (samples,) in s.
+        q, dq, ddq, d3q, d4q: position and its four derivatives, (samples, joints), rad (m) per s^k.
+        commanded: signals of `COMMANDED` and their derivatives by name, e.g. `dstiffness`, (samples, joints);
+            NaN for a joint without this command.
+        wrench: wrench of the environment on the tools; None without one.
+    """
+
+    time: FloatArray
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+    d3q: FloatArray
+    d4q: FloatArray
+    commanded: Mapping[str, FloatArray]
+    wrench: Wrench | None = field(default=None, kw_only=True)
+
+    @classmethod
+    def of(cls, time: FloatArray, arrays: Mapping[str, FloatArray], wrench: Wrench | None = None) -> Motion:
+        """Return the motion from arrays by the names of result variables; other arrays are ignored."""
+        q, dq, ddq, d3q, d4q = (arrays[name] for name in POSITION.names)
+        commanded = {name: arrays[name] for name in commanded_names() if name in arrays}
+        return cls(time, q, dq, ddq, d3q, d4q, commanded, wrench=wrench)
+
+    @property
+    def of_joints(self) -> dict[str, FloatArray]:
+        """Arrays of the joints by the names of result variables."""
+        return {**{name: getattr(self, name) for name in POSITION.names}, **self.commanded}
+
+    def variables(self) -> dict[str, FloatArray]:
+        """Return all arrays by the names of result variables."""
+        arrays = {"time": self.time, **self.of_joints}
+        if self.wrench is not None:
+            arrays |= {name: getattr(self.wrench, name) for name in WRENCH_NAMES}
+        return arrays
+
+    def mapped(self, time: FloatArray, function: Callable[[FloatArray, int], FloatArray]) -> Motion:
+        """Return the motion at other times, with each array replaced by `function(array, order)`."""
+        orders = orders_of_derivation()
+        arrays = {name: function(array, orders[name]) for name, array in self.of_joints.items()}
+        return Motion.of(time, arrays, self.wrench and self.wrench.mapped(function))
+
 
 NARROWEST_PIECE = 1e-9
 """Share of the duration; narrower pieces arise where knots of two splines differ only by rounding."""
@@ -42,6 +98,9 @@ class Trajectory:
         name: name for reports and for the result file.
         sources: files that the trajectory was read from.
     """
+
+    _of_functions = False
+    """Whether samples are values of smooth functions, like those at any other time."""
 
     def __init__(
         self,
@@ -63,8 +122,10 @@ class Trajectory:
             InputError: the numbers of joints or the spans differ.
         """
         self.times, self.position, self.wrench, self.name = times, position, wrench, name
+        nothing = (math.nan,) * self.joints
         self.commanded = {
-            key: commanded[key] if key in commanded else self._commanding_no_joint(signal)
+            key: commanded.get(key)
+            or ConstantProfile(signal=signal, span=(0.0, self.duration), value=nothing)
             for key, signal in COMMANDED.items()
             if key in commanded or signal.device is None
         }
@@ -119,10 +180,6 @@ class Trajectory:
                 raise InputError.one(
                     f"the {signal.key} spans {start:g} to {end:g} s, the steps 0 to {self.duration:g} s"
                 )
-
-    def _commanding_no_joint(self, signal: Signal) -> ConstantProfile:
-        """Return the profile of a signal that commands no joint."""
-        return ConstantProfile(signal=signal, span=(0.0, self.duration), value=(math.nan,) * self.joints)
 
     @classmethod
     def from_samples(
@@ -202,8 +259,7 @@ class Trajectory:
         """Return the mask, (joints,), of the joints that the signal with this key commands."""
         if key not in self.commanded:
             return np.zeros(self.joints, dtype=bool)
-        chosen: BoolArray = ~np.isnan(self.block(0, 1).commanded[key][0])
-        return chosen
+        return np.asarray(~np.isnan(self.block(0, 1).commanded[key][0]))
 
     def commanding(self, signal: Signal, value: tuple[float, ...], note: str) -> Trajectory:
         """Return the trajectory with a constant as a further signal; NaN for joints it does not command."""
@@ -232,6 +288,8 @@ class Trajectory:
     def block(self, start: int, stop: int) -> Motion:
         """Return the motion at samples start..stop-1; like a slice, clipped at the last sample."""
         time = self.times.block(start, stop)
+        if self._of_functions:
+            return self.at(time)
         return self._motion(time, lambda profile: profile.samples(start, stop, time - self.start))
 
     def at(self, time: ArrayLike) -> Motion:
@@ -302,7 +360,9 @@ class Trajectory:
 
     def sampled(self, times: Times) -> Trajectory:
         """Return the same functions at other sample times, from the first time on and not beyond the last."""
-        return self._derived(lambda _, profile: ContinuousProfile(profile), times)
+        derived = self._derived(lambda _, profile: profile, times)
+        derived._of_functions = True
+        return derived
 
     def from_zero(self) -> Trajectory:
         """Return the trajectory with time zero at its first sample, where times are rounded least."""
@@ -318,14 +378,13 @@ class Trajectory:
     @property
     def known_between(self) -> bool:
         """Whether `at` agrees with the samples; False if derivatives are given there alone."""
-        return all(profile.known_between for _, profile in self.profiles())
+        return self._of_functions or all(profile.known_between for _, profile in self.profiles())
 
     @property
     def breakpoints(self) -> FloatArray:
         """Ascending times between which all profiles are analytic; the first and last are the span."""
         times = np.sort(np.concatenate([profile.breakpoints for _, profile in self.profiles()]))
-        distinct: FloatArray = times[np.append(True, np.diff(times) > 0)]  # np.unique would import numpy.ma
-        return self.start + distinct
+        return np.asarray(self.start + times[np.append(True, np.diff(times) > 0)])  # no import of numpy.ma
 
     def check_points(self, count: int) -> tuple[FloatArray, FloatArray]:
         """Return `count` times over the span at which derivatives can be checked by finite differences.

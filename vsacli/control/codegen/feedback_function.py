@@ -24,7 +24,7 @@ from vsacli.control.linearization import Decoupling, LinkMotion, control_law, po
 from vsacli.dynamics.forward import Plant
 from vsacli.dynamics.limits import limit_flags
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 Arrays = Mapping[str, Any]
 """Arrays of numbers or symbols, by name."""

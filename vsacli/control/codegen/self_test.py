@@ -22,7 +22,7 @@ from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import compute_block, internal_equilibrium
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 CASES = 6
 """Number of samples; the last one requires half of the minimum attainable stiffness, so it is infeasible."""

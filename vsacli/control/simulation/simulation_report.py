@@ -13,7 +13,7 @@ from vsacli.analysis.tool_report import ToolReport, tool_stiffness_lines
 from vsacli.analysis.trouble_text import failing_joints_line, group_findings, of_all_joints
 from vsacli.base.flags import LIMITS, Flag
 from vsacli.base.json_records import Published, Stored, named
-from vsacli.base.tables import ReportText, headline
+from vsacli.base.tables import ReportText, TextReport, headline
 from vsacli.base.texts import counted, warnings_and_notes
 from vsacli.base.units import time_text
 from vsacli.control.simulation.ending import DIVERGED, INCOMPLETE, Ending
@@ -68,7 +68,7 @@ class LargestError(Published):
 
 
 @dataclass(frozen=True)
-class SimulationReport(Stored):
+class SimulationReport(Stored, TextReport):
     """The report on a simulation.
 
     Attributes:
@@ -150,10 +150,6 @@ class SimulationReport(Stored):
             [tracking_rows(self.joints, self.with_full_state)],
             lines,
         )
-
-    def __str__(self) -> str:
-        """Return the lines that the command prints, without a final newline."""
-        return str(self.as_text())
 
     def _title(self) -> str:
         """Return names, controller, the largest error, and how many joints fail which requirement."""

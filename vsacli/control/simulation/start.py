@@ -19,8 +19,7 @@ from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.plausibility.bodies import ROUNDED, turns
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 
 @dataclass(frozen=True)

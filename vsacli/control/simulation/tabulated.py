@@ -14,8 +14,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.signals import COMMANDED, DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 
 class Table:

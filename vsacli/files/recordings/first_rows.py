@@ -17,7 +17,7 @@ import numpy as np
 from vsacli.base.errors import InputError
 from vsacli.documents.column_mapping import MappedColumn
 from vsacli.documents.csv_file import Header, RowsToRead, is_missing, is_number, read_header, split_heading
-from vsacli.documents.preamble import find_surroundings
+from vsacli.documents.table import find_surroundings
 from vsacli.documents.time_column import (
     EXPECTED,
     NAMES,

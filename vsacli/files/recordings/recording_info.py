@@ -24,8 +24,7 @@ from vsacli.documents.column_mapping import REST, ColumnMapping, MappedColumn
 from vsacli.documents.columns_file import parse_rate
 from vsacli.documents.csv_file import read_header, split_heading
 from vsacli.documents.expression import conversion_factor
-from vsacli.documents.preamble import find_surroundings
-from vsacli.documents.table import CsvTable, read_table
+from vsacli.documents.table import CsvTable, find_surroundings, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.files.recordings.first_rows import (
     GUESSED,
@@ -40,12 +39,11 @@ from vsacli.files.recordings.recording_text import is_proposed, mapping_lines
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.trajectory.recorded.columns import column_layout
-from vsacli.trajectory.recorded.disorder import Disorder, find_disorder
 from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.header_words import COMMANDED, ERROR, role_of
-from vsacli.trajectory.recorded.health import column_faults
+from vsacli.trajectory.recorded.health import column_faults, mean_rate, stamp_faults
+from vsacli.trajectory.recorded.problems import Disorder, find_disorder
 from vsacli.trajectory.recorded.recording import NEEDED, read_samples
-from vsacli.trajectory.recorded.stamps import mean_rate, stamp_faults
 
 TOGETHER = 16
 """Columns read at a time: a million rows of them take 128 MB, however many columns the table has."""

@@ -14,7 +14,7 @@ from vsacli.documents.number import BOOLEANS
 from vsacli.documents.time_column import TIME
 from vsacli.files.recordings.first_rows import GUESSED, TimeColumn
 from vsacli.files.recordings.guesses import TAKEN, Guess
-from vsacli.trajectory.recorded.stamps import step_text
+from vsacli.trajectory.recorded.health import step_text
 
 KIND = "recording"
 

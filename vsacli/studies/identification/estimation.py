@@ -110,8 +110,7 @@ class System(NamedTuple):
 
     def by_group(self, of_rows: FloatArray) -> FloatArray:
         """Return the sums of row values over each group, (groups,)."""
-        sums: FloatArray = np.bincount(self.group, of_rows, len(self.groups)).astype(np.float64)
-        return sums
+        return np.bincount(self.group, of_rows, len(self.groups)).astype(np.float64)
 
 
 LEAST_FREEDOM = 0.01

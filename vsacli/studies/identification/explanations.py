@@ -26,8 +26,7 @@ from vsacli.studies.identification.estimation import (
     wider,
 )
 from vsacli.studies.identification.fitted_system import Solution
-from vsacli.studies.identification.identification_text import rounded_by_error
-from vsacli.studies.identification.identified_values import CHANGED
+from vsacli.studies.identification.identification_text import CHANGED, rounded_by_error
 from vsacli.studies.identification.independence import independence
 from vsacli.studies.identification.residual_causes import Cause, residual_causes
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from vsacli.base.errors import InputError
 from vsacli.base.progress import Countdown, Progress, unseen
+from vsacli.base.texts import listed
 from vsacli.base.wrench import WRENCH_NAMES, wrench_columns
 from vsacli.documents.columns_file import load_columns
 from vsacli.documents.edited import edited, moved_files, texts_at, unaliased, with_errors
@@ -40,14 +41,15 @@ from vsacli.studies.identification.identification_report import (
     Identification,
     system_report,
     torque_comparisons,
+    torque_deviations,
 )
-from vsacli.studies.identification.identification_text import rounded_by_error
-from vsacli.studies.identification.identified_values import (
+from vsacli.studies.identification.identification_text import (
     Number,
     RecordReport,
     Residual,
     SystemReport,
     far_from_file,
+    rounded_by_error,
 )
 from vsacli.studies.identification.link_equations import link_system, without_links
 from vsacli.studies.identification.motor_equations import (
@@ -76,7 +78,6 @@ from vsacli.studies.identification.recordings import (
     complete_joints,
     read_motor_recording,
 )
-from vsacli.studies.identification.torque_deviations import torque_deviations
 
 WORDS = (*GROUPS, LINKS)
 """Names of the groups of parameters."""
@@ -331,7 +332,7 @@ def _ignored(records: Sequence[Record]) -> str:
     unused = list(dict.fromkeys(column for record in records for column in record.unused))
     if not unused:
         return ""
-    return f"; ignored columns: {', '.join(unused[:MOST_IGNORED])}{', ...' if unused[MOST_IGNORED:] else ''}"
+    return f"; ignored columns: {listed(unused, MOST_IGNORED)}"
 
 
 def _explanations(

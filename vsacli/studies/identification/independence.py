@@ -111,8 +111,7 @@ def first_independent(columns: FloatArray, tolerance: float) -> IndexArray:
     scale = np.linalg.norm(columns, axis=0)
     there = np.flatnonzero(scale > NOTHING * scale.max(initial=0.0))
     r = np.linalg.qr(columns[:, there] / scale[there], mode="r")
-    independent: IndexArray = there[np.abs(np.diagonal(r)) > tolerance]
-    return independent
+    return np.asarray(there[np.abs(np.diagonal(r)) > tolerance])
 
 
 def shares_of(kept: FloatArray, columns: FloatArray, tolerance: float) -> FloatArray:
@@ -121,8 +120,7 @@ def shares_of(kept: FloatArray, columns: FloatArray, tolerance: float) -> FloatA
     shares, *_ = np.linalg.lstsq(kept / scale, columns, rcond=None)
     shares[:, of_others <= NOTHING * of_others.max(initial=0.0)] = 0.0
     shares[np.abs(shares) < CERTAIN * tolerance * of_others] = 0.0
-    found: FloatArray = shares / scale[:, None]
-    return found
+    return np.asarray(shares / scale[:, None])
 
 
 def in_words(terms: Iterable[tuple[int, float]], names: Sequence[str]) -> str:

@@ -32,7 +32,7 @@ from vsacli.studies.identification.independence import independence
 from vsacli.studies.identification.link_equations import link_system, without_links
 from vsacli.studies.identification.motor_equations import MOTORS as MOTORS_GROUP
 from vsacli.studies.identification.motor_equations import MotorSystem, group_of, motor_names
-from vsacli.studies.identification.recorded_columns import MOTOR, POSITION, TORQUE
+from vsacli.studies.identification.recording_faults import MOTOR, POSITION, TORQUE
 from vsacli.studies.identification.recordings import Record
 from vsacli.studies.measured.agreement import Agreement, straight_line
 from vsacli.studies.measured.likely_causes import exchanged, likely_causes

@@ -1,27 +1,31 @@
-"""Faults of the columns of a recording that prevent a fit, and those that make it unreliable.
+"""Columns of a recording that identification requires, and their faults.
 
-They are found column by column; faults that only the robot's equations reveal are found in
-`recording_checks`.
+Each column has its own time stamps, and values in SI units. Faults prevent a fit, or make it unreliable;
+those that only the robot's equations reveal are found in `recording_checks`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from vsacli.actuators.drivetrain import SIDES
+from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.simulation_variables import measured
 from vsacli.base.texts import counted
 from vsacli.base.units import time_text
-from vsacli.base.variables import VARIABLES
+from vsacli.base.variables import VARIABLES, Variable
+from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
+from vsacli.documents.csv_file import split_heading
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.recorded_columns import (
-    TORQUE,
-    RecordedColumn,
-)
-from vsacli.trajectory.recorded.faults import angle_wraps
-from vsacli.trajectory.recorded.health import column_faults
-from vsacli.trajectory.recorded.quantization import Quantization
-from vsacli.trajectory.recorded.stamps import stamp_faults, step_text
+from vsacli.studies.measured.measured_columns import MeasuredSignal, Recording, preferred, read_recording
+from vsacli.trajectory.recorded.even_stamps import elapsed_times
+from vsacli.trajectory.recorded.faults import Quantization, angle_wraps
+from vsacli.trajectory.recorded.health import column_faults, stamp_faults, step_text
 from vsacli.trajectory.recorded.thresholds import (
     GAP_STEPS,
     LARGEST_ANGLE,
@@ -29,6 +33,103 @@ from vsacli.trajectory.recorded.thresholds import (
     LONGEST_STEP,
     SHORTEST_STEP,
 )
+
+POSITION, MOTOR, TORQUE, CURRENT = "q", "theta", "tau_motor", "current"
+
+READINGS = (POSITION, MOTOR, TORQUE)
+"""Required columns of a joint.
+
+Simulated sensor readings, `q_measured` and so on, take precedence.
+"""
+
+Where: TypeAlias = tuple[str, int, int | None]
+"""Variable, joint index, and number of the motor or None."""
+
+
+class RecordedColumn(NamedTuple):
+    """A recorded column.
+
+    Attributes:
+        name: name in the file.
+        place: variable, joint and motor.
+        time: times of the samples, (samples,) in s since the first row of the file.
+        values: values, (samples,), SI units on the joint side of the gear.
+        has_unit: whether the file gives a unit after the name.
+    """
+
+    name: str
+    place: Where
+    time: FloatArray
+    values: FloatArray
+    has_unit: bool
+
+
+class _RobotColumns(NamedTuple):
+    """The possible columns of a robot, as a `Jointed`."""
+
+    robot: Robot
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return self.robot.joint_names
+
+    @property
+    def joint_types(self) -> tuple[str, ...]:
+        return self.robot.joint_types
+
+    @property
+    def gear_ratio(self) -> FloatArray:
+        """Gear ratios of the motors, (joints, 2); NaN where the file gives none."""
+        sides = [side for actuator in self.robot.actuators for side in actuator.sides]
+        ratios = [side.gear_ratio if side and side.gear_ratio else math.nan for side in sides]
+        return np.array(ratios).reshape(-1, SIDES)
+
+    def existing(self, variable: Variable) -> BoolArray:
+        """Return the existing columns of a variable of joints."""
+        return np.array([joint.has_columns(variable) for joint in self.robot.joints])
+
+
+def recorded_columns(
+    robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED
+) -> tuple[list[RecordedColumn], tuple[str, ...], Recording]:
+    """Return the required columns, the names of the others, and the recording as read.
+
+    Args:
+        robot: recorded robot.
+        path: path of the CSV file.
+        mapping: mapping of other column names.
+
+    Raises:
+        InputError: no column is required, a unit does not fit its variable, or times do not ascend.
+    """
+    wanted = [(name, 0, VARIABLES[name]) for name in (*READINGS, CURRENT)]
+    wanted += [(measured(name), 1, VARIABLES[name]) for name in READINGS]
+    recording = read_recording(path, _RobotColumns(robot), wanted, robot.name, mapping)
+    united = {name for name, unit in map(split_heading, recording.table.columns) if unit is not None}
+    stamps, columns = elapsed_times(recording.time), []
+    for place, signal in _preferred_columns(recording.signals).items():
+        there = np.isfinite(signal.values)
+        values = signal.values[there] * _torque_of_current(robot, signal)
+        columns.append(RecordedColumn(signal.column, place, stamps[there], values, signal.column in united))
+    used = {column.name for column in columns}
+    others = [signal.column for signal in recording.signals if signal.column not in used]
+    return columns, (*others, *recording.table.unknown_columns), recording
+
+
+def _preferred_columns(signals: Sequence[MeasuredSignal]) -> dict[Where, MeasuredSignal]:
+    """Return the preferred column for each place: sensor readings first, torques before currents."""
+    best = preferred(signals)
+    currents = {place: best.pop(place) for place in tuple(best) if place[0] == CURRENT}
+    return {(TORQUE, *place[1:]): signal for place, signal in currents.items()} | best
+
+
+def _torque_of_current(robot: Robot, signal: MeasuredSignal) -> float:
+    """Return the factor that converts a column to torques if it holds currents, otherwise 1."""
+    variable, joint, motor, *_ = signal.place
+    if variable != CURRENT or motor is None:
+        return 1.0
+    return robot.joints[joint].actuator.motors[motor - 1].torque_constant or 1.0
+
 
 FEWEST_SAMPLES = 200
 """Smallest number of samples in a column for a fit: four seconds at 50 Hz."""

@@ -13,19 +13,21 @@ import scipy
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.texts import listed
 from vsacli.base.variables import MOTORS
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.source import Source
 from vsacli.robot.model import Robot
-from vsacli.studies.identification.recorded_columns import (
+from vsacli.studies.identification.recording_faults import (
     MOTOR,
     POSITION,
     TORQUE,
     RecordedColumn,
     Where,
     recorded_columns,
+    stopping_faults,
+    unreliable_fit_sentences,
 )
-from vsacli.studies.identification.recording_faults import stopping_faults, unreliable_fit_sentences
 
 INTERPOLATION = 3
 """Degree of the spline that resamples a column."""
@@ -206,8 +208,7 @@ def _missing_columns_text(robot: Robot, places: Sequence[Where]) -> str:
             if name == variable
         ]
         if names:
-            listed = ", ".join(names[:MOST_LISTED]) + (", ..." if len(names) > MOST_LISTED else "")
-            clauses.append(f"{listed} ({words})")
+            clauses.append(f"{listed(names, MOST_LISTED)} ({words})")
     one = len(places) == 1
     missing = f"the {'column' if one else 'columns'} {' and '.join(clauses)} {'is' if one else 'are'} missing"
     torque = any(name == TORQUE for name, *_ in places)

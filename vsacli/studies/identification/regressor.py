@@ -236,8 +236,7 @@ class BaseParameters(NamedTuple):
 
     def of(self, parameters: FloatArray) -> FloatArray:
         """Return the combinations, (..., base), of the parameters, (..., parameters)."""
-        values: FloatArray = parameters @ self.shares.T
-        return values
+        return parameters @ self.shares.T
 
     def names(self, names: Sequence[str]) -> list[str]:
         """Return the name of each combination's first parameter, with a star if it has others."""

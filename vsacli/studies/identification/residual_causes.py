@@ -19,7 +19,7 @@ from vsacli.studies.identification.conditioning import ConditionedRecording
 from vsacli.studies.identification.estimation import Equations, least_squares
 from vsacli.studies.identification.fitted_system import Solution
 from vsacli.studies.identification.motor_equations import LINKS, motor_names
-from vsacli.studies.identification.recorded_columns import MOTOR, TORQUE
+from vsacli.studies.identification.recording_faults import MOTOR, TORQUE
 
 STEP = 1e-4
 """Initial error of a position, rad (m), in the search for it."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText, cell
+from vsacli.base.tables import ReportText, TextReport, cell
 from vsacli.documents.source import Source
 
 Still: TypeAlias = Literal["computed", "measured"]
@@ -90,7 +90,7 @@ SHOWN_LAG = 5e-4
 
 
 @dataclass(frozen=True)
-class Comparison(Published):
+class Comparison(Published, TextReport):
     """The comparison of measurements with a result.
 
     Attributes:
@@ -120,19 +120,15 @@ class Comparison(Published):
 
     format: ClassVar[str] = "vsacli-comparison/2"
     shape: ClassVar = {
-        "format": "format",
-        **{name: name for name in ("result", "recording", "time_offset", "time_offset_error")},
-        **{name: name for name in ("found", "duration", "compared")},
-        **{name: name for name in ("signals", "warnings", "notes")},
+        **named("format", "result", "recording", "time_offset", "time_offset_error"),
+        **named("found", "duration", "compared", "signals", "warnings", "notes"),
     }
-
-    def __str__(self) -> str:
-        return str(self.as_text())
 
     @property
     def title(self) -> str:
         """Names, the largest relative error, and the time offset."""
-        return f"{self.result}, {self.recording}: {self._worst()}; {self._alignment()}"
+        offset = _with_error(self.time_offset, self.time_offset_error, "s", "+.4f")
+        return f"{self.result}, {self.recording}: {self._worst()}; time offset {offset}"
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""
@@ -147,10 +143,6 @@ class Comparison(Published):
         if worst is None:
             return "no relative error, since no computed signal changes"
         return f"rms error up to {100 * worst.share:.3g} % ({worst.column})"
-
-    def _alignment(self) -> str:
-        """Return at which time in the recording the result begins."""
-        return f"time offset {_with_error(self.time_offset, self.time_offset_error, 's', '+.4f')}"
 
     def _rows(self) -> list[tuple[str, ...]]:
         header = (

@@ -19,10 +19,9 @@ from vsacli.documents.csv_file import split_heading
 from vsacli.documents.table import CsvTable, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
-from vsacli.trajectory.recorded.disorder import replace_stamps
 from vsacli.trajectory.recorded.header_problems import ColumnNames, misspellings
 from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
-from vsacli.trajectory.recorded.problems import time_problems
+from vsacli.trajectory.recorded.problems import replace_stamps, time_problems
 
 USUAL = ("q", "tau_motor")
 """Variables that a message names as examples of columns."""
@@ -147,9 +146,7 @@ def read_recording(
         raise InputError(Problem(table.source.path, table.header.line, text) for text in problems)
     order = {name: number for number, name in enumerate(places)}
     signals = [
-        MeasuredSignal(
-            name, places[name], _scaled_values(table.values[:, index], factors[index] * places[name].gear)
-        )
+        MeasuredSignal(name, places[name], table.values[:, index] * (factors[index] * places[name].gear))
         for index, name in enumerate(names)
         if name in places
     ]
@@ -277,10 +274,6 @@ def _no_column(header: ColumnNames, places: Mapping[str, Place]) -> str:
 
 
 @np.errstate(over="ignore")  # an overflow to infinity means a missing sample
-def _scaled_values(values: FloatArray, factor: float) -> FloatArray:
-    return np.asarray(values * factor)
-
-
 def _elapsed(table: CsvTable, at: int, factors: Mapping[int, float], rate: float | None) -> FloatArray:
     """Return the times since the first sample, s; with a stated rate it stands in place of wrong stamps."""
     stamps = table.values[:, at]

@@ -13,7 +13,7 @@ from vsacli.base.arrays import BoolArray, FlagArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.flags import FLAG_BITS, Flag, has_flag
 from vsacli.base.json_records import Published
-from vsacli.base.tables import ReportText, cell
+from vsacli.base.tables import ReportText, TextReport, cell
 from vsacli.base.variables import MOTORS
 from vsacli.results.charts.comparison import check_comparable
 from vsacli.results.store.reader import StoredResult
@@ -61,7 +61,7 @@ class FlagCount(Published):
 
 
 @dataclass(frozen=True)
-class ResultDifference(Published):
+class ResultDifference(Published, TextReport):
     """The comparison of two results.
 
     Attributes:
@@ -78,9 +78,6 @@ class ResultDifference(Published):
     signals: tuple[SignalDifference, ...]
     flags: tuple[FlagCount, ...]
     format: str = "vsacli-difference/1"
-
-    def __str__(self) -> str:
-        return str(self.as_text())
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""

@@ -165,8 +165,7 @@ class Acceptance:
 
     def beyond_path(self, joint: Joint, load: Load) -> BoolArray:
         """Return a mask of the samples that exceed a limit of position or velocity, (samples,)."""
-        beyond: BoolArray = self._limit_flags(joint, _path(load), load.instants) != 0
-        return beyond
+        return np.asarray(self._limit_flags(joint, _path(load), load.instants) != 0)
 
     def _driven(self, joint: Joint, load: Load) -> OfJoint:
         """Return all variables of one joint, by name."""

@@ -89,8 +89,7 @@ class CheapestPaceSearch(PacedSearch):
 
     def _lasting(self, pace: FloatArray) -> FloatArray:
         """Return a pace scaled to the commanded duration, (instants,)."""
-        scaled: FloatArray = pace * (self._span[1] / np.trapezoid(pace, self._s))
-        return scaled
+        return pace * (self._span[1] / np.trapezoid(pace, self._s))
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
         stiffness = {key: LIFTED * row for key, row in rows.items() if key is not None}

@@ -21,6 +21,7 @@ from vsacli.base.units import ENERGY, TORQUE, Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import drive
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import with_copied_actuator
@@ -86,8 +87,7 @@ class MotorsOfRun(NamedTuple):
 
     def torques(self, index: int) -> FloatArray:
         """Return the torques of the motors that a joint has, (motors, samples)."""
-        torques: FloatArray = self.tau_motor[:, index].T[: self.robot.joints[index].actuator.motor_count]
-        return torques
+        return self.tau_motor[:, index].T[: self.robot.joints[index].actuator.motor_count]
 
 
 @dataclass(frozen=True)
@@ -136,8 +136,7 @@ class Criterion:
 
     def weights(self, time: FloatArray) -> FloatArray:
         """Return the weights of each integrand at each instant, (integrands, instants)."""
-        weights: FloatArray = trapezoidal(time)[None]
-        return weights
+        return trapezoidal(time)[None]
 
     def bound_count(self, joint: Joint) -> int:  # noqa: ARG002
         """Return the number of `bounds`."""
@@ -202,8 +201,7 @@ class Torque(Criterion):
 
     def weights(self, time: FloatArray) -> FloatArray:
         """Return the weights of a mean over time."""
-        weights: FloatArray = trapezoidal(time)[None] / (time[-1] - time[0])
-        return weights
+        return np.asarray(trapezoidal(time)[None] / (time[-1] - time[0]))
 
     def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the rms torque, N m (N)."""
@@ -339,13 +337,6 @@ class Peak(Criterion):
 
 CRITERIA = {criterion.name: criterion for criterion in (Torque, Energy, CopperLoss, Peak)}
 """Criteria by name."""
-
-
-def trapezoidal(time: FloatArray) -> FloatArray:
-    """Return the weights of the trapezoidal rule, (instants,) in s."""
-    halves = np.diff(time) / 2
-    weights: FloatArray = np.append(halves, 0.0) + np.append(0.0, halves)
-    return weights
 
 
 ENDS_OF_CORRIDOR = "minimum attainable stiffness", "maximum attainable stiffness"

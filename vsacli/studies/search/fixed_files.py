@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
@@ -17,7 +16,7 @@ from vsacli.base.outputs import Outputs
 from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, WRENCHES, Signal, wrench_on
 from vsacli.base.texts import for_yaml
 from vsacli.base.wrench import wrench_columns
-from vsacli.documents.edited import edited, moved_files
+from vsacli.documents.edited import edited, format_on_one_line, moved_files
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.file import text_to_change
 from vsacli.studies.search.fix_report import Fix, branch_path
@@ -154,19 +153,7 @@ def _document(
             yield f"{WRENCHES}:\n"
         indent = "  " if signal.tool else ""
         yield f"{indent}{signal.tool or signal.key}:\n"
-        yield from (f"{indent}  {key}: {_in_one_line(value)}\n" for key, value in keys.items())
-
-
-def _in_one_line(content: Any) -> str:
-    """Return content as YAML in flow style, with identifiers unquoted."""
-    match content:
-        case dict():
-            return "{" + ", ".join(f"{key}: {_in_one_line(each)}" for key, each in content.items()) + "}"
-        case list():
-            return "[" + ", ".join(map(_in_one_line, content)) + "]"
-        case str() if content.isidentifier():
-            return content
-    return for_yaml(content) if isinstance(content, str) else json.dumps(content)
+        yield from (f"{indent}  {key}: {format_on_one_line(value)}\n" for key, value in keys.items())
 
 
 def _write_table(

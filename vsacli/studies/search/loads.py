@@ -15,9 +15,8 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.base.wrench import WRENCH_NAMES, Wrench
 from vsacli.dynamics.inverse import command_of, link_torques_along, usual_block
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.times import stretch
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 
 class Instants(NamedTuple):

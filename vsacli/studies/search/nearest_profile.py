@@ -155,8 +155,7 @@ def _shapes(free: BoolArray) -> FloatArray:
 def _pieces_near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray:
     """Return a mask of the pieces within `reach` of any of the ascending times."""
     next_time = np.append(times, np.inf)[np.searchsorted(times, ends[:-1] - reach)]
-    near: BoolArray = next_time <= ends[1:] + reach
-    return near
+    return next_time <= ends[1:] + reach
 
 
 def _least_amounts(bounds: Bounds, knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:

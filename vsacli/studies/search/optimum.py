@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText
+from vsacli.base.tables import ReportText, TextReport
 from vsacli.base.texts import counted, warnings_and_notes
 from vsacli.base.units import in_header
 from vsacli.robot.model import Robot
@@ -109,7 +109,7 @@ class TimingOptimum(Published):
 
 
 @dataclass(frozen=True)
-class Optimum(Published):
+class Optimum(Published, TextReport):
     """The result of an optimization: the best trajectory that was found.
 
     Attributes:
@@ -173,9 +173,6 @@ class Optimum(Published):
     def robot_name(self) -> str:
         """Name of the robot."""
         return self.robot.name
-
-    def __str__(self) -> str:
-        return str(self.as_text())
 
     @property
     def title(self) -> str:

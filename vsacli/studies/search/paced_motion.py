@@ -92,13 +92,11 @@ class PacedMotion:
             axis=0,
         )
         inner = (self.s > 0) & (self.s < self.s[-1])
-        resting: BoolArray = still & np.roll(still, 1) & np.roll(still, -1) & inner
-        return resting
+        return np.asarray(still & np.roll(still, 1) & np.roll(still, -1) & inner)
 
     def stiffness(self, joint: int) -> FloatArray:
         """Return the commanded stiffness of a joint, (instants,)."""
-        stiffness: FloatArray = self._path.by_s[STIFFNESS.key][joint]
-        return stiffness
+        return np.asarray(self._path.by_s[STIFFNESS.key][joint])
 
     def stiffness_rates(self, pace: Sequence[Row], by_s: Sequence[Row]) -> list[Row]:
         """Return a stiffness and its first two derivatives by time, from those by s."""

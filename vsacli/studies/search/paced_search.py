@@ -13,8 +13,8 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.studies.search.acceptance import ImpossibleError
-from vsacli.studies.search.criteria import trapezoidal
 from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum
 from vsacli.studies.search.paced_motion import (
     CLEARANCE,

@@ -23,7 +23,7 @@ from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.compute.vector import add, exact, mul
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques, link_resistance
 from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
+from vsacli.trajectory.trajectory import Motion
 
 Row: TypeAlias = Any
 """Array (..., instants), which may carry derivatives."""

@@ -166,8 +166,7 @@ class _Expanded:
     def changes(self, step: FloatArray) -> FloatArray:
         """Return the first-order changes of the existing bounds with a step."""
         moved = self.group.basis @ step[self.group.unknowns]
-        changes: FloatArray = np.sum(self.bounds.gradients * moved, axis=1)[self.group.there]
-        return changes
+        return np.asarray(np.sum(self.bounds.gradients * moved, axis=1)[self.group.there])
 
     def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
         """See `Point.newton_matrix`; (own unknowns, own unknowns)."""
@@ -181,8 +180,7 @@ class _Expanded:
         weighted = slopes * self._of_all(stiffening).T[:, None]
         joined = (curved + weighted @ slopes.swapaxes(1, 2)) @ self.group.by_instant
         size = joined.shape[2]
-        matrix: FloatArray = self.group.by_instant.reshape(-1, size).T @ joined.reshape(-1, size)
-        return matrix
+        return self.group.by_instant.reshape(-1, size).T @ joined.reshape(-1, size)
 
     def _curvature(self, multipliers: FloatArray) -> FloatArray:
         """Return the Hessian of the Lagrangian by rows, (instants, rows, rows), by finite differences."""
@@ -194,8 +192,7 @@ class _Expanded:
         here = _weighted_gradient(self.group.weights, self.integrands.gradients)
         here = here + _weighted_gradient(multipliers, self.bounds.gradients)
         second = (np.stack(moved, axis=1) - here[:, None, :]) / self._steps[None, :, None]
-        symmetric: FloatArray = (second + second.swapaxes(0, 1)).transpose(2, 0, 1) / 2
-        return symmetric
+        return (second + second.swapaxes(0, 1)).transpose(2, 0, 1) / 2
 
     def _of_all(self, of_bounds: FloatArray) -> FloatArray:
         """Return values of the existing bounds with zeros for the others, (bounds, instants)."""
@@ -204,15 +201,13 @@ class _Expanded:
         return spread
 
     def _by_unknowns(self, by_rows: FloatArray) -> FloatArray:
-        summed: FloatArray = by_rows.T.ravel() @ self.group.by_instant.reshape(by_rows.size, -1)
-        return summed
+        return by_rows.T.ravel() @ self.group.by_instant.reshape(by_rows.size, -1)
 
 
 def _weighted_gradient(weights: FloatArray, gradients: FloatArray) -> FloatArray:
     """Return the weighted sum of gradients, (rows, instants); gradients with zero weight may be NaN."""
     kept = np.where(weights[:, None, :] != 0, gradients, 0.0)
-    summed: FloatArray = np.sum(weights[:, None, :] * kept, axis=0)
-    return summed
+    return np.asarray(np.sum(weights[:, None, :] * kept, axis=0))
 
 
 class SeparablePoint:

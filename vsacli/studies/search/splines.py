@@ -128,8 +128,7 @@ class SplineSpace:
 
     def fitted(self, time: FloatArray, values: FloatArray) -> FloatArray:
         """Return the coefficients of the spline nearest to values, (shapes,), by least squares."""
-        amounts: FloatArray = np.linalg.lstsq(self.basis(time, 1)[0], values - self.offset, rcond=None)[0]
-        return amounts
+        return np.asarray(np.linalg.lstsq(self.basis(time, 1)[0], values - self.offset, rcond=None)[0])
 
 
 def _piece_ends(span: tuple[float, float], pieces: int, allowed: FloatArray | None) -> FloatArray:

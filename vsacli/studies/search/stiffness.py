@@ -270,8 +270,7 @@ class StiffnessSearch:
 
     def _fitted(self, space: SplineSpace, values: FloatArray) -> FloatArray:
         """Return the coefficients of the spline nearest to values at all instants, (shapes,)."""
-        fitted: FloatArray = np.linalg.lstsq(self._basis(space)[0], values, rcond=None)[0]
-        return fitted
+        return np.asarray(np.linalg.lstsq(self._basis(space)[0], values, rcond=None)[0])
 
     def _finer_than(self, pieces: int) -> Iterator[int]:
         """Yield numbers of pieces, each twice the previous one, up to the largest allowed."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.duals import Dual
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.studies.search.acceptance import Range
-from vsacli.studies.search.criteria import trapezoidal
 from vsacli.studies.search.interior_point import minimize
 from vsacli.studies.search.separable import Group, SeparableProblem, interior
 

@@ -119,13 +119,11 @@ class Task:
     @cached_property
     def _stiffness_rms(self) -> FloatArray:
         stiffness = self.trajectory.block(0, self.trajectory.samples).commanded[STIFFNESS.key]
-        rms: FloatArray = np.sqrt(np.mean(stiffness**2, axis=0))
-        return rms
+        return np.asarray(np.sqrt(np.mean(stiffness**2, axis=0)))
 
     def relative_size(self, index: int, change: FloatArray) -> FloatArray:
         """Return the rms of additions to the stiffness of a joint, (..., samples), over its rms stiffness."""
-        size: FloatArray = np.sqrt(np.mean(change**2, axis=-1)) / self._stiffness_rms[index]
-        return size
+        return np.asarray(np.sqrt(np.mean(change**2, axis=-1)) / self._stiffness_rms[index])
 
     def acceptance_with(self, found: Combination) -> Acceptance:
         """Return the acceptance rule for the robot with the branches of a combination."""

@@ -15,9 +15,10 @@ from vsacli.analysis.tool_report import unjudged_tools_text
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.base.units import TORQUE
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
-from vsacli.studies.sensitivities.band import Band
+from vsacli.studies.sensitivities.band import Band, share_of_peak
 from vsacli.studies.sensitivities.joint_derivatives import MARGIN
 from vsacli.studies.sensitivities.sensitivity_report import JointEffect, ParameterEffect, Sensitivity
 from vsacli.studies.sensitivities.slopes import Derivatives, SensitivityRun
@@ -70,7 +71,7 @@ class Effects:
         """
         shape = (len(steps), joints)
         self._steps = steps
-        self._weights = _trapezoidal_weights(times)
+        self._weights = trapezoidal(times)
         self._done = 0
         self.peak = np.zeros(joints)
         self.largest, self.time, self.spent = np.zeros((3, *shape))
@@ -124,13 +125,6 @@ class Effects:
         self.largest[at, joint] = found[larger]
         self.time[at, joint] = time[worst[larger] % len(time)]
         self.motor[at, joint] = 1 + worst[larger] // len(time)
-
-
-def _trapezoidal_weights(times: FloatArray) -> FloatArray:
-    """Return the weights of the trapezoidal rule over times, (samples,) in s."""
-    halves = np.diff(times) / 2
-    weights: FloatArray = np.append(halves, 0.0) + np.append(0.0, halves)
-    return weights
 
 
 def sensitivity(
@@ -231,7 +225,7 @@ def _effect(
     joints = {
         name: JointEffect(
             torque=float(effects.largest[place, joint]),
-            share=_share_of_peak(float(effects.largest[place, joint]), float(effects.peak[joint])),
+            share=share_of_peak(float(effects.largest[place, joint]), float(effects.peak[joint])),
             time=float(effects.time[place, joint]),
             motor=int(effects.motor[place, joint]),
             margin=float(margins[joint]),
@@ -249,7 +243,3 @@ def _effect(
         joints=joints,
         tolerance=tolerance,
     )
-
-
-def _share_of_peak(change: float, peak: float) -> float:
-    return change / peak if peak > 0 else math.nan

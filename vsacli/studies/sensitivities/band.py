@@ -73,8 +73,7 @@ class Reversals:
     def uncertain(self, speed: FloatArray, deviation: FloatArray) -> BoolArray:
         """Return a mask of joints with a motor of uncertain direction, (samples, joints); see `variance`."""
         near = (deviation > 0) & (np.abs(speed) < NEAR * deviation)
-        found: BoolArray = np.any(near & (self._forward + self._backward > 0), axis=-1)
-        return found
+        return np.asarray(np.any(near & (self._forward + self._backward > 0), axis=-1))
 
 
 @dataclass(frozen=True)
@@ -222,7 +221,7 @@ def _joint_band(run: _BandBlock) -> JointBand:
     reversing = float(run.by_reversals[worst, motor]) / deviation**2 if deviation > 0 else 0.0
     of_torque = (
         deviation,
-        _spread_share(deviation, peak),
+        share_of_peak(deviation, peak),
         float(run.time[worst]),
         bool(run.uncertain.any()),
         reversing,
@@ -241,5 +240,6 @@ def _joint_band(run: _BandBlock) -> JointBand:
     )
 
 
-def _spread_share(spread: float, peak: float) -> float:
-    return spread / peak if peak > 0 else math.nan
+def share_of_peak(size: float, peak: float) -> float:
+    """Return the ratio of a size to a peak; NaN without one."""
+    return size / peak if peak > 0 else math.nan

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText, headline
+from vsacli.base.tables import ReportText, TextReport, headline
 from vsacli.base.texts import counted, warnings_and_notes
 from vsacli.base.units import in_header
 from vsacli.studies.sensitivities.band import JointBand, TorqueCurves
@@ -77,7 +77,7 @@ class ParameterEffect(Published):
 
 
 @dataclass(frozen=True)
-class Sensitivity(Published):
+class Sensitivity(Published, TextReport):
     """The dependence of a run on each parameter of its robot.
 
     Attributes:
@@ -114,9 +114,6 @@ class Sensitivity(Published):
         "band?": "band",
         "monte_carlo?": "monte_carlo",
     }
-
-    def __str__(self) -> str:
-        return str(self.as_text())
 
     @property
     def title(self) -> str:

@@ -21,13 +21,12 @@ from vsacli.compute.vector import Scalar
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import adapt_trajectory, command_of, compute_block
-from vsacli.dynamics.recursion import MovingBody, backward, forward
+from vsacli.dynamics.recursion import backward, forward
 from vsacli.dynamics.recursion_inputs import RecursionInputs
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters, seeded
 from vsacli.studies.sensitivities.joint_derivatives import MARGIN, OF_MOTORS, drive_derivatives
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 
 class TorqueSlopes(NamedTuple):
@@ -63,14 +62,9 @@ def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> 
     bodies = forward(plain)
     for joint, places in _parameter_indices(chosen).items():
         mixed = _mixed_inputs(plain, carrying, joint)
-        known = {} if joint is None else _unmoved(robot, joint, bodies)
-        torques = backward(mixed, forward(mixed, known))
+        unmoved = (at for at in range(len(bodies)) if joint is not None and joint not in robot.paths[at])
+        torques = backward(mixed, forward(mixed, {at: bodies[at] for at in unmoved}))
         yield TorqueSlopes(places, [_derivatives(each, places, samples) for each in torques])
-
-
-def _unmoved(robot: Robot, joint: int, bodies: Sequence[MovingBody]) -> dict[int, MovingBody]:
-    """Return the links that a joint does not move, by index."""
-    return {index: body for index, body in enumerate(bodies) if joint not in robot.paths[index]}
 
 
 def _parameter_indices(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
@@ -189,8 +183,7 @@ class Derivatives:
     @property
     def time(self) -> FloatArray:
         """Times of the samples, (samples,) in s."""
-        time: FloatArray = self.block.time
-        return time
+        return np.asarray(self.block.time)
 
     @property
     def margin(self) -> FloatArray:
@@ -265,7 +258,7 @@ def derivatives_of(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) ->
     block, joints = compute_block(robot, motion), range(len(robot.joints))
     groups, by_torques = [], []
     for index in joints:
-        own = [place for place, each in enumerate(chosen) if _is_drive_parameter(each, index)]
+        own = [place for place, each in enumerate(chosen) if each.joint == index and each.part == ACTUATOR]
         command = command_of(index, block.arrays())
         derived = drive_derivatives(robot, index, command, [chosen[at] for at in own])
         by_torques.append(derived.by_torques)
@@ -279,7 +272,3 @@ def derivatives_of(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) ->
         ]
         groups.append(ParameterGroup([of_links[at] for at in places], of_joints))
     return Derivatives(block, len(chosen), groups)
-
-
-def _is_drive_parameter(parameter: Parameter, joint: int) -> bool:
-    return parameter.joint == joint and parameter.part == ACTUATOR

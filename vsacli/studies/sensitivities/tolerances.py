@@ -20,15 +20,13 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has_flag
 from vsacli.base.json_records import Published, named
-from vsacli.base.units import Quantity
 from vsacli.base.variables import Block
 from vsacli.compute.engine import choose
-from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import LARGEST
 from vsacli.documents.number import PER_CENT, evaluate
 from vsacli.documents.source import Problems, read_source
-from vsacli.documents.tree import parse_yaml
+from vsacli.documents.tree import MapNode, Node, TextNode, parse_yaml
 from vsacli.dynamics.inverse import adapt_trajectory, compute_block, usual_block
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, no_match
@@ -37,7 +35,7 @@ from vsacli.trajectory.trajectory import Trajectory
 RELATIVE = 0.01
 """Relative change of most parameters."""
 
-SMALL_CHANGES: Mapping[Quantity, tuple[float, str]] = {
+SMALL_CHANGES: Mapping[units.Quantity, tuple[float, str]] = {
     units.LENGTH: (1e-3, "1 mm"),
     units.ANGLE: (math.radians(1), "1 deg"),
 }
@@ -134,10 +132,10 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
     source, text = read_source(path)
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
-    if not isinstance(root, tree.MapNode):
+    if not isinstance(root, MapNode):
         problems.fail(root.line, f"expected {CONTENT}, found {root}")
     stated = root.entries.get("format")
-    if isinstance(stated, tree.TextNode):
+    if isinstance(stated, TextNode):
         kind = stated.text.removeprefix("vsacli-").partition("/")[0]
         raise InputError.one(f"is a {kind}; expected {CONTENT}", source.path)
     found: list[Tolerance | None] = [None] * len(chosen)
@@ -156,7 +154,7 @@ def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tup
     return tuple(found)
 
 
-def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
+def distribution(node: Node, value: float, unit: str) -> Tolerance:
     """Return the tolerance that an entry of a file gives to a value.
 
     Args:
@@ -167,10 +165,10 @@ def distribution(node: tree.Node, value: float, unit: str) -> Tolerance:
     Raises:
         InputError: the entry is invalid.
     """
-    if not isinstance(node, tree.MapNode) or len(node.entries) != 1:
+    if not isinstance(node, MapNode) or len(node.entries) != 1:
         raise InputError.one(f"expected a distribution, {FORM}, found {node}")
     ((shape, size),) = node.entries.items()
-    if shape not in SHAPES or not isinstance(size, tree.TextNode):
+    if shape not in SHAPES or not isinstance(size, TextNode):
         raise InputError.one(f"expected a distribution, {FORM}, found {shape}: {size}")
     share = PER_CENT.fullmatch(size.text)
     if share is None:
@@ -289,8 +287,7 @@ def _torques_of_robots(
 
 def _failed_joints(block: Block) -> BoolArray:
     """Return a mask of joints with an infeasible or singular sample, (joints,)."""
-    failed: BoolArray = np.any(has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR), axis=0)
-    return failed
+    return np.asarray(np.any(has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR), axis=0))
 
 
 def _run_torques(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:

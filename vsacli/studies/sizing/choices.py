@@ -18,7 +18,7 @@ from vsacli.actuators.reach import LIMIT_ROUNDING
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.json_records import Published, named
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, listed
 from vsacli.robot.joint import Joint
 from vsacli.studies.sizing.catalog import CatalogMotor
 from vsacli.studies.sizing.demand import MotorDemand
@@ -96,9 +96,8 @@ def check_criterion(criterion: str, motors: Sequence[CatalogMotor], path: str) -
     needed = {"copper_loss": "resistance", "mass": "mass"}.get(criterion)
     lacking = [motor.name for motor in motors if needed and getattr(motor, needed) is None]
     if lacking:
-        names = ", ".join([*lacking[:MOST_NAMED], *(["..."] if len(lacking) > MOST_NAMED else [])])
         several = f"{counted(len(lacking), 'motor')} {'lacks' if len(lacking) == 1 else 'lack'}"
-        reason = f"needs the column {needed} in {path}, which {several} ({names})"
+        reason = f"needs the column {needed} in {path}, which {several} ({listed(lacking, MOST_NAMED)})"
         raise InputError.one(f"minimizing {criterion} {reason}")
 
 
@@ -123,7 +122,8 @@ def choices(
         _best_choice(motor, trials, (int(best[index]), index), possible, bool(gears.listed))
         for index, motor in enumerate(motors)
     ]
-    return tuple(sorted(found, key=lambda choice: _sort_key(choice, criterion)))
+    found.sort(key=lambda choice: (not choice.does, cost_of(choice, criterion), choice.motor))
+    return tuple(found)
 
 
 class _Trials(NamedTuple):
@@ -204,11 +204,6 @@ def _best_choice(
         copper_loss=float(shaft.heat_per_torque * rms**2),
         mass=motor.mass,
     )
-
-
-def _sort_key(choice: Choice, criterion: str) -> tuple[bool, float, str]:
-    """Return the key by which choices are sorted."""
-    return not choice.does, cost_of(choice, criterion), choice.motor
 
 
 def cost_of(choice: Choice, criterion: str) -> float:

@@ -101,8 +101,7 @@ class MotorDemand:
     def mean(self, values: FloatArray) -> FloatArray:
         """Return the mean over time along the last axis; over samples if no two consecutive ones exist."""
         weight = self.weight if self.weight.any() else np.ones_like(self.weight)
-        mean: FloatArray = values @ weight / weight.sum()
-        return mean
+        return np.asarray(values @ weight / weight.sum())
 
     @cached_property
     def moments(self) -> FloatArray:

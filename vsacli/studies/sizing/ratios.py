@@ -120,15 +120,13 @@ class Ratios(NamedTuple):
     @property
     def empty(self) -> BoolArray:
         """Mask of empty ranges, (motors,)."""
-        empty: BoolArray = ~(self.low <= self.high)
-        return empty
+        return ~(self.low <= self.high)
 
     def nearest(self, ratio: FloatArray) -> FloatArray:
         """Return the nearest ratio in each range; zero and infinity become an end of the range, or 1."""
         inside = np.minimum(np.maximum(ratio, self.low), self.high)
         finite = np.where((inside > 0) & (inside < math.inf), inside, np.where(self.low > 0, self.low, 1.0))
-        nearest: FloatArray = np.minimum(finite, self.high)
-        return nearest
+        return np.minimum(finite, self.high)
 
 
 def shares(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
@@ -169,8 +167,7 @@ def _peak_torque_and_voltage(
 
 def _mean_product(one: FloatArray, moments: FloatArray, other: FloatArray) -> FloatArray:
     """Return mean products of torques, (motors,), from their coefficients."""
-    mean: FloatArray = np.einsum("mi,ij,mj->m", one, moments, other)
-    return mean
+    return np.asarray(np.einsum("mi,ij,mj->m", one, moments, other))
 
 
 def ratios_within(demand: MotorDemand, shafts: Shaft) -> Ratios:
@@ -225,8 +222,7 @@ def least_rms(demand: MotorDemand, shafts: Shaft) -> FloatArray:
 
     def rising(ratio: FloatArray) -> BoolArray:
         slope = (fourth * ratio + third) * ratio - (first + last / ratio) / ratio
-        beyond: BoolArray = slope > 0
-        return beyond
+        return slope > 0
 
     found = _turning_point(rising, np.full_like(fourth, LOWEST), np.full_like(fourth, HIGHEST))
     return _unbounded(found)
@@ -242,8 +238,7 @@ def _rms_within(demand: MotorDemand, shafts: Shaft, bound: FloatArray) -> Ratios
     best = np.clip(least_rms(demand, shafts), LOWEST, HIGHEST)
 
     def allowed(ratio: FloatArray) -> BoolArray:
-        within: BoolArray = rms_torque(demand, shafts, ratio) <= bound
-        return within
+        return rms_torque(demand, shafts, ratio) <= bound
 
     lowest, highest = np.full_like(best, LOWEST), np.full_like(best, HIGHEST)
     low = np.where(allowed(lowest), 0.0, _turning_point(allowed, lowest, best))
@@ -272,8 +267,7 @@ def balanced(demand: MotorDemand, shafts: Shaft, allowed: Ratios) -> FloatArray:
     """
 
     def largest(logarithm: FloatArray) -> FloatArray:
-        share: FloatArray = shares(demand, shafts, np.exp(logarithm)).max(axis=-1)
-        return share
+        return np.asarray(shares(demand, shafts, np.exp(logarithm)).max(axis=-1))
 
     low, high = (np.log(np.clip(end, LOWEST, HIGHEST)) for end in allowed)
     left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)

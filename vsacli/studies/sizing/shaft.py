@@ -135,8 +135,7 @@ class Shaft(NamedTuple):
     def coefficients(self, ratio: FloatArray) -> FloatArray:
         """Return the coefficients of the torque on the shaft, (motors, 7), for ratios (motors,)."""
         over = np.asarray(ratio)[..., None]
-        torque: FloatArray = over * self.inertial + self.frictional + self.loaded / over
-        return torque
+        return over * self.inertial + self.frictional + self.loaded / over
 
 
 def shaft_signals(velocity: FloatArray, acceleration: FloatArray, load: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from vsacli.base.json_records import Published, named
-from vsacli.base.tables import ReportText, cell, headline
+from vsacli.base.tables import ReportText, TextReport, cell, headline
 from vsacli.base.texts import counted, joined, warnings_and_notes
 from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, in_header, time_text, units_of
 from vsacli.studies.sizing.choices import CRITERIA, Choice
@@ -18,7 +18,7 @@ from vsacli.studies.sizing.shaft import LIMITS
 
 
 @dataclass(frozen=True, eq=False)
-class Sizing(Published):
+class Sizing(Published, TextReport):
     """The demands of motions on the drives of a robot, and the drives that meet them.
 
     Attributes:
@@ -71,9 +71,6 @@ class Sizing(Published):
         """Motors for which nothing suffices."""
         return tuple(motor for motor in self.motors if not motor.does)
 
-    def __str__(self) -> str:
-        return str(self.as_text())
-
     def as_text(self) -> ReportText:
         """Return the report in parts: motors and their utilization, then demands on joints and springs."""
         known = [motor for motor in self.motors if motor.asked is not None]
@@ -88,7 +85,8 @@ class Sizing(Published):
             *left_out(self.outcomes),
             *warnings_and_notes(self.warnings, self.notes),
         ]
-        return ReportText(self._headline(), found, [table for table in tables if len(table) > 1])
+        first = headline(self.verdict, f"{self.title}: {self._answer()}")
+        return ReportText(first, found, [table for table in tables if len(table) > 1])
 
     @property
     def title(self) -> str:
@@ -96,9 +94,6 @@ class Sizing(Published):
         return ", ".join(
             [self.robot, *(f"{each.trajectory} ({each.duration:g} s)" for each in self.outcomes)]
         )
-
-    def _headline(self) -> str:
-        return headline(self.verdict, f"{self.title}: {self._answer()}")
 
     def _answer(self) -> str:
         places, lacking = len(self.motors), len(self.lacking)

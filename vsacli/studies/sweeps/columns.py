@@ -19,7 +19,6 @@ from vsacli.analysis.tool_report import ToolReport
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.flags import LIMITS, ToolFlag
-from vsacli.base.units import Quantity
 from vsacli.base.variables import MOTORS, UNCERTAIN, VARIABLES, Block, deviation
 
 JOINT, MOTOR = ("joint",), ("joint", "motor")
@@ -42,7 +41,7 @@ class Column(NamedTuple):
 
     name: str
     dims: tuple[str, ...]
-    quantity: Quantity
+    quantity: units.Quantity
     long_name: str
     of: Callable[[Any], Any] | None = None
     whole: bool = False

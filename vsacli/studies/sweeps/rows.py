@@ -70,12 +70,8 @@ class Row(NamedTuple):
         return self.error.startswith(LOST)
 
 
-def failed(run: int, key: str, reason: str) -> Row:
-    """Return the row of a run that could not be computed."""
-    return _without_values(run, key, FAILED, reason)
-
-
-def _without_values(run: int, key: str, verdict: str, reason: str) -> Row:
+def failed(run: int, key: str, reason: str, verdict: str = FAILED) -> Row:
+    """Return the row of a run that could not be computed, or has no feasible optimum."""
     return Row(run, key, verdict, "", one_line(reason), np.empty(0), np.empty(0))
 
 
@@ -98,10 +94,6 @@ class _Prepared(NamedTuple):
     key: str
     inputs: PreparedRun
     costs: Sequence[FloatArray]
-
-    def failed(self, reason: str) -> Row:
-        """Return the row of the run if it cannot be computed."""
-        return failed(self.run, self.key, reason)
 
 
 class Computer:
@@ -137,13 +129,23 @@ class Computer:
         key = self._study.key(point)
         try:
             return self._inputs(run, key, point)
-        except ChangedError:
-            raise
-        except InputError as error:
+        except Exception as error:  # one run must not cost the others
+            return self._failed(run, key, error)
+
+    def _failed(self, run: int, key: str, error: Exception) -> Row:
+        """Return the row of a run that an error ended.
+
+        Raises:
+            ChangedError: a file of the study has changed.
+        """
+        if isinstance(error, ChangedError):
+            raise error
+        if isinstance(error, InputError):
             self._study.check_files()
             return failed(run, key, str(self._study.as_named(error)))
-        except Exception as error:  # one run must not cost the others
-            return failed(run, key, _bug(error, point))
+        values = "; ".join(format_changes(self._study.point(run).values))
+        bug = f"a bug, please report it: {type(error).__name__}: {error}"
+        return failed(run, key, f"{bug}{f' ({values})' if values else ''}")
 
     def _inputs(self, run: int, key: str, point: Point) -> _Prepared | Row:
         changes = point.changes
@@ -158,7 +160,7 @@ class Computer:
         if optimize is not None:
             optimum = optimize.optimum(robot, trajectory)
             if optimum.trajectory is None:
-                return _without_values(run, key, IMPOSSIBLE, "; ".join(optimum.reasons))
+                return failed(run, key, "; ".join(optimum.reasons), IMPOSSIBLE)
             trajectory, costs = optimum.trajectory, optimize.costs_of(optimum)
         return _Prepared(run, key, PreparedRun(robot, trajectory), costs)
 
@@ -168,11 +170,7 @@ class Computer:
             return self._computed(variants, prepared)
         except Exception as error:
             if len(prepared) == 1:
-                (run,) = prepared
-                if isinstance(error, InputError):
-                    self._study.check_files()
-                    return [run.failed(str(self._study.as_named(error)))]
-                return [run.failed(_bug(error, self._study.point(run.run)))]
+                return [self._failed(prepared[0].run, prepared[0].key, error)]
         rows = list[Row]()
         for robot, run in zip(variants.robots, prepared, strict=True):
             rows += self._batch_rows(replace(variants, robots=(robot,)), [run])
@@ -212,11 +210,6 @@ class Computer:
             declared = declared_trajectory(self._study.trajectories[index], robot, changes.trajectory)
             self._read = (place, joints, declared)
         return self._read[2]
-
-
-def _bug(error: Exception, point: Point) -> str:
-    values = "; ".join(format_changes(point.values))
-    return f"a bug, please report it: {type(error).__name__}: {error}{f' ({values})' if values else ''}"
 
 
 class Job(NamedTuple):

@@ -1,21 +1,254 @@
-"""Execution of a study: missing rows are computed and added to the journal, then all become a table."""
+"""Execution of a study: missing rows are computed and added to the journal, then all become a table.
+
+The tables of the parts of a study are merged here, too.
+"""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from vsacli.base.arrays import IndexArray
 from vsacli.base.errors import InputError, check_path
-from vsacli.base.outputs import Outputs
+from vsacli.base.outputs import Outputs, Staged
 from vsacli.base.progress import Progress, unheard, unseen
-from vsacli.results.store.study_table import StoredStudy
+from vsacli.base.texts import counted, listed
+from vsacli.documents.source import Source
+from vsacli.results.store.study_table import (
+    OF_RUN,
+    TEXTS,
+    Head,
+    StoredStudy,
+    StudyRows,
+    StudyWriter,
+    VariedParameter,
+    rows_at_once,
+)
+from vsacli.studies.sweeps.columns import arrays_of, pad_curves, steps_of, width
 from vsacli.studies.sweeps.executors import executor
 from vsacli.studies.sweeps.journal import Journal
-from vsacli.studies.sweeps.rows import Row
+from vsacli.studies.sweeps.rows import FAILED, Row
 from vsacli.studies.sweeps.study import Study, load_study
-from vsacli.studies.sweeps.study_tables import write
+
+
+def write(
+    study: Study,
+    runs: Sequence[int],
+    lost: Mapping[int, Row],
+    journal: Journal,
+    file: Staged,
+    **provenance: str,
+) -> None:
+    """Write the table of runs.
+
+    Args:
+        study: study of the runs.
+        runs: numbers of the runs, in order.
+        lost: rows that are not in the journal, by run.
+        journal: journal with the other rows.
+        file: staged file of the table.
+        **provenance: further root attributes.
+
+    Raises:
+        StorageError: the disk is full or fails.
+    """
+    joints = len(study.robot.joints)
+
+    def row(run: int) -> Row:
+        return lost[run] if run in lost else journal.row(run, study.key(study.point(run)))
+
+    steps = 0
+    if study.over_time:  # the longest run determines the size, so all rows are read first
+        steps = max((steps_of(row(run).curves, study.over_time, joints) for run in runs), default=0)
+    at_once = rows_at_once(steps)
+    with StudyWriter(file, _head_of_study(study, steps, provenance), len(runs)) as writer:
+        for start in range(0, len(runs), at_once):
+            writer.write(_table_rows(study, [row(run) for run in runs[start : start + at_once]], steps))
+        writer.finish()
+
+
+def _head_of_study(study: Study, steps: int, provenance: dict[str, str]) -> Head:
+    parameters = [VariedParameter(each.path, each.unit, each.numeric) for each in study.dimensions]
+    return Head(
+        study=study.file.name,
+        robot=study.robot.name,
+        fingerprint=study.fingerprint,
+        runs=study.runs,
+        joint_names=study.robot.joint_names,
+        joint_types=study.robot.joint_types,
+        parameters=tuple(parameters),
+        columns=(*study.costs, *study.kept, *study.over_time),
+        steps=steps,
+        sources={
+            "study": (study.source,),
+            "robot": study.robot.sources,
+            "trajectory": tuple(dict.fromkeys(each for files in study.trajectory_sources for each in files)),
+        },
+        provenance={
+            "method": study.file.method,
+            "seed": str(study.file.seed),
+            "engine": study.engine,
+            "compiler": study.compiler,
+            "numpy": np.__version__,
+            **provenance,
+        },
+    )
+
+
+def _table_rows(study: Study, rows: Sequence[Row], steps: int) -> StudyRows:
+    points = [study.point(row.run) for row in rows]
+    arrays: dict[str, Any] = {
+        "trajectory": [study.trajectories[point.trajectory] for point in points],
+        **{name: [getattr(row, name) for row in rows] for name in OF_RUN},
+    }
+    for dimension in study.dimensions:
+        values = [point.values[dimension.path] for point in points]
+        if dimension.numeric:
+            arrays[dimension.path] = np.array([dimension.number(value) for value in values], dtype=float)
+        else:
+            arrays[dimension.path] = [
+                value if isinstance(value, str) else json.dumps(value) for value in values
+            ]
+    joints = len(study.robot.joints)
+    columns = [*study.costs, *study.kept]
+    table = np.full((len(rows), width(columns, joints)), np.nan)
+    for place, row in enumerate(rows):
+        if len(row.values):
+            table[place] = row.values
+    arrays |= arrays_of(columns, table, joints)
+    if study.over_time:
+        arrays |= pad_curves([row.curves for row in rows], study.over_time, steps, joints)
+    return StudyRows([row.run for row in rows], arrays)
+
+
+MOST_NAMED = 5
+"""Largest number of runs that a message lists."""
+
+
+def merge(paths: Sequence[str | Path], file: Staged, **provenance: str) -> None:
+    """Merge tables of parts, which together have all runs, into the whole table of a study.
+
+    A run that failed in one part and not in another counts as computed.
+
+    Args:
+        paths: paths of the parts.
+        file: staged file of the whole table.
+        **provenance: root attributes that replace those of the parts.
+
+    Raises:
+        InputError: the parts belong to different studies, one is given twice, or some runs are in none.
+        StorageError: the disk is full or fails.
+    """
+    _check_repeated(paths)
+    with ExitStack() as stack:
+        parts = [stack.enter_context(StoredStudy(path)) for path in paths]
+        _check_alike(parts)
+        order = _row_order(parts)
+        steps = max(part.steps for part in parts)
+        with StudyWriter(file, _head_of_parts(parts[0], steps, provenance), len(order)) as writer:
+            for start in range(0, len(order), rows_at_once(steps)):
+                rows = order[start : start + rows_at_once(steps)]
+                writer.write(
+                    StudyRows(range(start, start + len(rows)), _concatenated_columns(parts, rows, steps))
+                )
+            writer.finish()
+
+
+def _check_repeated(paths: Sequence[str | Path]) -> None:
+    seen: set[Path] = set()
+    for path in paths:
+        if (place := Path(path).resolve()) in seen:
+            raise InputError.one("is given twice; give each table once", path)
+        seen.add(place)
+
+
+def _check_alike(parts: Sequence[StoredStudy]) -> None:
+    first = parts[0]
+    for part in parts[1:]:
+        if part.fingerprint != first.fingerprint:
+            raise InputError.one(
+                f"is part of another study than {first.path}: of other files, or computed otherwise",
+                part.path,
+            )
+
+
+def _row_order(parts: Sequence[StoredStudy]) -> IndexArray:
+    """Return the index of each run's row in the concatenated parts."""
+    runs = np.concatenate([part.read("run") for part in parts])
+    lost = np.concatenate([np.array(part.texts("verdict")) == FAILED for part in parts])
+    order = np.full(parts[0].runs, -1)
+    for rows in (np.flatnonzero(lost), np.flatnonzero(~lost)):
+        order[runs[rows]] = rows
+    absent = np.flatnonzero(order < 0)
+    if len(absent):
+        shown = listed(list(map(str, absent)), MOST_NAMED)
+        missing = f"run {shown} is missing" if len(absent) == 1 else f"runs {shown} are missing"
+        held = f"{parts[0].path} holds" if len(parts) == 1 else "the tables hold"
+        found = f"{held} {len(order) - len(absent)} of {counted(len(order), 'run')}"
+        raise InputError.one(f"{found}; {missing}: give the tables of all shards (--shard K/N)")
+    return order
+
+
+def _concatenated_columns(parts: Sequence[StoredStudy], rows: IndexArray, steps: int) -> dict[str, Any]:
+    """Return all columns of some runs; `rows` are indices into the concatenated parts."""
+    first = parts[0]
+    texts = {name for name in (*TEXTS, *first.parameters) if name in TEXTS or first.parameter_is_text(name)}
+    arrays: dict[str, Any] = {name: np.empty(len(rows), dtype=object) for name in texts}
+    for name in {*first.parameters, *first.columns} - texts:
+        arrays[name] = np.full((len(rows), *first.shape(name, steps)), np.nan)
+    start = 0
+    for part in parts:
+        here = np.flatnonzero((start <= rows) & (rows < start + part.rows))
+        if len(here):
+            _fill(arrays, texts, here, part, rows[here] - start)
+        start += part.rows
+    return arrays | {name: arrays[name].tolist() for name in texts}
+
+
+def _fill(
+    arrays: dict[str, Any], texts: Collection[str], here: IndexArray, part: StoredStudy, rows: IndexArray
+) -> None:
+    """Copy rows of a part to their places; runs with fewer samples than others end with NaN."""
+    span = slice(int(rows.min()), int(rows.max()) + 1)
+    for name, array in arrays.items():
+        found = np.array(part.texts(name, span), dtype=object) if name in texts else part.read(name, span)
+        array[(here, *map(slice, found.shape[1:]))] = found[rows - span.start]
+
+
+def _head_of_parts(part: StoredStudy, steps: int, provenance: dict[str, str]) -> Head:
+    sources: dict[str, tuple[Source, ...]] = {"study": (), "robot": (), "trajectory": ()}
+    role = "study"
+    for each in part.inputs():
+        role = each.role or role
+        text = None if each.content is None else each.content.decode()
+        sources[role] += (Source(each.path, each.sha256, text),)
+    return Head(
+        study=part.study_name,
+        robot=part.robot_name,
+        fingerprint=part.fingerprint,
+        runs=part.runs,
+        joint_names=part.joint_names,
+        joint_types=part.joint_types,
+        parameters=tuple(
+            VariedParameter(
+                path,
+                "" if part.parameter_is_text(path) else part.unit(path),
+                not part.parameter_is_text(path),
+            )
+            for path in part.parameters
+        ),
+        columns=tuple(map(part.column, part.columns)),
+        steps=steps,
+        sources=sources,
+        provenance=part.provenance() | provenance,
+    )
+
 
 MOST_LINES_NAMED = 5
 """Largest number of damaged lines of a journal that a message lists."""

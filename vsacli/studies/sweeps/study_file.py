@@ -13,8 +13,6 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.flags import MIN_MARGIN, SINGULAR_MARGIN
-from vsacli.base.units import Quantity
-from vsacli.documents import tree
 from vsacli.documents.fields import (
     Check,
     Items,
@@ -34,7 +32,7 @@ from vsacli.documents.fields import (
 )
 from vsacli.documents.reading import check_path_of_change
 from vsacli.documents.record_checks import DeclaredRecord
-from vsacli.documents.tree import INVALID, Node, Scope
+from vsacli.documents.tree import INVALID, ListNode, MapNode, Node, Scope, TextNode, plain
 from vsacli.robot.model import Robot
 from vsacli.studies.sensitivities.tolerances import SHAPES
 from vsacli.studies.sweeps.columns import JOINT, KEPT, OVER_TIME, TIME, Column
@@ -105,7 +103,7 @@ class Ways(OwnKind):
 
     def read(self, node: Node, label: str, scope: Scope) -> Any:
         """Return a tuple of `Varied`."""
-        if not isinstance(node, tree.MapNode):
+        if not isinstance(node, MapNode):
             return scope.unexpected(node, "a mapping from paths to values", label)
         found = []
         for path, entry in node.entries.items():
@@ -130,14 +128,14 @@ class Ways(OwnKind):
 
 def _variation(node: Node) -> Way:
     match node:
-        case tree.ListNode(items=items) if items:
-            return Listed(tuple(map(tree.plain, items)))
-        case tree.MapNode(entries=entries) if entries:
+        case ListNode(items=items) if items:
+            return Listed(tuple(map(plain, items)))
+        case MapNode(entries=entries) if entries:
             return _mapped(node, dict(entries))
     raise InputError.one(f"expected {FORMS}, found {node}")
 
 
-def _mapped(node: tree.MapNode, entries: Mapping[str, Node]) -> Way:
+def _mapped(node: MapNode, entries: Mapping[str, Node]) -> Way:
     key = next(iter(entries))
     if LINKED in entries:
         texts = {
@@ -148,7 +146,7 @@ def _mapped(node: tree.MapNode, entries: Mapping[str, Node]) -> Way:
     elif len(entries) == 1 and key in SPACED:
         return Spaced(key, *_scalar_texts(entries[key], 3, f"{key}: [first, last, count]"))
     elif len(entries) == 1 and key in SHAPES:
-        if key == "uniform" and isinstance(entries[key], tree.ListNode):
+        if key == "uniform" and isinstance(entries[key], ListNode):
             return Ranged(*_scalar_texts(entries[key], 2, "uniform: [least, largest]"))
         return Drawn(node)
     hint = did_you_mean(key, [*SPACED, *SHAPES, LINKED]) if len(entries) == 1 else ""
@@ -156,13 +154,13 @@ def _mapped(node: tree.MapNode, entries: Mapping[str, Node]) -> Way:
 
 
 def _scalar_texts(node: Node, count: int, form: str) -> list[str]:
-    if not isinstance(node, tree.ListNode) or len(node.items) != count:
+    if not isinstance(node, ListNode) or len(node.items) != count:
         raise InputError.one(f"expected {form}, found {node}")
     return [_scalar_text(item, form) for item in node.items]
 
 
 def _scalar_text(node: Node, form: str) -> str:
-    if not isinstance(node, tree.TextNode):
+    if not isinstance(node, TextNode):
         raise InputError.one(f"expected a single value in {form}, found {node}")
     return node.text
 
@@ -250,7 +248,7 @@ class Optimized(DeclaredRecord):
         )
 
     @property
-    def _cost(self) -> tuple[tuple[str, ...], Quantity, str]:
+    def _cost(self) -> tuple[tuple[str, ...], units.Quantity, str]:
         """Dimensions after `run`, unit and words of the minimized quantity."""
         if self.minimize == TIME:
             return (), units.TIME, "duration"

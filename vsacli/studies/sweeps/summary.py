@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from vsacli.base.json_records import Stored, named
-from vsacli.base.tables import ReportText
+from vsacli.base.tables import ReportText, TextReport
 from vsacli.base.texts import counted
 from vsacli.results.charts.study_points import (
     count_verdicts,
@@ -67,7 +67,7 @@ class OkShare(Stored):
 
 
 @dataclass(frozen=True)
-class StudySummary(Stored):
+class StudySummary(Stored, TextReport):
     """The findings of a study.
 
     Attributes:
@@ -120,9 +120,6 @@ class StudySummary(Stored):
             ok_share=OkShare(*ok_share(counts)) if random else None,
             first_limits=dict(Counter(filter(None, table.texts(FIRST_LIMIT))).most_common()),
         )
-
-    def __str__(self) -> str:
-        return str(self.as_text())
 
     @property
     def title(self) -> str:

@@ -22,10 +22,13 @@ from vsacli.trajectory.curves.closed_form import (
     DEGREES,
     ClosedForm,
     ConstantProfile,
+    Formula,
+    Use,
+    Values,
     add_constants,
     multiply_constants,
+    nan_for_none,
 )
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,8 +14,17 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import POSITIVE, Items, OneOf, integer, number, value
-from vsacli.trajectory.curves.closed_form import DEGREES, LONGEST, SHORTEST, ClosedForm, ConstantProfile
-from vsacli.trajectory.curves.declaration import Declaration, Formula, Use, same_time
+from vsacli.trajectory.curves.closed_form import (
+    DEGREES,
+    LONGEST,
+    SHORTEST,
+    ClosedForm,
+    ConstantProfile,
+    Declaration,
+    Formula,
+    Use,
+    same_time,
+)
 from vsacli.trajectory.curves.polynomial import RestToRest
 from vsacli.trajectory.curves.sinusoids import SumOfSinusoids
 from vsacli.trajectory.curves.steps import Jump, PiecewiseProfile
@@ -124,8 +133,7 @@ class _Standalone(Formula, SequencePart):
     @property
     def begins(self) -> Position:
         """Position at the start."""
-        start: Position = tuple(self.profile_over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
-        return start
+        return tuple(self.profile_over((0.0, self.lasts)).at(np.zeros(1))[0, :, 0].tolist())
 
     def placed(self, span: tuple[float, float], _start_position: Position) -> ClosedForm:
         """See `SequencePart.placed`."""

@@ -14,8 +14,15 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, PerJoint, number, value
-from vsacli.trajectory.curves.closed_form import ClosedForm, add_constants, multiply_constants
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
+from vsacli.trajectory.curves.closed_form import (
+    ClosedForm,
+    Formula,
+    Use,
+    Values,
+    add_constants,
+    multiply_constants,
+    nan_for_none,
+)
 from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.times import MAX_STEPS
 

@@ -15,8 +15,17 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import WRENCH, Signal
 from vsacli.documents.fields import NON_NEGATIVE, POSITIVE, Items, NumberWithUnit, integer, number, value
-from vsacli.trajectory.curves.closed_form import DEGREES, ClosedForm, ConstantProfile
-from vsacli.trajectory.curves.declaration import SAME_TIME, Formula, Use, Values, nan_for_none, odd
+from vsacli.trajectory.curves.closed_form import (
+    DEGREES,
+    SAME_TIME,
+    ClosedForm,
+    ConstantProfile,
+    Formula,
+    Use,
+    Values,
+    nan_for_none,
+    odd,
+)
 from vsacli.trajectory.curves.polynomial import AXES, RestToRest
 from vsacli.trajectory.times import stretch
 
@@ -120,8 +129,7 @@ class PiecewiseProfile(ClosedForm):
 
 def _peak_magnitudes(profile: ClosedForm) -> FloatArray:
     """Return the largest magnitude of each order and component, (orders, components)."""
-    peaks: FloatArray = np.abs(profile.at(np.linspace(*profile.span, PROBES))).max(axis=2)
-    return peaks
+    return np.asarray(np.abs(profile.at(np.linspace(*profile.span, PROBES))).max(axis=2))
 
 
 def profile_of_levels(

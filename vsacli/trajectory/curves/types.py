@@ -10,7 +10,7 @@ from typing import Any
 from vsacli.base.lazy import LazyRegistry
 from vsacli.base.signals import POSITION, WRENCH
 from vsacli.documents.fields import OneOf
-from vsacli.trajectory.curves.declaration import Declaration, Formula, Recorded, Use
+from vsacli.trajectory.curves.closed_form import Declaration, Formula, Recorded, Use
 
 _JOINTS = ("position", "commanded")
 _EVERY = (*_JOINTS, "wrench")
@@ -22,7 +22,7 @@ TYPES = {
     "sequence": ("vsacli.trajectory.curves.sequence:Sequence", ("position",)),
     "steps": ("vsacli.trajectory.curves.steps:Steps", ("commanded", "wrench")),
     "constant": ("vsacli.trajectory.curves.polynomial:Hold", _EVERY),
-    "csv": ("vsacli.trajectory.curves.declaration:Recorded", _EVERY),
+    "csv": ("vsacli.trajectory.curves.closed_form:Recorded", _EVERY),
 }
 """Types of declarations, each with module and class, and its uses: position, commanded signals, wrench."""
 

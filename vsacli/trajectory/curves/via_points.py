@@ -17,8 +17,16 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import FieldProblem, InputError
 from vsacli.base.signals import POSITION
 from vsacli.documents.fields import NON_NEGATIVE, Items, NumberWithUnit, integer, value
-from vsacli.trajectory.curves.closed_form import VIA_DEGREES, ClosedForm, add_constants, multiply_constants
-from vsacli.trajectory.curves.declaration import Formula, Use, Values, nan_for_none
+from vsacli.trajectory.curves.closed_form import (
+    VIA_DEGREES,
+    ClosedForm,
+    Formula,
+    Use,
+    Values,
+    add_constants,
+    multiply_constants,
+    nan_for_none,
+)
 
 SEAM = 1e-9
 """Largest jump between the expansions about two neighboring points, relative to the peak of each derivative;
@@ -82,8 +90,7 @@ class ViaPoints(ClosedForm):
     @cached_property
     def _specified(self) -> BoolArray:
         """Mask of components with values, (components,)."""
-        specified: BoolArray = ~np.isnan(self.points[0])
-        return specified
+        return ~np.isnan(self.points[0])
 
     @cached_property
     def _derivatives(self) -> FloatArray:
@@ -176,8 +183,7 @@ def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
     steps = np.diff(corners / (np.abs(corners).max() or 1.0), axis=0)
     lengths = np.concatenate(([0.0], np.cumsum(np.sqrt(np.linalg.norm(steps, axis=1)))))
     half = (degree + 1) // 2
-    shares: FloatArray = scipy.special.betaincinv(half, half, lengths / (lengths[-1] or 1.0))
-    return shares
+    return scipy.special.betaincinv(half, half, lengths / (lengths[-1] or 1.0))
 
 
 def _is_smooth(rows: FloatArray, lengths: FloatArray, orders: int) -> bool:

@@ -17,7 +17,7 @@ import scipy
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.trajectory.fits.banded_qr import Posterior
 from vsacli.trajectory.fits.least_squares import local_basis, of_derivatives, of_least_squares
-from vsacli.trajectory.fits.left_over import LeftOutMotion
+from vsacli.trajectory.fits.noise import LeftOutMotion
 from vsacli.trajectory.fits.smoothing import Smoothing
 from vsacli.trajectory.fits.spectrum import FollowedNoise
 from vsacli.trajectory.times import stretch

@@ -71,8 +71,7 @@ def _differ(given: FloatArray, rows: FloatArray, order: int, fit: Fit) -> BoolAr
     size = _rms(rows[order])
     least = SMALLEST_SHARE * np.nanmax(size, initial=0.0)
     allowed = SHARE * np.maximum(size, least) + DEVIATIONS * _errors(fit, order)
-    differ: BoolArray = _rms(given - rows[order]) > allowed
-    return differ
+    return _rms(given - rows[order]) > allowed
 
 
 def _errors(fit: Fit, order: int) -> FloatArray:

@@ -169,8 +169,7 @@ class Model:
     def inside(self) -> BoolArray:
         """Mask of `probes` away from the ends."""
         share = np.linspace(0, 1, 2 * self.bins.spans)
-        inside: BoolArray = (share > ENDS) & (share < 1 - ENDS)
-        return inside
+        return (share > ENDS) & (share < 1 - ENDS)
 
 
 def segment_of(count: int, segments: int) -> IndexArray:

@@ -17,12 +17,16 @@ from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.progress import Progress, ProgressBar, unseen
 from vsacli.trajectory.fits.fit import Fit, Part, join
 from vsacli.trajectory.fits.least_squares import best_spans, fit_spline
-from vsacli.trajectory.fits.left_over import LeftOutMotion, left_out_motion
-from vsacli.trajectory.fits.noise import estimated_noise, filtered_noise, typical_noise
+from vsacli.trajectory.fits.noise import (
+    LeftOutMotion,
+    estimated_noise,
+    filtered_noise,
+    left_out_motion,
+    typical_noise,
+)
 from vsacli.trajectory.fits.resolution import KnownNoise
-from vsacli.trajectory.fits.ringing import ringing_ends
 from vsacli.trajectory.fits.smoothing import disagreement, smoothing_spline
-from vsacli.trajectory.fits.spectrum import FollowedNoise, followed_noise
+from vsacli.trajectory.fits.spectrum import FollowedNoise, followed_noise, ringing_ends
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
@@ -332,7 +336,8 @@ def fit_samples(
     if present.size and method == LEAST_SQUARES:
         parts += _least_squares(time, values, present, degree)
     elif present.size:
-        parts.append(_interpolation(time, values, present, degree))
+        through = scipy.interpolate.make_interp_spline(time, values[present].T, k=degree)
+        parts.append(Part(present, through, exact=True))
     if present.size and method != LEAST_SQUARES and len(time) >= FEWEST_JUDGED:
         typical = typical_noise(time, values[present], degree + 1)
         expected = np.where(np.isnan(given[present]), typical, given[present])
@@ -346,10 +351,6 @@ def fit_samples(
     if method is not None or bandwidth is not None or noise is not None:
         parts = _with_left_out_motion(parts, record)
     return join(degree, parts, time, values, estimate, given)
-
-
-def _interpolation(time: FloatArray, values: FloatArray, members: IndexArray, degree: int) -> Part:
-    return Part(members, scipy.interpolate.make_interp_spline(time, values[members].T, k=degree), exact=True)
 
 
 def _spoilt(

@@ -132,8 +132,7 @@ def _integration_errors(time: FloatArray, rows: FloatArray) -> FloatArray:
     ]
     inside = _evaluate_derivative(coefficients, len(rows) - 1, LOOKED_AT * one) / width ** (len(rows) - 1)
     between = inside - (highest[:, :-1] + LOOKED_AT * np.diff(highest))
-    missed: FloatArray = np.abs(np.stack([*ends, between])).max(axis=2)
-    return missed
+    return np.asarray(np.abs(np.stack([*ends, between])).max(axis=2))
 
 
 def _hermite_coefficients(left: FloatArray, right: FloatArray, width: FloatArray) -> FloatArray:

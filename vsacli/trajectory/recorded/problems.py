@@ -1,18 +1,147 @@
-"""Problems that prevent the use of recorded samples."""
+"""Problems that prevent the use of recorded samples, such as stamps that do not increase.
+
+The rows of a log are nearly always in the order of the motion. Sorting them by wrong stamps would scramble
+the motion, and deleting rows with equal stamps would thin it, so that neither is ever advised.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.texts import counted
 from vsacli.base.units import time_text
 from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
-from vsacli.trajectory.recorded.disorder import find_disorder
 from vsacli.trajectory.recorded.samples import SignalSamples
+
+TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of 32-bit counters, s
+WRAP_STEPS = 20.0  # rows may be missing where a counter wraps
+RESTART_SHARE = 0.5  # of the time since the last start; a late stamp falls by less
+REPEATED_SHARE = 0.3  # of the rows after the first repeated stamp, if stamps have too few digits
+ENOUGH_STEPS = 20  # intervals that give a rate
+SAME_RATE = 0.05  # a rate farther from that of the rows is for resampling, not in place of stamps
+
+
+class Disorder(NamedTuple):
+    """A failure of stamps to increase.
+
+    Attributes:
+        sample: index of the first sample that is not later than the one before it.
+        cause: pattern of the failure, a clause.
+        advice: advice, a clause.
+        rate: rate of the rows, 1/s; NaN if it is unknown, None if no rate helps.
+    """
+
+    sample: int
+    cause: str
+    advice: str
+    rate: float | None = None
+
+    @property
+    def message(self) -> str:
+        """The problem of the stamps, a sentence without its subject."""
+        return f"must increase, but {self.cause}; {self.advice}"
+
+    def is_replaced_by(self, rate: float | None) -> bool:
+        """Return whether a stated rate, 1/s, is that of the rows, so that the stamps are not needed."""
+        return rate is not None and self.rate is not None and not abs(rate / self.rate - 1) > SAME_RATE
+
+
+def find_disorder(stamps: FloatArray) -> Disorder | None:
+    """Return the failure of stamps, (samples,), s, to increase; None if they do, or are not finite."""
+    steps = np.diff(stamps) if np.isfinite(stamps).all() else np.ones(1)
+    if np.all(steps > 0):
+        return None
+    return next(filter(None, _patterns(stamps, steps)))
+
+
+def replace_stamps(stamps: FloatArray, rate: float | None) -> tuple[FloatArray, Disorder | None]:
+    """Return the times by a stated rate, 1/s, and why they replace the stamps, s; else these and None."""
+    disorder = find_disorder(stamps)
+    if rate is None or disorder is None or not disorder.is_replaced_by(rate):
+        return stamps, None
+    return np.arange(len(stamps)) / rate, disorder
+
+
+def _patterns(stamps: FloatArray, steps: FloatArray) -> Iterator[Disorder | None]:
+    failures = np.flatnonzero(~(steps > 0))
+    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    if np.all(steps[failures] < 0):
+        yield _wrap(stamps, steps, usual)
+        yield _restart(stamps, steps, failures)
+    elif np.all(steps[failures] == 0):
+        yield _repeats(stamps, steps, int(failures[0]))
+    first = int(failures[0]) + 1
+    before, after = (f"{value:.9g} s" for value in stamps[first - 1 : first + 1].tolist())
+    cause = f"{before} appears twice" if before == after else f"{after} follows {before}"
+    cause += f" ({len(failures)} such rows)" if len(failures) > 1 else ""
+    rate = rounded_rate(1 / usual) if usual > 0 else math.nan
+    advice = f"correct these stamps, or set {_rate_text(rate)} in their place if the rows are equally spaced"
+    yield Disorder(first, cause, advice, rate)
+
+
+def _wrap(stamps: FloatArray, steps: FloatArray, usual: float) -> Disorder | None:
+    """Return that a 32-bit counter begins again, if every fall is of its size."""
+    falls = steps < 0
+    for unit, size in TICKS.items():
+        whole = 2.0**32 * size
+        if np.all(np.abs(steps[falls] + whole) <= min(WRAP_STEPS * usual, 0.05 * whole)):
+            rate = rounded_rate(len(steps) / float(steps.sum() + whole * falls.sum()))
+            first = int(np.argmax(falls)) + 1
+            cause = f"falls by 2**32 {unit} after {stamps[first - 1]:.9g} s, as a 32-bit counter that wraps"
+            advice = f"set rate: {rate:g} in place of the stamps, or add {whole:.10g} s from this row on"
+            return Disorder(first, cause, advice, rate)
+    return None
+
+
+def _restart(stamps: FloatArray, steps: FloatArray, failures: IndexArray) -> Disorder | None:
+    """Return that the recording begins again, if stamps fall rarely, and by about their whole range."""
+    starts = np.append(0, failures[:-1] + 1)
+    ranges = stamps[failures] - stamps[starts]
+    far = np.all(-steps[failures] >= RESTART_SHARE * ranges) and np.all(failures - starts >= ENOUGH_STEPS)
+    if not far:
+        return None
+    first = int(failures[0]) + 1
+    times = "" if len(failures) == 1 else f", and {counted(len(failures) - 1, 'time')} more"
+    cause = f"{stamps[first]:.9g} s follows {stamps[first - 1]:.9g} s{times}: the recording begins again"
+    return Disorder(first, f"{cause}, as in a bag played in a loop", "cut the file in two before this row")
+
+
+def _repeats(stamps: FloatArray, steps: FloatArray, start: int) -> Disorder | None:
+    """Return that stamps have too few digits, if many repeat and the others are multiples of one step."""
+    coarse = steps[start:]
+    repeated, rises = int(np.count_nonzero(coarse == 0)), coarse[coarse > 0]
+    if not rises.size or repeated < REPEATED_SHARE * len(coarse):
+        return None
+    grain = float(rises.min())
+    if np.any(np.abs(rises / grain - np.round(rises / grain)) > 0.2):  # no multiples of one step
+        return None
+    first, last = (np.flatnonzero(steps > 0)[[0, -1]] + 1).tolist()  # rows where a stamp begins
+    fine = steps[: max(0, start - 1)]
+    even = fine if len(fine) >= ENOUGH_STEPS else steps[first:last]
+    rate = rounded_rate(len(even) / float(even.sum())) if len(even) else math.nan
+    cause = (
+        f"{counted(repeated, 'row')} from {stamps[start]:.9g} s on repeat the stamp before: stamps with too"
+        f" few digits, in steps of {grain:.3g} s"
+    )
+    advice = f"the rows are in order: set {_rate_text(rate)} in place of the stamps"
+    return Disorder(start + 1, cause, advice, rate)
+
+
+def _rate_text(rate: float) -> str:
+    return "rate: (Hz), that of the rows," if math.isnan(rate) else f"rate: {rate:g}"
+
+
+def rounded_rate(rate: float) -> float:
+    """Return a rate, 1/s, with the fewest digits that it needs; with four if these do not suffice."""
+    rounded = [float(f"{rate:.{digits}g}") for digits in (3, 4, 5, 6)]
+    return next((each for each in rounded if abs(each - rate) <= 1e-5 * rate), rounded[1])
+
 
 LARGEST_VALUE = 1e100
 """Largest value; larger ones are no motion of a robot, and their squares, which fits need, may overflow."""

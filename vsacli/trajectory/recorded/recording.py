@@ -31,10 +31,15 @@ from vsacli.trajectory.recorded.columns import (
     column_layout,
     trajectory_column_names,
 )
-from vsacli.trajectory.recorded.disorder import Disorder, replace_stamps
 from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import check_health, unit_doubts
-from vsacli.trajectory.recorded.problems import SampleProblem, sample_problems, time_problems
+from vsacli.trajectory.recorded.problems import (
+    Disorder,
+    SampleProblem,
+    replace_stamps,
+    sample_problems,
+    time_problems,
+)
 from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples
 from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times
 from vsacli.trajectory.trajectory import Trajectory

@@ -27,10 +27,9 @@ from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import ImpossibleError, admissible_stiffness
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.devices import set_uncommanded_dampers
-from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.trajectory import Motion, Trajectory
 
 MARGIN = 0.05
 """Relative distance that an excitation keeps from each limit and from the ends of the attainable stiffness:
@@ -263,8 +262,7 @@ class ExcitationFamily:
 
 def _range_share(numbers: FloatArray) -> FloatArray:
     """Return the used share of the allowed range, (joints,), which is 1 for a parameter of zero."""
-    share: FloatArray = np.exp(-np.abs(numbers[:, -2]) / 2)
-    return share
+    return np.exp(-np.abs(numbers[:, -2]) / 2)
 
 
 def _placed(
@@ -334,8 +332,7 @@ def feasible(design: ExcitationFamily, numbers: FloatArray) -> Member | None:
 
 def least_clearances(design: ExcitationFamily, block: Block) -> FloatArray:
     """Return the smallest relative distance of each `watched` quantity from its bounds."""
-    least: FloatArray = clearances(watched(design), block).min(axis=1, initial=np.inf)
-    return least
+    return np.asarray(clearances(watched(design), block).min(axis=1, initial=np.inf))
 
 
 def watched(design: ExcitationFamily) -> list[Bounded]:

@@ -23,7 +23,7 @@ from vsacli.studies.identification.conditioning import ConditionedRecording, Fil
 from vsacli.studies.identification.excitation.family import RATE
 from vsacli.studies.identification.identification import WORDS, solutions
 from vsacli.studies.identification.identification_report import numbers_of
-from vsacli.studies.identification.identified_values import Number
+from vsacli.studies.identification.identification_text import Number
 from vsacli.studies.identification.independence import Independence, in_words, independence
 from vsacli.studies.identification.link_equations import link_system
 from vsacli.studies.identification.motor_equations import GROUPS, MotorSystem, unknowns, with_friction

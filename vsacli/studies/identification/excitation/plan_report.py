@@ -12,7 +12,7 @@ from vsacli.analysis.report import Report
 from vsacli.base import file_formats
 from vsacli.base.json_records import Published, named
 from vsacli.base.signals import COMMANDED, POSITION
-from vsacli.base.tables import ReportText, headline
+from vsacli.base.tables import ReportText, TextReport, headline
 from vsacli.base.texts import counted, one_line
 from vsacli.base.version import __version__
 from vsacli.documents.commented import WIDTH, commented_document
@@ -46,7 +46,7 @@ class Usefulness(Published):
 
 
 @dataclass(frozen=True)
-class Excitation(Published):
+class Excitation(Published, TextReport):
     """A motion with a stiffness profile that identifies the parameters of a robot.
 
     Attributes:
@@ -107,9 +107,6 @@ class Excitation(Published):
             known = "no standard errors predicted"
         named = f"{self.trajectory.name}: {counted(self.trajectory.samples, 'sample')}"
         return f"{named}, {self.trajectory.duration:g} s; {known}, largest condition {self.condition:.3g}"
-
-    def __str__(self) -> str:
-        return str(self.as_text())
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""
