@@ -27,7 +27,7 @@ from vsacli.base.flags import Flag
 from vsacli.compute.engine import choose, compiler
 from vsacli.compute.engine.engines import Engine
 from vsacli.dynamics.deflection_rows import IntegratedRows
-from vsacli.dynamics.elastic_torques import link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
 from vsacli.dynamics.inverse import InverseDynamics, block_of, compute_block
 from vsacli.robot.model import Robot
 
@@ -54,6 +54,17 @@ def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def compiled(robot: Robot, threads: int = 1, frame: str | None = None) -> Engine:
     return choose("c", InverseDynamics(robot, frame), 1, threads).engine
+
+
+@pytest.mark.usefixtures("quickly")
+@pytest.mark.parametrize("samples", [1, 7, 64, 3000])
+def test_rows_of_results_begin_at_whole_vectors_in_different_sets_of_a_cache(samples):
+    kernel = LinkTorques(vsa_3r())
+    rows = choose("c", kernel, 1, 1).engine.run(kernel, list(np.ones((kernel.inputs, samples))))
+    distances = np.diff([row.ctypes.data for row in rows])
+    assert not rows.ctypes.data % 64
+    assert set(distances % 128) == {64}  # lines of a cache: 64 bytes, an odd number of them apart
+    assert (distances >= rows[0].nbytes).all()  # none lies in another
 
 
 def one_joint(*laws: SpringLaw) -> Robot:

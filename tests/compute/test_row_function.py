@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from samples.shipped import shipped_robot
 
-from vsacli.compute.aligned_rows import LINE, address, aligned_rows
 from vsacli.compute.control_flow import where_needed
 from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.choice import TRACE_FROM
@@ -56,26 +55,6 @@ def test_rows_are_used_again():
     function = RowFunction(program)
     # The forward pass leaves some thirty numbers a joint for the backward pass, and the rest is short-lived.
     assert sum(function.rows.values()) < len(program.operations) / 10
-
-
-@pytest.mark.parametrize("array", [np.ones(3), np.ones((4, 5))[1, :-1], np.ones((4, 5))[:, 2], np.empty(0)])
-def test_the_address_is_that_of_the_first_entry_also_where_nothing_may_be_written(array):
-    assert address(array) == array.ctypes.data
-    array.flags.writeable = False
-    assert address(array) == array.ctypes.data
-
-
-@pytest.mark.parametrize("samples", [1, 7, 64, 12288, 20000])
-@pytest.mark.parametrize("dtype", [np.float64, np.uint32, np.bool_])
-def test_rows_of_the_workspace_begin_at_whole_vectors_in_different_sets_of_a_cache(samples, dtype):
-    rows = aligned_rows(5, samples, dtype)
-    assert rows.shape == (5, samples)
-    assert rows.dtype == dtype
-    assert {address(row) % LINE for row in rows} == {0}
-    assert rows.strides[0] // LINE % 2 == 1
-    for number, row in enumerate(rows):
-        row[:] = number % 2
-    assert [row.mean() for row in rows] == [0, 1, 0, 1, 0]  # none lies in another
 
 
 @pytest.mark.slow

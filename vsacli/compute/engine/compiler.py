@@ -23,7 +23,6 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import VsacliError
-from vsacli.compute.aligned_rows import LINE, address, aligned_rows
 
 NATIVE = "-march=native"
 
@@ -41,6 +40,9 @@ LIES = ("__FINITE_MATH_ONLY__ 1", "__FAST_MATH__ 1", "__ASSOCIATIVE_MATH__ 1", "
 
 SAMPLES_PER_THREAD = 2048
 """Smallest number of samples per thread; fewer are not worth a thread."""
+
+LINE = 64
+"""Bytes of the longest vector register, and of a cache line."""
 
 DOUBLES_PER_VECTOR = LINE // np.dtype(np.float64).itemsize
 """Samples in the longest vector."""
@@ -175,10 +177,12 @@ class Library:
     def __call__(self, rows: Sequence[FloatArray], threads: int) -> FloatArray:
         """Run on contiguous rows (samples,) of doubles; return the outputs, (rows, samples)."""
         samples = len(rows[0])
-        outputs = aligned_rows(self._outputs, samples)
-        sources = np.array([address(row) for row in rows], dtype=np.uintp)
-        targets = address(outputs) + np.arange(self._outputs, dtype=np.uintp) * np.uintp(outputs.strides[0])
-        given = address(sources), address(targets)
+        outputs = _aligned_rows(self._outputs, samples)
+        sources = np.array([row.ctypes.data for row in rows], dtype=np.uintp)
+        targets = outputs.ctypes.data + np.arange(self._outputs, dtype=np.uintp) * np.uintp(
+            outputs.strides[0]
+        )
+        given = sources.ctypes.data, targets.ctypes.data
         count = min(threads, max(1, samples // SAMPLES_PER_THREAD))
         own, *others = _parts(samples, count)
         running = [_pool(count - 1).submit(self._run, *part, *given) for part in others]
@@ -186,6 +190,17 @@ class Library:
         for part in running:
             part.result()
         return outputs
+
+
+def _aligned_rows(rows: int, samples: int) -> FloatArray:
+    """Return uninitialized rows, (rows, samples), each of which begins at a multiple of `LINE` bytes.
+
+    Rows are an odd number of lines apart: at a power of two, all would be in the same sets of a cache.
+    """
+    distance = DOUBLES_PER_VECTOR * (samples // DOUBLES_PER_VECTOR // 2 * 2 + 3)
+    space = np.empty(rows * distance + DOUBLES_PER_VECTOR)
+    first = -space.ctypes.data % LINE // space.itemsize
+    return space[first : first + rows * distance].reshape(rows, distance)[:, :samples]
 
 
 @cache

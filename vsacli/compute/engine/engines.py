@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.aligned_rows import aligned_rows
 from vsacli.compute.engine.costs import CONDITIONAL_OPERATIONS, MOST_UNROLLED
 from vsacli.compute.subnormals import subnormals_as_zero
 
@@ -111,7 +110,7 @@ class TracedEngine:
             return NumPyEngine().run(kernel, rows)
         if function not in self._workspaces:
             self._workspaces[function] = function.workspace(samples_per_pass(len(rows)))
-        outputs = aligned_rows(kernel.outputs, len(rows[0]))
+        outputs = np.empty((kernel.outputs, len(rows[0])))
         with subnormals_as_zero():
             for part in passes(rows):
                 function([row[part] for row in rows], outputs[:, part], self._workspaces[function])

@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Any
 
 ALIGNMENT = 64
-"""Bytes of the longest vector register: results begin at multiples, as in `aligned_rows`."""
+"""Bytes of the longest vector register: results begin at multiples, as those of a `Library`."""
 
 
 def call(path: str, name: str, arguments: list[Any]) -> bytes:

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from heapq import heappop, heappush
+from collections.abc import Callable, Mapping, Sequence
 from types import CodeType
 from typing import Any, NamedTuple
 
@@ -64,8 +63,8 @@ _ON_NUMBERS: dict[str, Any] = {
 """Equivalents of NumPy's functions on plain numbers."""
 
 NESTING = 20
-"""Depth of expressions. Values that are used once are not assigned, which halves the time of a program;
-deeper expressions save no more, and Python's parser has a limit."""
+"""Depth of expressions. Values that are used once are not assigned; otherwise `link_torques` of seven joints
+takes 1.7 times as long. Deeper expressions save no more, and Python's parser has a limit."""
 
 
 def _as_number(name: str) -> Callable[..., float]:
@@ -112,38 +111,10 @@ def function_text(program: Program, name: str, arguments: Mapping[str, int], nes
 
 
 class _NestedText(NamedTuple):
-    """Expression of a value that is used once, its depth, and the names in it, as often as they occur."""
+    """Expression of a value that is used once, and its depth."""
 
     text: str
     depth: int
-    names: tuple[str, ...]
-
-
-class _ReusedNames:
-    """Names for values; a name is taken again once its value is not used any more, the first ones first.
-
-    Python loads the first 256 names of a function by one instruction, others by two. Of the 633 values with
-    names in the link torques of seven joints, at most 325 are in use at a time.
-    """
-
-    def __init__(self, prefix: str) -> None:
-        self._prefix = prefix
-        self._uses: dict[str, int] = {}
-        self._free: list[tuple[int, str]] = []
-
-    def take(self, uses: int) -> str:
-        """Return a name for a value with a number of uses."""
-        name = heappop(self._free)[1] if self._free else f"{self._prefix}_{len(self._uses)}"
-        self._uses[name] = uses
-        return name
-
-    def count(self, used: Iterable[str]) -> None:
-        """Count uses of names; those that were not taken here are ignored."""
-        for name in used:
-            if name in self._uses:
-                self._uses[name] -= 1
-                if not self._uses[name]:
-                    heappush(self._free, (len(name), name))
 
 
 class _PythonWriter:
@@ -173,17 +144,11 @@ class _PythonWriter:
             if isinstance(operand, Symbol)
         )
         nested: dict[int, _NestedText] = {}
-        reused, used = _ReusedNames(prefix), list[str]()
 
         def value(operand: Any) -> str:
-            if not isinstance(operand, Symbol):
-                return self._value(operand, names)
-            if operand.index in nested:
-                inner = nested.pop(operand.index)
-                used.extend(inner.names)
-                return inner.text
-            used.append(names[operand.index])
-            return names[operand.index]
+            if isinstance(operand, Symbol) and operand.index in nested:
+                return nested[operand.index].text
+            return self._value(operand, names)
 
         for symbol in program.operations:
             own = f"{prefix}{symbol.index}"
@@ -193,7 +158,6 @@ class _PythonWriter:
                 names[symbol.index] = own
                 write = self._loop if symbol.operation == "loop" else self._branch
                 write(symbol.operands[0], own, list(map(value, symbol.operands[1:])), lines)
-                reused.count(used)
             else:
                 deep = [
                     nested[each.index].depth
@@ -203,12 +167,10 @@ class _PythonWriter:
                 depth = 1 + max(deep, default=0)
                 text = self._expression(symbol, list(map(value, self._operands(symbol))))
                 if uses[symbol.index] == 1 and depth <= self._nesting:
-                    nested[symbol.index] = _NestedText(f"({text})", depth, tuple(used))
+                    nested[symbol.index] = _NestedText(f"({text})", depth)
                 else:
-                    reused.count(used)
-                    names[symbol.index] = reused.take(uses[symbol.index]) if self._nesting else own
-                    lines.append(f"{names[symbol.index]} = {text}")
-            used.clear()
+                    names[symbol.index] = own
+                    lines.append(f"{own} = {text}")
         return list(map(value, program.outputs))
 
     def _loop(self, loop: Loop, own: str, given: list[str], lines: list[str]) -> None:

@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
-from vsacli.compute.aligned_rows import aligned_rows
 from vsacli.compute.tracing.calls import Workspace
 from vsacli.compute.tracing.program import CHOOSING, Kind, Operand, Program, Symbol, kind_of
 from vsacli.compute.tracing.python_functions import compiled, defined
@@ -53,7 +52,7 @@ class RowFunction:
 
     def workspace(self, samples: int) -> RowSpace:
         """Return rows for the intermediate values of at most this many samples."""
-        return tuple(aligned_rows(self.rows[kind], samples, dtype) for kind, dtype in DTYPES.items())
+        return tuple(np.empty((self.rows[kind], samples), dtype) for kind, dtype in DTYPES.items())
 
     def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray, workspace: RowSpace) -> None:
         """Compute outputs, (outputs, samples), in place from rows of inputs, (samples,)."""
@@ -205,7 +204,7 @@ class CallingRowFunction:
             for kind in DTYPES
         }
         return tuple(
-            aligned_rows(self._kept[kind] + own[kind], samples, dtype) for kind, dtype in DTYPES.items()
+            np.empty((self._kept[kind] + own[kind], samples), dtype) for kind, dtype in DTYPES.items()
         )
 
     def __call__(self, rows: Sequence[FloatArray], outputs: FloatArray, workspace: RowSpace) -> None:

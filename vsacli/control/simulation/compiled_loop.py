@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from vsacli.base.arrays import AnyArray, FloatArray
-from vsacli.compute.aligned_rows import address
+from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine.compiler import CompilerError
 from vsacli.compute.engine.trial import Trial
 from vsacli.control.simulation.closed_loop import ClosedLoop
@@ -126,7 +125,7 @@ class _CTable(Structure):
 
     @classmethod
     def of(cls, table: Table) -> _CTable:
-        return cls(*table.coefficients.shape, address(table.ends), address(table.coefficients))
+        return cls(*table.coefficients.shape, table.ends.ctypes.data, table.coefficients.ctypes.data)
 
 
 class _CLoop(Structure):
@@ -135,7 +134,7 @@ class _CLoop(Structure):
     @classmethod
     def of(cls, numbers: FloatArray, tables: Sequence[Table]) -> _CLoop:
         row = _CTable * len(tables)
-        return cls(address(numbers), len(tables), row(*map(_CTable.of, tables)))
+        return cls(numbers.ctypes.data, len(tables), row(*map(_CTable.of, tables)))
 
 
 def open_loop(path: Path) -> dict[str, Any]:
@@ -199,24 +198,24 @@ class CompiledLoop:
         self._to_boundaries = partial(functions["to_boundaries"], distances)
         self._motors = len(recording.torques.program.outputs)
         self._distances = np.empty(len(recording.distances.program.outputs))
-        self._addressed: dict[str, tuple[AnyArray, int]] = {}
 
     def derivatives(self, time: float, vectors: FloatArray) -> FloatArray:
         """Return the time derivatives of state vectors, (..., entries), at a time."""
         given = np.ascontiguousarray(vectors)
         rates = np.empty_like(given)
-        self._derivatives(time, given.size // given.shape[-1], address(given), address(rates))
+        self._derivatives(time, given.size // given.shape[-1], given.ctypes.data, rates.ctypes.data)
         return rates
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
         """Return the torques, (motors,), that a controller which holds them commands in a state."""
         given, asked = np.ascontiguousarray(vector), np.empty(self._motors)
-        self._demand(time, address(given), address(asked))
+        self._demand(time, given.ctypes.data, asked.ctypes.data)
         return asked
 
     def distance(self, vector: FloatArray) -> float:
         """Return the distance to the nearest boundary, at most 1."""
-        self._to_boundaries(self._address("state", vector), self._address("distances", self._distances))
+        given = np.ascontiguousarray(vector)
+        self._to_boundaries(given.ctypes.data, self._distances.ctypes.data)
         return float(self._distances.min(initial=1.0))  # there may be none
 
     def stages(
@@ -232,22 +231,9 @@ class CompiledLoop:
             rates: rates at the stages, (stages, entries), contiguous; those of earlier stages are read, the
                 computed ones are written.
         """
-        begin, state = self._address("state", vector), np.empty_like(vector)
+        begin, state = np.ascontiguousarray(vector), np.empty_like(vector)
         finite = self._stages(
-            time, step, begin, which.first, which.last, len(which.weights),
-            self._address("weights", which.weights), self._address("times", which.times),
-            self._address("rates", rates), self._address("state", state),
+            time, step, begin.ctypes.data, which.first, which.last, len(which.weights),
+            which.weights.ctypes.data, which.times.ctypes.data, rates.ctypes.data, state.ctypes.data,
         )  # fmt: skip
         return state if finite else None
-
-    def _address(self, role: str, array: FloatArray) -> int:
-        """Return the address of an array; NumPy takes a microsecond for it, as the code for an evaluation.
-
-        Steps pass the same arrays again and again, so the last one of each role is remembered.
-        """
-        last = self._addressed.get(role)
-        if last is not None and last[0] is array:
-            return last[1]
-        given = np.ascontiguousarray(array)  # kept with its address, since it may be a copy
-        self._addressed[role] = given, address(given)
-        return self._addressed[role][1]

@@ -72,7 +72,8 @@ class PacedMotion:
     def commands(self, pace: Sequence[Row], instants: IndexArray) -> list[Command]:
         """Return the command of each joint, with link torques, for a pace with its derivatives.
 
-        The last result is cached, since joints are evaluated one after the other.
+        The last result is cached, since joints are evaluated one after the other. Without it, the timing of
+        least energy of a 3R takes 1.3 times as long.
         """
         values = np.stack([*(value_of(row) for row in pace), instants])
         key = values.tobytes() + type(pace[0]).__name__.encode()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -93,7 +92,7 @@ class Group:
         rows: FloatArray = self.basis @ unknowns[self.unknowns]
         return rows if self.offsets is None else rows + self.offsets[:, None]
 
-    @cached_property
+    @property
     def by_instant(self) -> FloatArray:
         """Basis with the axes (instants, rows, own unknowns)."""
         return np.ascontiguousarray(self.basis.transpose(1, 0, 2))
@@ -135,7 +134,6 @@ class _Expanded:
 
     def __init__(self, group: Group, integrands: Sampled, bounds: Sampled, steps: FloatArray) -> None:
         self.group, self._steps = group, steps
-        self._curved: FloatArray | None = None
         self.integrands, *self._moved_integrands = (integrands.part(each) for each in range(len(steps) + 1))
         here, *self._moved_bounds = (bounds.part(each) for each in range(len(steps) + 1))
         self.bounds = here._replace(gradients=np.where(group.there[:, None], here.gradients, 0.0))
@@ -170,9 +168,7 @@ class _Expanded:
 
     def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
         """See `Point.newton_matrix`; (own unknowns, own unknowns)."""
-        if self._curved is None:  # a second call follows, with `convex`, if the matrix is indefinite
-            self._curved = self._curvature(self._of_all(multipliers))
-        curved = self._curved
+        curved = self._curvature(self._of_all(multipliers))
         if convex:
             values, vectors = np.linalg.eigh(curved)
             curved = np.einsum("iab,ib,icb->iac", vectors, np.maximum(values, 0.0), vectors)

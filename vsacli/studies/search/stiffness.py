@@ -263,7 +263,10 @@ class StiffnessSearch:
         )
 
     def _basis(self, space: SplineSpace) -> FloatArray:
-        """Return the shapes with two derivatives at all instants, (3, instants, shapes), computed once."""
+        """Return the shapes with two derivatives at all instants, (3, instants, shapes).
+
+        They are kept: without that, the stiffness of least torque of a 3R takes 1.2 times as long.
+        """
         if space not in self._bases:
             self._bases[space] = space.basis(self._load.time, STIFFNESS.orders)
         return self._bases[space]

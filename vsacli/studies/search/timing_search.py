@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray, evenly
+from vsacli.base.arrays import FloatArray
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.interior_point import Minimum, minimize_all
 from vsacli.studies.search.loads import Ends
@@ -28,14 +28,8 @@ from vsacli.trajectory.trajectory import Trajectory
 STIFFER_STARTS = (1.0, 0.8, 1.5, 2.2)
 """Multiples of the commanded stiffness for the starts, if it may vary."""
 
-FEW = 100
-"""Number of instants at which bounds are checked first."""
-
 SLOWEST, STRIDE = 1000.0, 1.1
 """Largest factor of a uniform slow-down that is tried, and the ratio of successive factors."""
-
-FACTORS_AT_ONCE = 16
-"""Factors that are tried in one call."""
 
 HALVINGS = 16
 """Bisections of the last stride, to 1e-6 of the factor."""
@@ -156,36 +150,23 @@ class TimingSearch(PacedSearch):
 
     def _uniform(self, spaces: PacedSpaces, stiffness: Mapping[int, FloatArray]) -> float | None:
         """Return the smallest constant pace that keeps all bounds, or None."""
-        few = SeparableProblem(self._groups(spaces, evenly(len(self._s), FEW)))
         every = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
         even, pace = spaces.even(self._s, 1.0, stiffness), spaces.even(self._s, 2.0, stiffness)
         pace -= even  # unknowns that make the pace faster by one
 
-        def kept(problem: SeparableProblem, *factors: float) -> list[bool]:
-            found = problem.values([even + (factor - 1) * pace for factor in factors])
-            return [bool(np.all(bounds < 0)) for _, bounds in found]
+        def kept(factor: float) -> bool:
+            ((_, bounds),) = every.values([even + (factor - 1) * pace])
+            return bool(np.all(bounds < 0))
 
         factors = FASTEST * STRIDE ** np.arange(math.ceil(math.log(SLOWEST / FASTEST) / math.log(STRIDE)))
-        for begin in range(0, len(factors), FACTORS_AT_ONCE):
-            tried = factors[begin : begin + FACTORS_AT_ONCE].tolist()
-            hopeful = kept(few, *(SLACK * factor for factor in tried))
-            factor = next(
-                (
-                    factor
-                    for factor, hope in zip(tried, hopeful, strict=True)
-                    if hope and all(kept(every, factor, SLACK * factor))
-                ),
-                None,
-            )
-            if factor is not None:
-                break
-        else:
+        factor = next((each for each in factors.tolist() if kept(SLACK * each) and kept(each)), None)
+        if factor is None:
             return None
         refused = factor / STRIDE
         for _ in range(HALVINGS):
             middle = math.sqrt(refused * factor)
-            refused, factor = (refused, middle) if kept(every, middle)[0] else (middle, factor)
-        return factor
+            refused, factor = (refused, middle) if kept(middle) else (middle, factor)
+        return float(factor)
 
     def _minima(
         self, problem: SeparableProblem, starts: Sequence[FloatArray], gap: float

@@ -18,7 +18,7 @@ from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.trajectory.fits.banded_qr import BandedFactor, block_count, factorize, sort_rows
 
 BLOCK_SAMPLES = 65536
-"""Samples processed at a time; a block that fits into the cache is twice as fast."""
+"""Samples that are summed at a time; the last digits of the sums depend on it."""
 
 
 class BinMoments(NamedTuple):
