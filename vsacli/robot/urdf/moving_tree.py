@@ -289,13 +289,7 @@ def moving_tree(
                 carriers[joint.parent],
                 to_base @ poses[joint.child],
                 links,
-                weld_bodies(
-                    [
-                        link.body.in_outer_frame(to_base @ poses[link.name])
-                        for link in links
-                        if link.body is not None
-                    ]
-                ),
+                _rigid_body_of(links, poses, to_base),
             )
             for joint, links in zip(moving.joints, carried, strict=True)
         ),
@@ -389,3 +383,11 @@ def _side_joints(urdf: Urdf, carriers: Mapping[str, int], moving: MovingJoints) 
         for joint in urdf.joints.values()
         if not joint.is_fixed and joint.name not in moving.names and carriers.get(joint.child, -2) >= nearest
     ]
+
+
+def _rigid_body_of(
+    links: tuple[UrdfLink, ...], poses: dict[str, FloatArray], to_base: FloatArray
+) -> RigidBody:
+    return weld_bodies(
+        [link.body.in_outer_frame(to_base @ poses[link.name]) for link in links if link.body is not None]
+    )
