@@ -259,10 +259,3 @@ def preferred_order(joints: int) -> IndexArray:
     """Return the indices of the parameters of all links in the order in which they are kept."""
     links = len(SYMBOLS) * np.arange(joints)[:, None]
     return np.asarray((links + [SYMBOLS.index(symbol) for symbol in PREFERRED]).ravel())
-
-
-def base_parameters(robot: Robot) -> BaseParameters:
-    """Return the base parameters of a robot's links."""
-    joints = len(robot.joints)
-    columns = np.moveaxis(regressor(robot, *random_motion(joints)), 1, -1)
-    return BaseParameters.of_columns(columns.reshape(-1, len(SYMBOLS) * joints), preferred_order(joints))
