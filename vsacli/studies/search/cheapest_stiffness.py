@@ -264,7 +264,7 @@ class CheapestStiffness:
         commanded = self._trajectory.block(0, self._trajectory.samples).commanded
         changes = {}
         for index, profile in profiles.items():
-            rows = profile.at_steps
+            rows = profile.rows[:, profile.steps]
             repeated = np.tile(rows[:, :-1], max(self._periods[index], 1))
             asked = np.stack([commanded[name][:, index] for name in STIFFNESS.names])
             changes[index] = np.concatenate([repeated, rows[:, -1:]], axis=1) - asked

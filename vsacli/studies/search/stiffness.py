@@ -85,11 +85,6 @@ class OptimizedStiffness:
     agreeing: int
     bounding: dict[str, float]
 
-    @property
-    def at_steps(self) -> FloatArray:
-        """Rows at the samples of the trajectory only, (3, samples)."""
-        return self.rows[:, self.steps]
-
 
 Spaces = Callable[[tuple[float, float], int, FloatArray], SplineSpace]
 """Function (span, number of pieces, times at which pieces may begin and end) that returns the splines."""
