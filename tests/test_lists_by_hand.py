@@ -16,9 +16,8 @@ from vsacli.dynamics import limits
 from vsacli.results.store.reader import RANGES, SIZES
 from vsacli.studies.search import fixed_text
 from vsacli.studies.sizing.sizing import KEPT
-from vsacli.trajectory.curves.closed_form import ClosedForm
+from vsacli.trajectory.curves.closed_form import TYPES, ClosedForm
 from vsacli.trajectory.curves.sequence import PARTS
-from vsacli.trajectory.curves.types import TYPES
 
 OF_PLACE = {"inertia", "gear_ratio", "side", "damping", "friction"}
 """Fields of a motor in a robot file that `size` writes from the place and the gear, or in another form."""

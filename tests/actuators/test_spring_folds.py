@@ -136,7 +136,7 @@ def scalar_fold(balance: Balance, tau_e: float, phi_1: float, phi_2: float) -> f
         low, high = max(middle - width, float(least)), min(middle + width, float(largest))
         if slope(low) * slope(high) < 0:
             t = brentq(slope, low, high, xtol=1e-300, rtol=4 * EPS)
-            return float(balance.stiffness(*deflections(t)))
+            return float(balance.state(*deflections(t)).stiffness)
     raise AssertionError("there is no fold next to these deflections")
 
 

@@ -17,7 +17,7 @@ from vsacli.base.signals import POSITION
 from vsacli.documents.paths import find, replace
 from vsacli.robot.file import load_robot
 from vsacli.robot.model import Robot
-from vsacli.trajectory.curves.types import Use
+from vsacli.trajectory.curves.closed_form import Use
 from vsacli.trajectory.curves.via_points import Via
 
 ROBOT = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")

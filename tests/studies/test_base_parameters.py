@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 from oracles import lagrange, pinocchio
+from samples.base_parameters import base_parameters
 from samples.marks import slow
 from samples.robots import random_link, random_motion, random_robot
 from samples.shipped import shipped_robot
@@ -15,7 +16,6 @@ from vsacli.robot.joint import Pose
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.regressor import (
     all_parameters,
-    base_parameters,
     link_of,
     link_parameter_names,
     parameters_of,

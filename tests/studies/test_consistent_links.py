@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from samples.base_parameters import base_parameters
 from samples.marks import slow
 from samples.robots import random_link, random_robot
 from samples.shipped import shipped_robot
@@ -15,7 +16,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.robot.joint import Inertia, Link
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.consistent_links import LinkEstimate, consistent_links
-from vsacli.studies.identification.regressor import all_parameters, base_parameters
+from vsacli.studies.identification.regressor import all_parameters
 
 
 def relinked(robot: Robot, links: list[Link]) -> Robot:

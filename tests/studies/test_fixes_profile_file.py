@@ -15,10 +15,9 @@ from vsacli.base.errors import InputError, StorageError
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import POSITION, WRENCH
 from vsacli.studies.search import Fix, check_fixed_target
-from vsacli.studies.search.acceptance import Acceptance
+from vsacli.studies.search.acceptance import Acceptance, verify_fixes
 from vsacli.studies.search.changed_motion import with_changed_stiffness
 from vsacli.studies.search.task import AS_IT_IS, Task
-from vsacli.studies.search.verification import verify_fixes
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.curves.via_points import ViaPoints

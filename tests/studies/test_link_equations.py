@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from samples.base_parameters import base_parameters
 from samples.computed_signals import computed_signals
 from samples.marks import slow_but
 
 from vsacli.studies.identification.estimation import least_squares
 from vsacli.studies.identification.link_equations import LinkSystem, link_system
 from vsacli.studies.identification.motor_equations import FRICTION, MOTORS, SPRINGS, unknowns
-from vsacli.studies.identification.regressor import base_parameters
 
 RUNS = {
     "coupled_1r": "coupled_1r",

@@ -9,10 +9,10 @@ import pytest
 from samples.fixes import pendulum, rest_to_rest
 
 from vsacli import inverse_dynamics, load_trajectory, optimize
-from vsacli.studies.search.cheapest_pace import CheapestPaceSearch
 from vsacli.studies.search.criteria import CRITERIA, Scale
 from vsacli.studies.search.loads import Ends
 from vsacli.studies.search.paced_motion import PacedJoint, PacedMotion, instants_of, retimed
+from vsacli.studies.search.paced_search import CheapestPaceSearch
 from vsacli.studies.search.splines import PacedSpaces, SplineSpace
 
 DURATION = 0.4

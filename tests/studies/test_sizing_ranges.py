@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from vsacli.base.arrays import FloatArray
 from vsacli.studies.sizing import CatalogMotor
+from vsacli.studies.sizing.catalog import Shaft
 from vsacli.studies.sizing.demand import MotorDemand
 from vsacli.studies.sizing.ratios import ratios_within, shares
-from vsacli.studies.sizing.shaft import Shaft
 
 SCAN = np.geomspace(1e-4, 1e7, 1500)
 AT_END = 1e-6

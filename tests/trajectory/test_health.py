@@ -11,10 +11,15 @@ from samples.clean_records import MOTIONS, SENSORS, clean_records
 
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.trajectory.recorded.even_stamps import elapsed_times, even_rate, rounding_notes, stamp_resolution
 from vsacli.trajectory.recorded.health import check_health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem
-from vsacli.trajectory.recorded.samples import SignalSamples
+from vsacli.trajectory.recorded.samples import (
+    SignalSamples,
+    elapsed_times,
+    even_rate,
+    rounding_notes,
+    stamp_resolution,
+)
 
 RATE = 1000
 TIME = np.arange(5001) / RATE

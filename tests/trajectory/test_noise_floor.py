@@ -10,7 +10,7 @@ from samples.marks import slow_but
 from samples.random_recordings import draw
 
 from vsacli.trajectory.fits import resolution
-from vsacli.trajectory.fits.noise_floor import enough_spans
+from vsacli.trajectory.fits.penalized import enough_spans
 from vsacli.trajectory.fits.resolution import KnownNoise, find_resolution
 from vsacli.trajectory.fits.selection import fit_samples
 

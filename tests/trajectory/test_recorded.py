@@ -10,7 +10,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.trajectory.fits import FitChoice
-from vsacli.trajectory.recorded.header_problems import RATE_INSTEAD
+from vsacli.trajectory.recorded.columns import RATE_INSTEAD
 from vsacli.trajectory.recorded.recording import read_recorded_signals, recorded_trajectory
 
 JOINTS = CommandedJoints({"base": "revolute", "elbow": "revolute"}, exempt={})

@@ -54,6 +54,11 @@ class Parameter(NamedTuple):
         """Words of the path, with entries of lists by their index."""
         return tuple(str(step.number) if isinstance(step, PathIndex) else step for step in self.path)
 
+    def matches(self, *patterns: str) -> bool:
+        """Return whether the path, with entries of lists by name or by index, matches one of the patterns."""
+        paths = (str(self), ".".join(self.by_index))
+        return any(fnmatchcase(path, pattern) for path in paths for pattern in patterns)
+
     @property
     def of_every_joint(self) -> str:
         """Pattern of this parameter of all joints, e.g. `joints.*.link.mass`."""
@@ -89,15 +94,10 @@ def parameters(robot: Robot, patterns: Sequence[str] = ()) -> tuple[Parameter, .
         InputError: a pattern matches no parameter.
     """
     available = [number for number in numbers_of_robot(robot) if _affects_results(number.path)]
-    chosen = [
-        each
-        for each in available
-        if not patterns or any(_matches_pattern(each, pattern) for pattern in patterns)
-    ]
     for pattern in patterns:
-        if not any(_matches_pattern(each, pattern) for each in available):
+        if not any(each.matches(pattern) for each in available):
             raise InputError.one(no_match(pattern, available))
-    return tuple(chosen)
+    return tuple(each for each in available if not patterns or each.matches(*patterns))
 
 
 def numbers_of_robot(robot: Robot) -> Iterator[Parameter]:
@@ -142,11 +142,6 @@ def _are_similar_paths(one: str, other: str) -> bool:
 def _affects_results(path: NumberPath) -> bool:
     bounds = LIMITS in path or path[2:4] == OF_DAMPER
     return not bounds and not str(path[-1]).startswith(LARGEST)
-
-
-def _matches_pattern(parameter: Parameter, pattern: str) -> bool:
-    words = (str(parameter), ".".join(parameter.by_index))
-    return any(fnmatchcase(path, pattern) for path in words)
 
 
 def seeded(robot: Robot, chosen: Sequence[Parameter]) -> Robot:

@@ -24,7 +24,7 @@ from vsacli.documents.record_values import numbers_in_record
 from vsacli.documents.source import Source, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot, check_robot
-from vsacli.trajectory.curves.types import Declaration, Formula, Recorded, Use, declared_as
+from vsacli.trajectory.curves.closed_form import Declaration, Formula, Recorded, Use, declared_as
 from vsacli.trajectory.devices import set_uncommanded_dampers
 from vsacli.trajectory.plausibility import trajectory_findings
 from vsacli.trajectory.profile import Profile, WrenchProfile

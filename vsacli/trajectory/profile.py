@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
@@ -18,40 +19,52 @@ if TYPE_CHECKING:
 
 
 class Profile(Protocol):
-    """A function of time with one component per joint or axis, and its first derivatives."""
+    """A function of time with one component per joint or axis, and its first derivatives.
+
+    By default it is a formula: samples are evaluated like any other time, and nothing is uncertain.
+    """
 
     @property
+    @abstractmethod
     def components(self) -> int:
         """Number of components: one per joint, or six of a wrench."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings about implausible values."""
+        return ()
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on the interpretation of the samples, where that is not obvious."""
+        return ()
 
     @property
+    @abstractmethod
     def breakpoints(self) -> FloatArray:
         """Ascending times between which the function is analytic; the first and last are its span."""
 
     @property
     def known_between(self) -> bool:
         """Whether `at` also gives the values at samples; False if these are given and known only there."""
+        return True
 
+    @abstractmethod
     def at(self, time: FloatArray) -> FloatArray:
         """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
 
-    def samples(self, start: int, stop: int, time: FloatArray, /) -> FloatArray:
+    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
         """Return the same at samples start..stop-1, whose times are `time`; given columns pass through."""
+        return self.at(time)
 
+    @abstractmethod
     def stretched(self, factor: float) -> Profile:
         """Return the profile slowed down by a factor, with the same first time."""
 
     @property
     def estimate(self) -> SampledProfile | None:
         """This profile if any value at the samples comes from a fit of recorded samples, else None."""
+        return None
 
 
 @dataclass(frozen=True)

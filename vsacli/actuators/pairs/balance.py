@@ -130,10 +130,6 @@ class Balance:
         """Return the state of both springs at their deflections."""
         return PairState(phi_1, phi_2, spring_state(self.first, phi_1), spring_state(self.second, phi_2))
 
-    def stiffness(self, phi_1: FloatArray, phi_2: FloatArray) -> FloatArray:
-        """Return G at deflections."""
-        return self.first.stiffness(phi_1) + self.second.stiffness(phi_2)
-
     def stiffness_slope(self, phi_1: FloatArray, phi_2: FloatArray) -> FloatArray:
         """Return dG/dt at deflections."""
         return self.first.hardening(phi_1) - self.second.hardening(phi_2)

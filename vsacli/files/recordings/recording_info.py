@@ -39,11 +39,11 @@ from vsacli.files.recordings.recording_text import is_proposed, mapping_lines
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
 from vsacli.trajectory.recorded.columns import column_layout
-from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.header_words import COMMANDED, ERROR, role_of
 from vsacli.trajectory.recorded.health import column_faults, mean_rate, stamp_faults
 from vsacli.trajectory.recorded.problems import Disorder, find_disorder
 from vsacli.trajectory.recorded.recording import NEEDED, read_samples
+from vsacli.trajectory.recorded.samples import elapsed_times
 
 TOGETHER = 16
 """Columns read at a time: a million rows of them take 128 MB, however many columns the table has."""

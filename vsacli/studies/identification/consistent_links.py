@@ -27,12 +27,7 @@ from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
 from vsacli.studies.identification.fitted_system import Solution
 from vsacli.studies.identification.link_equations import LinkSystem
-from vsacli.studies.identification.regressor import (
-    SYMBOLS,
-    link_of,
-    parameters_of,
-    steiner,
-)
+from vsacli.studies.identification.regressor import SYMBOLS, about_origin, link_of, tensor_entries
 
 WEIGHT = 1.0
 """Weight of the relative entropy against half the squared deviation in standard errors: where a recording
@@ -163,11 +158,8 @@ def _body_near(link: Link, robot: Robot) -> FloatArray:
     inertia = link.inertia.tensor
     spread, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
     spread = np.maximum(spread, mass * LEAST_RADIUS**2)
-    central = (axes * (spread.sum() - spread)) @ axes.T + mass * steiner(com)
-    parameters = parameters_of(link)
-    parameters[:4] = mass, *(mass * com)
-    parameters[4:] = central[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    return parameters
+    central = (axes * (spread.sum() - spread)) @ axes.T
+    return about_origin(np.array([mass, *com, *tensor_entries(central)]))
 
 
 def _parts_near(estimate: LinkEstimate, bodies: int) -> tuple[FloatArray, FloatArray]:

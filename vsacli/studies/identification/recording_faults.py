@@ -23,9 +23,9 @@ from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.csv_file import split_heading
 from vsacli.robot.model import Robot
 from vsacli.studies.measured.measured_columns import MeasuredSignal, Recording, preferred, read_recording
-from vsacli.trajectory.recorded.even_stamps import elapsed_times
 from vsacli.trajectory.recorded.faults import Quantization, angle_wraps
 from vsacli.trajectory.recorded.health import column_faults, stamp_faults, step_text
+from vsacli.trajectory.recorded.samples import elapsed_times
 from vsacli.trajectory.recorded.thresholds import (
     GAP_STEPS,
     LARGEST_ANGLE,

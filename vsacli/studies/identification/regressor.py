@@ -41,20 +41,20 @@ TENSOR = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 def parameters_of(link: Link) -> FloatArray:
     """Return the standard inertial parameters of a link, (10,)."""
-    return _about_origin(np.array([link.mass, *link.com, *_tensor_entries(link.inertia.tensor)]))
+    return about_origin(np.array([link.mass, *link.com, *tensor_entries(link.inertia.tensor)]))
 
 
-def _about_origin(of_file: FloatArray) -> FloatArray:
+def about_origin(of_file: FloatArray) -> FloatArray:
     """Return the standard parameters, (10,), from mass, center of mass and inertia about it, (10,)."""
     mass, com = of_file[0], of_file[1:4]
-    return np.concatenate(([mass], mass * com, of_file[4:] + _tensor_entries(mass * steiner(com))))
+    return np.concatenate(([mass], mass * com, of_file[4:] + tensor_entries(mass * steiner(com))))
 
 
 def derivatives_by_file(link: Link) -> FloatArray:
     """Return derivatives of the standard parameters by mass, center of mass and inertia, (10, 10)."""
-    of_file = np.array([link.mass, *link.com, *_tensor_entries(link.inertia.tensor)])
+    of_file = np.array([link.mass, *link.com, *tensor_entries(link.inertia.tensor)])
     changes = np.eye(len(SYMBOLS))  # central differences of polynomials of second degree are exact
-    columns = [(_about_origin(of_file + each) - _about_origin(of_file - each)) / 2 for each in changes]
+    columns = [(about_origin(of_file + each) - about_origin(of_file - each)) / 2 for each in changes]
     return np.stack(columns, axis=1)
 
 
@@ -66,7 +66,7 @@ def link_of(parameters: FloatArray) -> Link:
             positive.
     """
     mass, com = float(parameters[0]), parameters[1:4] / parameters[0]
-    central = _tensor_entries(tensor(parameters) - mass * steiner(com))
+    central = tensor_entries(tensor(parameters) - mass * steiner(com))
     x, y, z = map(float, com)
     inertia = Inertia(**dict(zip(TENSOR, map(float, central), strict=True)))
     return Link(mass=mass, com=(x, y, z), inertia=inertia)
@@ -93,7 +93,8 @@ def tensor(parameters: FloatArray) -> FloatArray:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _tensor_entries(symmetric: FloatArray) -> FloatArray:
+def tensor_entries(symmetric: FloatArray) -> FloatArray:
+    """Return the entries of a symmetric tensor in the order of `TENSOR`, (6,)."""
     return symmetric[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 
@@ -259,10 +260,3 @@ def preferred_order(joints: int) -> IndexArray:
     """Return the indices of the parameters of all links in the order in which they are kept."""
     links = len(SYMBOLS) * np.arange(joints)[:, None]
     return np.asarray((links + [SYMBOLS.index(symbol) for symbol in PREFERRED]).ravel())
-
-
-def base_parameters(robot: Robot) -> BaseParameters:
-    """Return the base parameters of a robot's links."""
-    joints = len(robot.joints)
-    columns = np.moveaxis(regressor(robot, *random_motion(joints)), 1, -1)
-    return BaseParameters.of_columns(columns.reshape(-1, len(SYMBOLS) * joints), preferred_order(joints))

@@ -15,14 +15,16 @@ is the usual covariance.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.studies.measured.agreement import Still
 from vsacli.studies.measured.pairing import FEWEST_SAMPLES, LARGEST, Pairing, noise, tame
+
+Still: TypeAlias = Literal["computed", "measured"]
+"""Signal that does not change beyond rounding or noise."""
 
 COSINES = 24
 """Number of cosines of a recording. With 8, the errors themselves were too uncertain (87 % within two of

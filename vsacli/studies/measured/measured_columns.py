@@ -18,8 +18,7 @@ from vsacli.documents.column_mapping import ColumnMapping
 from vsacli.documents.csv_file import split_heading
 from vsacli.documents.table import CsvTable, read_table
 from vsacli.documents.time_column import TIME
-from vsacli.trajectory.recorded.columns import NAMINGS, unit_factors
-from vsacli.trajectory.recorded.header_problems import ColumnNames, misspellings
+from vsacli.trajectory.recorded.columns import NAMINGS, ColumnNames, misspellings, unit_factors
 from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
 from vsacli.trajectory.recorded.problems import replace_stamps, time_problems
 
@@ -33,21 +32,17 @@ class Jointed(Protocol):
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints."""
-        ...
 
     @property
     def joint_types(self) -> tuple[str, ...]:
         """Types of the joints."""
-        ...
 
     @property
     def gear_ratio(self) -> FloatArray:
         """Gear ratios of the motors, (joints, 2); NaN where unknown."""
-        ...
 
     def existing(self, variable: Variable) -> BoolArray:
         """Return the existing columns of a variable of joints, (joints, 1 or 2)."""
-        ...
 
 
 class Place(NamedTuple):

@@ -14,9 +14,8 @@ from vsacli.base.texts import as_name
 from vsacli.trajectory.curves import ClosedForm
 from vsacli.trajectory.fits import INTERPOLATE, FitChoice
 from vsacli.trajectory.profile import Profile
-from vsacli.trajectory.recorded.even_stamps import elapsed_times, even_rate
 from vsacli.trajectory.recorded.hermite import HermiteSpline, derivatives_are_consistent
-from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples
+from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples, elapsed_times, even_rate
 from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -36,8 +35,8 @@ def with_raised_stiffness(trajectory: Trajectory, constants: Mapping[int, float]
         steps = np.zeros((3, trajectory.samples))
         steps[0] = 1.0
         return with_changed_stiffness(trajectory, {joint: by * steps for joint, by in constants.items()})
-    raised = stiffness.raised([constants.get(joint, 0.0) for joint in range(trajectory.joints)])
-    return with_stiffness(trajectory, raised)
+    of_joints = [constants.get(joint, 0.0) for joint in range(trajectory.joints)]
+    return with_stiffness(trajectory, stiffness.rescaled([1.0] * trajectory.joints, of_joints))
 
 
 def with_scaled_stiffness(trajectory: Trajectory, factors: Mapping[int, float]) -> Trajectory:
@@ -47,8 +46,8 @@ def with_scaled_stiffness(trajectory: Trajectory, factors: Mapping[int, float]) 
     """
     stiffness = trajectory.commanded[STIFFNESS.key]
     if isinstance(stiffness, ClosedForm):
-        by = [factors.get(joint, 1.0) for joint in range(trajectory.joints)]
-        return with_stiffness(trajectory, stiffness.scaled(by))
+        of_joints = [factors.get(joint, 1.0) for joint in range(trajectory.joints)]
+        return with_stiffness(trajectory, stiffness.rescaled(of_joints, [0.0] * trajectory.joints))
     elapsed = elapsed_times(trajectory.times.block(0, trajectory.samples))
     rows = stiffness.samples(0, trajectory.samples, elapsed)
     changes = {joint: (factor - 1) * rows[:, joint] for joint, factor in factors.items()}

@@ -18,14 +18,13 @@ from vsacli.base.progress import Countdown
 from vsacli.base.signals import STIFFNESS
 from vsacli.base.texts import as_name
 from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, verify
 from vsacli.studies.search.changed_motion import as_one_function, with_changed_stiffness
 from vsacli.studies.search.criteria import CRITERIA, Criterion, run_costs
 from vsacli.studies.search.loads import Load, joint_loads, periods, rests
 from vsacli.studies.search.optimum import JointOptimum, Optimum
 from vsacli.studies.search.splines import SplineSpace
 from vsacli.studies.search.stiffness import OptimizedStiffness, StiffnessSearch
-from vsacli.studies.search.verification import verify
 from vsacli.trajectory.trajectory import Trajectory
 
 SEARCHES = 10
@@ -244,7 +243,8 @@ class CheapestStiffness:
         self, acceptance: Acceptance, index: int, load: Load
     ) -> tuple[OptimizedStiffness | None, OptimizedStiffness]:
         """Return the best constant, if there is one, and the best profile of a joint over one period."""
-        steps = np.arange(len(load.time))[load.steps][: self._steps_of_period(index) + 1]
+        last = (self._trajectory.samples - 1) // max(self._periods[index], 1)
+        steps = np.arange(len(load.time))[load.steps][: last + 1]
         period = replace(load.at(slice(steps[-1] + 1)), steps=steps)
         search = StiffnessSearch(
             acceptance,
@@ -259,15 +259,12 @@ class CheapestStiffness:
         self._bars[index].finish()
         return found
 
-    def _steps_of_period(self, index: int) -> int:
-        return (self._trajectory.samples - 1) // max(self._periods[index], 1)
-
     def _with_stiffness(self, profiles: Mapping[int, OptimizedStiffness]) -> Trajectory:
         """Return the motion with other stiffness profiles, given by joint index."""
         commanded = self._trajectory.block(0, self._trajectory.samples).commanded
         changes = {}
         for index, profile in profiles.items():
-            rows = profile.at_steps
+            rows = profile.rows[:, profile.steps]
             repeated = np.tile(rows[:, :-1], max(self._periods[index], 1))
             asked = np.stack([commanded[name][:, index] for name in STIFFNESS.names])
             changes[index] = np.concatenate([repeated, rows[:, -1:]], axis=1) - asked

@@ -26,14 +26,13 @@ from vsacli.dynamics.inverse import adapt_trajectory
 from vsacli.dynamics.limits import Finding
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, verify, verify_fixes
 from vsacli.studies.search.combined import CombinedSearch, least_change, smallest_slow_down
 from vsacli.studies.search.cutting_planes import lowest_offset, smallest_offset, transitions_between_levels
 from vsacli.studies.search.fix_report import NOT_CONFIRMED, SIMILAR, Fix, Fixes, NotPossible, in_order
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.recorded_limits import RecordedLimits
 from vsacli.studies.search.task import AS_IT_IS, Combination, Task
-from vsacli.studies.search.verification import verify, verify_fixes
 from vsacli.trajectory.times import RecordedTimes
 from vsacli.trajectory.trajectory import Trajectory
 

@@ -1,9 +1,12 @@
-"""Cost and bounds of a joint along a fixed motion, as functions of its stiffness with two derivatives."""
+"""Cost and bounds of a joint along a fixed motion, as functions of its stiffness with two derivatives.
+
+A search starts from smooth profiles within the admissible range of the stiffness.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +19,7 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import driven_by
 from vsacli.dynamics.limits import limit_checks
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Range
 from vsacli.studies.search.criteria import (
@@ -27,7 +31,9 @@ from vsacli.studies.search.criteria import (
     limit_names,
     made_to_carry,
 )
+from vsacli.studies.search.interior_point import minimize
 from vsacli.studies.search.loads import Load
+from vsacli.studies.search.separable import Group, SeparableProblem, interior
 
 CLEARANCE = 1e-6
 """Relative distance that a profile keeps from each bound, so that rounding does not cross it."""
@@ -160,3 +166,71 @@ def best_of_constants(
             best = float(grid[at]), float(costs[at])
         grid = np.geomspace(grid[max(at - 1, 0)], grid[min(at + 1, GRID - 1)], GRID)
     return best
+
+
+INSIDE = 1e-3
+"""Relative distance that a start keeps from the ends of the admissible range, if possible."""
+
+DRAWN, LEVELS = 2, 6
+"""Number of random targets, and of the random levels that each of them interpolates."""
+
+
+class _Distance:
+    """The `Functions` of the squared distance from a target stiffness, within bounds."""
+
+    def __init__(self, target: FloatArray, within: Range, size: float) -> None:
+        self._target, self._within, self._size = target, within, size
+
+    def __call__(
+        self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
+    ) -> tuple[list[Dual | FloatArray], list[Dual | FloatArray]]:
+        """Return the square of the distance, and the excess over the bounds."""
+        low, high = (row[instants] for row in self._within)
+        missed = (rows[0] - self._target[instants]) / self._size
+        return [missed * missed], [(low - rows[0]) / self._size, (rows[0] - high) / self._size]
+
+
+def targets(asked: FloatArray, admissible: Range, time: FloatArray, seed: int) -> Iterator[FloatArray]:
+    """Yield targets for starts: the command, the lower end of the range, constants, random profiles."""
+    highest = float(admissible.low.max())
+    generator = np.random.default_rng(seed)
+    yield asked
+    yield 1.05 * admissible.low
+    yield np.full_like(time, 1.05 * highest)
+    yield np.full_like(time, 2 * highest)
+    places = np.linspace(time[0], time[-1], LEVELS)
+    for _ in range(DRAWN):
+        yield admissible.low * np.interp(time, places, generator.uniform(1.0, 2.0, LEVELS))
+
+
+def nearest_profile(
+    basis: FloatArray, time: FloatArray, target: FloatArray, admissible: Range
+) -> FloatArray | None:
+    """Return the coefficients of the admissible spline nearest to a target, (shapes,), or None.
+
+    Args:
+        basis: splines per unit of each coefficient, (instants, shapes).
+        time: instants, (instants,) in s.
+        target: target, (instants,).
+        admissible: range in which the spline must lie at the instants.
+    """
+    size = float(np.median(admissible.low))
+    clearance = np.minimum(INSIDE * size, (admissible.high - admissible.low) / 4)
+    within = Range(admissible.low + clearance, admissible.high - clearance)
+    wanted = np.minimum(np.maximum(target, within.low), within.high)
+    fitted = np.asarray(np.linalg.lstsq(basis, wanted, rcond=None)[0], dtype=np.float64)
+    near = basis @ fitted
+    if np.all((within.low < near) & (near < within.high)):
+        return fitted
+    group = Group(
+        functions=_Distance(target, within, size),
+        instants=np.arange(len(time)),
+        basis=basis[None],
+        unknowns=np.arange(basis.shape[1]),
+        weights=trapezoidal(time)[None] / (time[-1] - time[0]),
+        there=np.isfinite(np.stack(within)),
+        scales=np.array([size]),
+    )
+    problem = SeparableProblem([group])
+    start = interior(problem, fitted)
+    return None if start is None else minimize(problem, start).unknowns

@@ -24,7 +24,6 @@ from vsacli.dynamics.inverse import adapt_trajectory
 from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.changed_motion import reads_back, with_raised_stiffness
-from vsacli.studies.search.cheapest_pace import CheapestPaceSearch
 from vsacli.studies.search.cheapest_stiffness import (
     BOTH,
     SEARCHES,
@@ -50,7 +49,7 @@ from vsacli.studies.search.paced_motion import (
     path_at,
     retimed,
 )
-from vsacli.studies.search.paced_search import PacedSearch
+from vsacli.studies.search.paced_search import CheapestPaceSearch, PacedSearch
 from vsacli.studies.search.splines import Pacing
 from vsacli.studies.search.task import Combination, Task
 from vsacli.studies.search.timing_search import NoStartError, TimingSearch

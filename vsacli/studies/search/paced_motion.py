@@ -99,10 +99,6 @@ class PacedMotion:
         """Return the commanded stiffness of a joint, (instants,)."""
         return np.asarray(self._path.by_s[STIFFNESS.key][joint])
 
-    def stiffness_rates(self, pace: Sequence[Row], by_s: Sequence[Row]) -> list[Row]:
-        """Return a stiffness and its first two derivatives by time, from those by s."""
-        return Speeds.of(pace).rates(by_s)
-
 
 def instants_of(trajectory: Trajectory, duration: float, further: FloatArray = NOTHING) -> FloatArray:
     """Return the path coordinates s at which bounds are checked: even, and ever denser towards both ends.
@@ -169,6 +165,8 @@ class PacedJoint:
     Attributes:
         criterion: cost of the joint.
         scale: scale of that cost.
+        smoothings: smoothings of the cost in successive searches.
+        name: name of the joint.
     """
 
     def __init__(
@@ -185,8 +183,10 @@ class PacedJoint:
     ) -> None:
         self._motion, self._index, self._min_margin = motion, index, min_margin
         self.criterion, self.scale, self._share = criterion, scale, share
+        self.smoothings = criterion.smoothings
         self._clearance = CLEARANCE + reserve
         self._joint = motion.robot.joints[index]
+        self.name = self._joint.name
         self._carrying = (
             made_to_carry(self._joint, PACE_ORDERS + STIFFNESS.orders * varied, moving_corridor=True)
             if self._joint.actuator.sprung
@@ -195,16 +195,6 @@ class PacedJoint:
         fixed = NOT_OF_THE_PACE if varied else (*NOT_OF_THE_PACE, STIFFNESS.key)
         self._checks = [check for check in limit_checks(self._joint) if check.variable not in fixed]
         self._chosen = STIFFNESS.key in self._joint.actuator.commanded
-
-    @property
-    def smoothings(self) -> Sequence[float]:
-        """Smoothings of the cost in successive searches."""
-        return self.criterion.smoothings
-
-    @property
-    def name(self) -> str:
-        """Name of the joint."""
-        return self._joint.name
 
     @property
     def bound_names(self) -> list[str]:
@@ -229,7 +219,7 @@ class PacedJoint:
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
             command = self._motion.commands(pace, instants)[self._index]
             if len(stiffness):
-                rates = self._motion.stiffness_rates(pace, stiffness)
+                rates = Speeds.of(pace).rates(stiffness)
                 asked = dict(zip(STIFFNESS.names, rates, strict=True))
                 command = command._replace(commanded={**command.commanded, **asked})
             joint = self._carrying if isinstance(pace[0], Dual) else self._joint

@@ -1,11 +1,12 @@
 """Search over the pace along a path, and the stiffness if it varies, for the least time or cost.
 
-`PacedSearch` tries several starts and refines the best; `timing_search` minimizes the time, `cheapest_pace` a
-cost at the commanded duration.
+`PacedSearch` tries several starts and refines the best; `timing_search` minimizes the time,
+`CheapestPaceSearch` a cost at the commanded duration.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
@@ -15,7 +16,9 @@ from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.losses import trapezoidal
 from vsacli.studies.search.acceptance import ImpossibleError
+from vsacli.studies.search.criteria import rough_minima, smoothed_minimum
 from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum
+from vsacli.studies.search.loads import Ends
 from vsacli.studies.search.paced_motion import (
     CLEARANCE,
     PACE_ORDERS,
@@ -46,7 +49,7 @@ Start = tuple[FloatArray, FloatArray | None]
 """Unknowns near which to start, and unknowns that keep all bounds, if any are known."""
 
 
-class PacedSearch:
+class PacedSearch(ABC):
     """The common part of the searches along a path for least time and for least cost.
 
     Attributes:
@@ -84,31 +87,31 @@ class PacedSearch:
         self._span = float(motion.s[0]), float(motion.s[-1])
         self._scale = self._span[1]
 
+    @abstractmethod
     def _spaces(self, pieces: int) -> PacedSpaces:
         """Return the spaces of splines with this many pieces."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
         """Return the starts.
 
         Raises:
             ImpossibleError: no start was found.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
         """Return a start among finer splines, near the pace (key None) and the stiffness of joints."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _minima(
         self, problem: SeparableProblem, starts: Sequence[FloatArray], gap: float
     ) -> Sequence[Minimum]:
         """Return a minimum of the cost near each start; the first barrier raises it by `gap`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
         """Return the minimum, possibly slowed down, if it keeps all bounds at every instant; else None."""
-        raise NotImplementedError
 
     def best(self) -> Pacing:
         """Return the best pace, and stiffness if it varies, found from several starts.
@@ -238,3 +241,108 @@ class PacedSearch:
             if shares:
                 found[joint.name] = shares
         return found
+
+
+STIFFER = 1.0, 1.5, 2.0
+"""Multiples of the first stiffness for further starts."""
+
+DRAWN_PACES = 0.6, 1.6
+"""Range of the random paces before they are scaled to the duration."""
+
+LIFTED = 1.1
+"""Factor on a stiffness from which a search starts: from an end of the attainable range, where the optimum
+often is, a pendulum required more than 200 Newton steps, and from here 50."""
+
+FIRST_LEVEL = 1.05
+"""Initial level, as a multiple of the largest value that it bounds."""
+
+
+class CheapestPaceSearch(PacedSearch):
+    """A search for the timing of least cost at the commanded duration.
+
+    Args:
+        motion: motion along the path.
+        joints: cost and bounds of each joint.
+        varied: indices of the joints whose stiffness varies as well.
+        ends: ends of the motion.
+        seed: seed of the random starts.
+        progress: function to call after each search.
+        near: pace and stiffness near which to start, scaled to the duration, if the path is infeasible as
+            commanded.
+    """
+
+    pieces = (12, 24, 48)
+    same_cost = 1e-3
+    worth = 1e-3
+    timed = False
+    nothing_kept = "no pace that was tried keeps every limit at all instants within the duration"
+
+    def __init__(
+        self,
+        motion: PacedMotion,
+        joints: Sequence[PacedJoint],
+        varied: Sequence[int],
+        ends: Ends,
+        seed: int,
+        progress: Callable[[], None],
+        near: Pacing | None = None,
+    ) -> None:
+        super().__init__(motion, joints, varied, seed, progress)
+        self._ends, self._near = ends, near
+
+    def _spaces(self, pieces: int) -> PacedSpaces:
+        return PacedSpaces.of(self._span, pieces, self._varied, self._ends).lasting_as_commanded()
+
+    def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
+        """Return the commanded pace with several stiffnesses, and random paces with the first of these."""
+        asked = {joint: LIFTED * self._motion.stiffness(joint) for joint in self._varied}
+        even = np.ones_like(self._s)
+        if self._near is not None:
+            even, asked = self._lasting(self._near.pace()(self._s)), self._near.stiffness_at(self._s)
+        first = self._levelled(spaces, spaces.fitted(self._s, even, asked))
+        inside = first if self._kept(spaces, first) else None
+        stiffer = [
+            {joint: multiple * row for joint, row in asked.items()}
+            for multiple in (STIFFER if self._varied else (1.0,))
+        ]
+        wanted = [spaces.fitted(self._s, even, stiffness) for stiffness in stiffer]
+        wanted += [
+            spaces.fitted(self._s, self._lasting(even * drawn), asked) for drawn in self._drawn(*DRAWN_PACES)
+        ]
+        return [(self._levelled(spaces, unknowns), inside) for unknowns in wanted]
+
+    def _lasting(self, pace: FloatArray) -> FloatArray:
+        """Return a pace scaled to the commanded duration, (instants,)."""
+        return pace * (self._span[1] / np.trapezoid(pace, self._s))
+
+    def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
+        stiffness = {key: LIFTED * row for key, row in rows.items() if key is not None}
+        return self._levelled(spaces, spaces.fitted(self._s, rows[None], stiffness)), None
+
+    def _kept(self, spaces: PacedSpaces, unknowns: FloatArray) -> bool:
+        every = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
+        ((_, bounds),) = every.values([unknowns])
+        return bool(np.all(bounds < 0))
+
+    def _levelled(self, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
+        """Return unknowns with a level appended that bounds its values, if the cost is a level."""
+        if not self._joints[0].criterion.levels:
+            return unknowns
+        without = np.append(unknowns, 0.0)
+        _, *groups = self._groups(spaces, np.arange(len(self._s)))
+        over = [
+            group.bounds(group.rows(without))[len(joint.bound_names) :]
+            for joint, group in zip(self._joints, groups, strict=True)
+        ]
+        return np.append(unknowns, FIRST_LEVEL * float(np.nan_to_num(np.concatenate(over)).max()))
+
+    def _minima(
+        self, problem: SeparableProblem, starts: Sequence[FloatArray], gap: float
+    ) -> Sequence[Minimum]:
+        if gap > WARM_GAP:
+            return rough_minima(problem, starts, self._joints, gap)
+        return [smoothed_minimum(problem, start, gap, self._joints) for start in starts]
+
+    def _accepted(self, _spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
+        ((_, bounds),) = SeparableProblem(every).values([found.unknowns])
+        return found if np.all(bounds <= CLEARANCE / 2) else None

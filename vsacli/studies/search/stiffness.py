@@ -18,12 +18,17 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, Range, checked_range
 from vsacli.studies.search.criteria import ROUGH_GAP, Criterion, Scale, rough_minima, smoothed_minimum
-from vsacli.studies.search.fixed_motion import CLEARANCE, FixedMotion, best_of_constants
+from vsacli.studies.search.fixed_motion import (
+    CLEARANCE,
+    FixedMotion,
+    best_of_constants,
+    nearest_profile,
+    targets,
+)
 from vsacli.studies.search.interior_point import WARM_GAP, Minimum
 from vsacli.studies.search.loads import Load
 from vsacli.studies.search.separable import Group, SeparableProblem, interior, missed_instants
 from vsacli.studies.search.splines import SplineSpace
-from vsacli.studies.search.stiffness_starts import nearest_profile, targets
 
 INSTANTS_PER_PIECE = 8
 """Instants per piece of the spline at which the cost is integrated and bounds are kept."""
@@ -79,11 +84,6 @@ class OptimizedStiffness:
     starts: int
     agreeing: int
     bounding: dict[str, float]
-
-    @property
-    def at_steps(self) -> FloatArray:
-        """Rows at the samples of the trajectory only, (3, samples)."""
-        return self.rows[:, self.steps]
 
 
 Spaces = Callable[[tuple[float, float], int, FloatArray], SplineSpace]
@@ -239,10 +239,6 @@ class StiffnessSearch:
         found = self._completed(rough)
         return np.inf if found is None else found.minimum.cost
 
-    @property
-    def _asked(self) -> FloatArray:
-        return self._load.command.commanded[STIFFNESS.key]
-
     def _space(self, pieces: int) -> SplineSpace:
         return self._spaces(self._span, pieces, self._steps)
 
@@ -251,7 +247,8 @@ class StiffnessSearch:
         time, coarsest = self._load.time, min(FIRST_PIECES, self._most)
         chosen = evenly(len(time), INSTANTS_PER_PIECE * MOST_PIECES)
         admissible = Range(*(row[chosen] for row in self._admissible))
-        wanted = [target[chosen] for target in targets(self._asked, self._admissible, time, self._seed)]
+        asked = self._load.command.commanded[STIFFNESS.key]
+        wanted = [target[chosen] for target in targets(asked, self._admissible, time, self._seed)]
         for pieces in self._finer_than(coarsest // 2):
             space = self._space(pieces)
             basis = self._basis(space)[0, chosen]

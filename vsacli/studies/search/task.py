@@ -136,7 +136,8 @@ class Task:
             for index, joint in enumerate(self.acceptance.robot.joints)
             if "stiffness" in joint.actuator.commanded
         )
-        changed = bool(found.constants) and not self._declares_stiffness
+        stiffness = self.trajectory.commanded[STIFFNESS.key]
+        changed = bool(found.constants) and not isinstance(stiffness, ClosedForm)
         stretched, factor = self._stretched(found.factor, changed=changed)
         raised = with_raised_stiffness(stretched, found.constants)
         declared, factor = self._kept_rate(raised, factor, found)
@@ -197,10 +198,6 @@ class Task:
             asked=self.trajectory,
             transition=LongerTransition(before, after),
         )
-
-    @property
-    def _declares_stiffness(self) -> bool:
-        return isinstance(self.trajectory.commanded[STIFFNESS.key], ClosedForm)
 
     def _stretched(self, factor: float, *, changed: bool) -> tuple[Trajectory, float]:
         """Return the slower trajectory, and the factor by which it remains to be stretched.

@@ -23,7 +23,7 @@ from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.compliance import HeldPose, coupled_joints, softest_direction
 from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range, verify_fixes
 from vsacli.studies.search.changed_motion import with_scaled_stiffness
 from vsacli.studies.search.fix_report import (
     NOT_CONFIRMED,
@@ -36,7 +36,6 @@ from vsacli.studies.search.fix_report import (
 )
 from vsacli.studies.search.loads import joint_loads
 from vsacli.studies.search.recorded_limits import RecordedLimits
-from vsacli.studies.search.verification import verify_fixes
 from vsacli.trajectory.trajectory import Trajectory
 
 LARGEST_FACTOR = 1e3

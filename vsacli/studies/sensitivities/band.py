@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -21,7 +21,7 @@ import scipy
 from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.friction import REST, FrictionLaws
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.json_records import Published, named
+from vsacli.base.json_records import Published
 from vsacli.studies.sensitivities.joint_derivatives import MARGIN, SPEED
 from vsacli.studies.sensitivities.slopes import Derivatives
 
@@ -102,18 +102,6 @@ class JointBand(Published):
     margin_deviation: float
     margin_time: float
     lost: float
-
-    shape: ClassVar = named(
-        "torque",
-        "share",
-        "time",
-        "reverses",
-        "reversals",
-        "margin",
-        "margin_deviation",
-        "margin_time",
-        "lost",
-    )
 
 
 class TorqueCurves(NamedTuple):

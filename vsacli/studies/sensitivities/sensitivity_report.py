@@ -38,8 +38,6 @@ class JointEffect(Published):
     margin: float
     spent: float
 
-    shape: ClassVar = named("torque", "share", "time", "motor", "margin", "spent")
-
 
 @dataclass(frozen=True)
 class ParameterEffect(Published):

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -19,7 +19,7 @@ from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has_flag
-from vsacli.base.json_records import Published, named
+from vsacli.base.json_records import Published
 from vsacli.base.variables import Block
 from vsacli.compute.engine import choose
 from vsacli.documents.expression import ExpressionError
@@ -212,8 +212,6 @@ class MonteCarlo(Published):
     refused: int
     lost: dict[str, float]
     torque: dict[str, float]
-
-    shape: ClassVar = named("drawn", "refused", "lost", "torque")
 
 
 def monte_carlo(

@@ -20,10 +20,9 @@ from vsacli.base.errors import InputError
 from vsacli.base.json_records import Published, named
 from vsacli.base.texts import counted, listed
 from vsacli.robot.joint import Joint
-from vsacli.studies.sizing.catalog import CatalogMotor
+from vsacli.studies.sizing.catalog import LIMITS, CatalogMotor, Shaft
 from vsacli.studies.sizing.demand import MotorDemand
 from vsacli.studies.sizing.ratios import Gears, Ratios, balanced, least_rms, ratios_within, rms_torque, shares
-from vsacli.studies.sizing.shaft import LIMITS, Shaft
 
 CRITERIA = {
     "copper_loss": "least copper loss",

@@ -21,7 +21,7 @@ from vsacli.base.json_records import Published, named
 from vsacli.base.variables import Block
 from vsacli.dynamics.dampers import parallel_damper_torques
 from vsacli.robot.model import Robot
-from vsacli.studies.sizing.shaft import shaft_signals
+from vsacli.studies.sizing.catalog import shaft_signals
 from vsacli.trajectory.trajectory import Trajectory
 
 

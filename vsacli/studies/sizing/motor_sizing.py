@@ -12,10 +12,9 @@ from vsacli.actuators.motor import JointMotor
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import Published, named
 from vsacli.base.units import TORQUE, VELOCITY
-from vsacli.studies.sizing.catalog import CatalogMotor
+from vsacli.studies.sizing.catalog import LIMITS, CatalogMotor, Shaft
 from vsacli.studies.sizing.choices import Choice
 from vsacli.studies.sizing.demand import MotorDemand, Peak
-from vsacli.studies.sizing.shaft import LIMITS, Shaft
 
 
 @dataclass(frozen=True, eq=False)

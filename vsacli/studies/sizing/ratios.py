@@ -20,8 +20,8 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.did_you_mean import did_you_mean
 from vsacli.base.errors import InputError
+from vsacli.studies.sizing.catalog import Shaft
 from vsacli.studies.sizing.demand import MotorDemand
-from vsacli.studies.sizing.shaft import Shaft
 
 _RANGE = re.compile(r"(?P<low>[^,]+?)\s*\.\.\s*(?P<high>[^,]+)")
 _TO_ONE = re.compile(r"\s*(?P<ratio>\d+(\.\d+)?)\s*:\s*1\s*")

@@ -24,7 +24,7 @@ from vsacli.documents.edited import edited, moved_files, unaliased
 from vsacli.documents.record_table import RecordTable
 from vsacli.robot.file import text_to_change
 from vsacli.robot.model import Robot, check_robot
-from vsacli.studies.sizing.catalog import CatalogMotor, read_catalog
+from vsacli.studies.sizing.catalog import CatalogMotor, Shaft, read_catalog
 from vsacli.studies.sizing.choices import (
     CRITERIA,
     Choice,
@@ -36,7 +36,6 @@ from vsacli.studies.sizing.choices import (
 from vsacli.studies.sizing.demand import MotorDemand, demanded
 from vsacli.studies.sizing.motor_sizing import MotorSizing, OwnMotor, WorkingPoints
 from vsacli.studies.sizing.ratios import Gears, gears_of_joints, ratios_within
-from vsacli.studies.sizing.shaft import Shaft
 from vsacli.studies.sizing.sizing_report import Sizing
 from vsacli.trajectory.trajectory import Trajectory
 

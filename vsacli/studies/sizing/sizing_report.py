@@ -11,10 +11,10 @@ from vsacli.base.json_records import Published, named
 from vsacli.base.tables import ReportText, TextReport, cell, headline
 from vsacli.base.texts import counted, joined, warnings_and_notes
 from vsacli.base.units import JOINT_ACCELERATION, POSITION, TORQUE, VELOCITY, in_header, time_text, units_of
+from vsacli.studies.sizing.catalog import LIMITS
 from vsacli.studies.sizing.choices import CRITERIA, Choice
 from vsacli.studies.sizing.demand import Outcome, Peak, SpringDemand
 from vsacli.studies.sizing.motor_sizing import MotorSizing
-from vsacli.studies.sizing.shaft import LIMITS
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,11 +23,12 @@ from vsacli.documents import tree
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import evaluate
 from vsacli.documents.reading import ChangeError, apply_changes
-from vsacli.documents.record_values import NumberAtPath, NumberPath, PathIndex, numbers_in_record
+from vsacli.documents.record_values import NumberAtPath, PathIndex, numbers_in_record
 from vsacli.documents.source import Problems, is_table
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.file import RobotFileWithSource
 from vsacli.robot.model import Robot
+from vsacli.robot.parameters import Parameter
 from vsacli.studies.sensitivities.tolerances import Tolerance, distribution
 from vsacli.studies.sweeps.study_file import GRID, Drawn, Linked, Listed, Ranged, Spaced, StudyFile, Varied
 from vsacli.trajectory.changes import divide_changes_by_file
@@ -35,39 +36,6 @@ from vsacli.trajectory.file import read_trajectory
 
 MOST_VALUES = 1_000_000
 """Largest number of values of one path: more than any study has runs."""
-
-
-class FileNumber(NamedTuple):
-    """A number in one of the files: its path with names and with indices, its unit and its value."""
-
-    path: str
-    indexed: str
-    unit: str
-    value: float
-
-
-def file_numbers(numbers: Sequence[NumberAtPath], joint_types: Mapping[str, str]) -> list[FileNumber]:
-    """Return the numbers of a file with their paths.
-
-    Args:
-        numbers: numbers from `documents.record_values.numbers`.
-        joint_types: type of each joint, which determines units, by name.
-    """
-    return [
-        FileNumber(
-            _dotted(each.path),
-            _dotted(each.path, indexed=True),
-            each.quantity.unit(_joint_type(each, joint_types)),
-            each.value,
-        )
-        for each in numbers
-    ]
-
-
-def _dotted(path: NumberPath, *, indexed: bool = False) -> str:
-    return ".".join(
-        str(step.number) if indexed and isinstance(step, PathIndex) else str(step) for step in path
-    )
 
 
 def _joint_type(number: NumberAtPath, joint_types: Mapping[str, str]) -> str:
@@ -117,7 +85,7 @@ class Dimension(NamedTuple):
 
 
 def dimensions_of(
-    varied: Varied, numbers: Sequence[FileNumber], before: Sequence[Dimension]
+    varied: Varied, numbers: Sequence[Parameter], before: Sequence[Dimension]
 ) -> Iterator[Dimension]:
     """Yield the dimensions of a path: one, or one for each parameter of a distribution.
 
@@ -129,7 +97,7 @@ def dimensions_of(
     Raises:
         InputError: the variation does not fit the value.
     """
-    fitting = [each for each in numbers if _fits(each, varied.path)]
+    fitting = [each for each in numbers if each.matches(varied.path, f"{varied.path}.*")]
     unit = fitting[0].unit if fitting else ""
     match varied.way:
         case Listed(values=values):
@@ -155,27 +123,20 @@ def dimensions_of(
             )
 
 
-def _fits(number: FileNumber, path: str) -> bool:
-    """Return whether a path leads to a number, or to a record with it."""
-    return any(fnmatchcase(each, pattern) for each in number[:2] for pattern in (path, f"{path}.*"))
-
-
 def _distributed(
-    path: str, node: tree.Node, fitting: Sequence[FileNumber], numbers: Sequence[FileNumber]
+    path: str, node: tree.Node, fitting: Sequence[Parameter], numbers: Sequence[Parameter]
 ) -> Iterator[Dimension]:
     if not fitting:
         raise InputError.one(
-            f"no number of robot or trajectory fits{did_you_mean(path, [each.path for each in numbers])}"
+            f"no number of robot or trajectory fits{did_you_mean(path, [*map(str, numbers)])}"
         )
     for each in dict.fromkeys(fitting):
         if any(other.path == each.path and other.value != each.value for other in fitting):
-            raise InputError.one(f"{each.path} differs between trajectories; list its values, or a range")
+            raise InputError.one(f"{each} differs between trajectories; list its values, or a range")
         tolerance = distribution(node, each.value, each.unit)
         if tolerance.size == 0:
-            raise InputError.one(
-                f"{each.path} is zero, of which a share is nothing; give {each.unit} instead"
-            )
-        yield Dimension(each.path, each.unit, (), each.value, tolerance)
+            raise InputError.one(f"{each} is zero, of which a share is nothing; give {each.unit} instead")
+        yield Dimension(str(each), each.unit, (), each.value, tolerance)
 
 
 def _spaced(spaced: Spaced, unit: str) -> tuple[float, ...]:
@@ -265,10 +226,10 @@ class Entries:
                     self._change(dimension.path, value)
         problems.check()
 
-    def _numbers(self) -> list[FileNumber]:
+    def _numbers(self) -> list[Parameter]:
         trajectories = (numbers_in_record(document, self._joints.types) for document, _ in self._documents)
         every = [*numbers_in_record(self._read.document), *(each for found in trajectories for each in found)]
-        return file_numbers(every, self._joints.types)
+        return [Parameter(*each, None, _joint_type(each, self._joints.types)) for each in every]
 
     def _change(self, path: str, value: object) -> None:
         changes = divide_changes_by_file({path: value})

@@ -16,7 +16,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing.connection import Connection
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeAlias
 
 from vsacli.base.errors import InputError
@@ -87,7 +86,7 @@ def executor(
         yield Computer(study).rows
 
 
-class Executor(ABC):
+class Executor(ExitStack, ABC):
     """A context manager around workers that compute tasks, like the executors of `concurrent.futures`.
 
     Args:
@@ -95,18 +94,10 @@ class Executor(ABC):
     """
 
     def __init__(self, study: Study) -> None:
+        super().__init__()
         self._study, self._job = study, Job.of(study)
-        self._open = ExitStack()
         self._seconds_a_run = TASK_SECONDS
         self._apart: set[int] = set()  # runs of lost tasks, of which one may end its process again
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._open.close()
 
     @abstractmethod
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
@@ -219,7 +210,7 @@ class Processes(Executor):
         free = next((worker for worker in self.workers if worker.task.done()), None)
         if free is None or len(self.workers) < self._count:
             free = Worker(self._job)
-            self._open.callback(free.end)
+            self.callback(free.end)
             self.workers.append(free)
         return free.compute(runs)
 
@@ -276,7 +267,7 @@ class Cluster(Executor):
             opened.enter_context(distributed.utils.silence_logging_cmgr(CRITICAL))
             self._client = opened.enter_context(self._connected(opened))
             self._executor = self._client.get_executor(pure=False)
-            self._open = opened.pop_all()
+            self.callback(opened.pop_all().close)
         if not self._client.nthreads():
             self._tell(f"{self._address} has no worker yet; waiting for one")
         return self

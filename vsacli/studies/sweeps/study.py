@@ -8,7 +8,6 @@ import json
 import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -317,12 +316,10 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     return study.with_engine(engine)
 
 
-def _led_to(robot: Robot, dimension: Dimension) -> Iterator[Parameter]:
-    """Yield the numbers of a robot to which a dimension leads, or which are part of what it leads to."""
-    for parameter in numbers_of_robot(robot):
-        paths = str(parameter), ".".join(parameter.by_index)
-        if any(fnmatchcase(path, end) for path in paths for end in (dimension.path, f"{dimension.path}.*")):
-            yield parameter
+def _led_to(robot: Robot, dimension: Dimension) -> list[Parameter]:
+    """Return the numbers of a robot to which a dimension leads, or which are part of what it leads to."""
+    ends = (dimension.path, f"{dimension.path}.*")
+    return [each for each in numbers_of_robot(robot) if each.matches(*ends)]
 
 
 def _check_named(source: Source, key: str, name: str) -> None:

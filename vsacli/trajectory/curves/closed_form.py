@@ -1,7 +1,8 @@
 """Base classes of profiles in closed form, and of the declarations of signals in trajectory files.
 
 A type of declaration, such as a polynomial or a recording, becomes a record class for each of its uses, i.e.
-for a signal and for robots with or without springs. The simplest profile is a constant.
+for a signal and for robots with or without springs. The simplest profile is a constant. A new type needs a
+class like those in this folder, and a row in `TYPES`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from vsacli.base import units
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import FieldProblem, InputError
+from vsacli.base.lazy import LazyRegistry
 from vsacli.base.signals import POSITION, WRENCH, Signal
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_FRAMES
 from vsacli.documents.fields import (
@@ -25,6 +27,7 @@ from vsacli.documents.fields import (
     Check,
     Items,
     NumberList,
+    OneOf,
     PerJoint,
     boolean,
     choice,
@@ -33,6 +36,7 @@ from vsacli.documents.fields import (
     value,
 )
 from vsacli.documents.record_checks import DeclaredRecord
+from vsacli.trajectory.profile import Profile
 from vsacli.trajectory.times import stretch
 
 if TYPE_CHECKING:
@@ -52,16 +56,11 @@ VIA_DEGREES = range(3, 10, 2)
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClosedForm(ABC):
+class ClosedForm(Profile):
     """A profile in closed form, analytic between its breakpoints; its span is in s."""
 
     signal: Signal
     span: tuple[float, float]
-
-    warnings: ClassVar[tuple[str, ...]] = ()
-    notes: ClassVar[tuple[str, ...]] = ()
-    known_between: ClassVar[bool] = True
-    estimate: ClassVar[None] = None
 
     def __post_init__(self) -> None:
         first, last = self.span
@@ -70,22 +69,9 @@ class ClosedForm(ABC):
             raise InputError.one(f"a profile must last {allowed}, not from {first:g} to {last:g} s")
 
     @property
-    @abstractmethod
-    def components(self) -> int:
-        """Number of components: one per joint, or six of a wrench."""
-
-    @property
     def breakpoints(self) -> FloatArray:
         """Ends of the span."""
         return np.array(self.span)
-
-    @abstractmethod
-    def at(self, time: FloatArray) -> FloatArray:
-        """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
-
-    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
-        """Return the same at samples, whose times are `time`."""
-        return self.at(time)
 
     def stretched(self, factor: float) -> Self:
         """Return the profile slowed down by a factor."""
@@ -93,22 +79,16 @@ class ClosedForm(ABC):
         return replace(self, span=(first, stretch(last, first, factor)))
 
     @abstractmethod
-    def raised(self, by: Sequence[float]) -> Self:
-        """Return the profile with a constant added to each component."""
-
-    @abstractmethod
-    def scaled(self, by: Sequence[float]) -> Self:
-        """Return the profile with each component multiplied by a constant."""
+    def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:
+        """Return the profile with each component multiplied by a factor, and then a constant added."""
 
 
-def add_constants(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
-    """Return the sums of two values for each component."""
-    return tuple(value + constant for value, constant in zip(values, by, strict=True))
-
-
-def multiply_constants(values: Sequence[float], by: Sequence[float]) -> tuple[float, ...]:
-    """Return the products of two values for each component."""
-    return tuple(value * constant for value, constant in zip(values, by, strict=True))
+def rescale(
+    values: Sequence[float], factors: Sequence[float], constants: Sequence[float]
+) -> tuple[float, ...]:
+    """Return the value of each component multiplied by a factor, and then a constant added."""
+    changes = zip(values, factors, constants, strict=True)
+    return tuple(factor * value + constant for value, factor, constant in changes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,18 +103,14 @@ class ConstantProfile(ClosedForm):
         return len(self.value)
 
     def at(self, time: FloatArray) -> FloatArray:
-        """See `ClosedForm.at`."""
+        """See `Profile.at`."""
         rows = np.zeros((self.signal.orders, self.components, len(time)))
         rows[0] = np.array(self.value)[:, None]
         return rows
 
-    def raised(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.raised`."""
-        return replace(self, value=add_constants(self.value, by))
-
-    def scaled(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.scaled`."""
-        return replace(self, value=multiply_constants(self.value, by))
+    def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:
+        """See `ClosedForm.rescaled`."""
+        return replace(self, value=rescale(self.value, factors, constants))
 
 
 SAME_TIME = 1e-9
@@ -366,3 +342,38 @@ def same_time(one: float, other: float) -> bool:
 def nan_for_none(values: Values) -> tuple[float, ...]:
     """Return values with NaN in place of None."""
     return tuple(math.nan if value is None else value for value in values)
+
+
+_JOINTS = ("position", "commanded")
+_EVERY = (*_JOINTS, "wrench")
+
+TYPES = {
+    "polynomial": ("vsacli.trajectory.curves.polynomial:Polynomial", _EVERY),
+    "via": ("vsacli.trajectory.curves.via_points:Via", _JOINTS),
+    "sinusoids": ("vsacli.trajectory.curves.sinusoids:SumOfSinusoids", _JOINTS),
+    "sequence": ("vsacli.trajectory.curves.sequence:Sequence", ("position",)),
+    "steps": ("vsacli.trajectory.curves.steps:Steps", ("commanded", "wrench")),
+    "constant": ("vsacli.trajectory.curves.polynomial:Hold", _EVERY),
+    "csv": ("vsacli.trajectory.curves.closed_form:Recorded", _EVERY),
+}
+"""Types of declarations, each with module and class, and its uses: position, commanded signals, wrench."""
+
+
+class _Types(LazyRegistry):
+    """The record classes of the types that are possible for a use."""
+
+    def __init__(self, use: Use) -> None:
+        served = {POSITION: "position", WRENCH: "wrench"}.get(use.signal, "commanded")
+        super().__init__({name: home for name, (home, serves) in TYPES.items() if served in serves})
+        self._use = use
+
+    def __getitem__(self, name: str) -> Any:
+        return super().__getitem__(name).record(self._use)
+
+
+def declared_as(use: Use) -> OneOf:
+    """Return the possible declarations of a signal."""
+    return OneOf(_Types(use))
+
+
+__all__ = ["TYPES", "Declaration", "Formula", "Recorded", "Use", "declared_as"]

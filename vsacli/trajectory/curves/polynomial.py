@@ -25,9 +25,8 @@ from vsacli.trajectory.curves.closed_form import (
     Formula,
     Use,
     Values,
-    add_constants,
-    multiply_constants,
     nan_for_none,
+    rescale,
 )
 
 
@@ -53,11 +52,11 @@ class RestToRest(ClosedForm):
 
     @property
     def components(self) -> int:
-        """See `ClosedForm.components`."""
+        """See `Profile.components`."""
         return len(self.start)
 
     def at(self, time: FloatArray) -> FloatArray:
-        """See `ClosedForm.at`."""
+        """See `Profile.at`."""
         first, last = self.span
         elapsed, remaining = time - first, last - time
         late = remaining < elapsed
@@ -73,13 +72,10 @@ class RestToRest(ClosedForm):
             np.multiply(change, rate, out=row)
         return rows
 
-    def raised(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.raised`."""
-        return replace(self, start=add_constants(self.start, by), end=add_constants(self.end, by))
-
-    def scaled(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.scaled`."""
-        return replace(self, start=multiply_constants(self.start, by), end=multiply_constants(self.end, by))
+    def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:
+        """See `ClosedForm.rescaled`."""
+        start, end = (rescale(values, factors, constants) for values in (self.start, self.end))
+        return replace(self, start=start, end=end)
 
 
 def _scalar(times: FloatArray) -> Scalar:

@@ -33,6 +33,15 @@ from vsacli.trajectory.curves.via_points import Via
 Position: TypeAlias = tuple[float, ...]
 
 
+class _OfAnyRobot(Declaration):
+    """A declaration that means the same for robots whose joints are all rigid, though with other degrees."""
+
+    @classmethod
+    def meaning(cls, use: Use) -> str:
+        """Return the meaning for users."""
+        return "The same for a robot whose joints are all rigid." if use.rigid else cls.__doc__ or ""
+
+
 class SequencePart(Declaration):
     """A motion with a duration of its own, whose start may follow from the previous part."""
 
@@ -85,7 +94,7 @@ class Dwell(_Timed):
         return ConstantProfile(signal=POSITION, span=span, value=start_position)
 
 
-class PolynomialPart(_Timed):
+class PolynomialPart(_OfAnyRobot, _Timed):
     """Rest to rest: all derivatives up to (degree-1)/2 vanish at both ends."""
 
     opening = ("start",)
@@ -105,11 +114,6 @@ class PolynomialPart(_Timed):
             "start": use.one("at the start; where the part before ends, if absent", default=None),
             "end": use.one("at the end"),
         }
-
-    @classmethod
-    def meaning(cls, use: Use) -> str:
-        """Return the meaning for users."""
-        return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
 
     @property
     def begins(self) -> Position | None:
@@ -144,7 +148,7 @@ class _Standalone(Formula, SequencePart):
         return self.problems_over(self.lasts)
 
 
-class ViaPart(Via, _Standalone):
+class ViaPart(_OfAnyRobot, Via, _Standalone):
     """A spline through points as above."""
 
     opening = ("points", 0)
@@ -155,11 +159,6 @@ class ViaPart(Via, _Standalone):
         """Return the declared fields by name."""
         doc = "duration of the part; absent if times are given"
         return {**super().fields(use), "duration": number(units.TIME, doc, check=POSITIVE, default=None)}
-
-    @classmethod
-    def meaning(cls, use: Use) -> str:
-        """Return the meaning for users."""
-        return "The same for a robot whose joints are all rigid." if use.rigid else cls.__doc__ or ""
 
     def _problems(self) -> Iterator[FieldProblem]:
         yield from super()._problems()
@@ -179,22 +178,15 @@ class ViaPart(Via, _Standalone):
         return duration
 
 
-class SinusoidsPart(SumOfSinusoids, _Standalone):
+class SinusoidsPart(SumOfSinusoids, _Timed, _Standalone):
     """A sum of sinusoids as above; it needs a `ramp` where another part precedes or follows."""
 
     opening = ("offset",)
-    duration: float
 
     @classmethod
     def fields(cls, use: Use) -> dict[str, Any]:
         """Return the declared fields by name."""
-        duration = number(units.TIME, "duration of the part", check=POSITIVE)
-        return {**super().fields(use), "duration": duration}
-
-    @property
-    def lasts(self) -> float:
-        """Duration, s."""
-        return self.duration
+        return {**super().fields(use), **_Timed.fields(use)}
 
 
 PARTS: dict[str, type[SequencePart]] = {
@@ -205,7 +197,7 @@ PARTS: dict[str, type[SequencePart]] = {
 }
 
 
-class Sequence(Formula):
+class Sequence(_OfAnyRobot, Formula):
     """Parts one after the other. Each begins as the one before ends, to the fourth derivative."""
 
     parts: tuple[SequencePart, ...]
@@ -215,11 +207,6 @@ class Sequence(Formula):
         """Return the declared fields by name."""
         parts = {name: part.record(use) for name, part in PARTS.items()}
         return {"parts": value(Items(OneOf(parts)), "parts in temporal order")}
-
-    @classmethod
-    def meaning(cls, use: Use) -> str:
-        """Return the meaning for users."""
-        return "The same for a robot whose joints are all rigid." if use.rigid else super().meaning(use)
 
     def _problems(self) -> list[FieldProblem]:
         unfit = [

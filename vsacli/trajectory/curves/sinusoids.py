@@ -19,9 +19,8 @@ from vsacli.trajectory.curves.closed_form import (
     Formula,
     Use,
     Values,
-    add_constants,
-    multiply_constants,
     nan_for_none,
+    rescale,
 )
 from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.times import MAX_STEPS
@@ -76,7 +75,7 @@ class Sinusoids(ClosedForm):
 
     @property
     def components(self) -> int:
-        """See `ClosedForm.components`."""
+        """See `Profile.components`."""
         return len(self.offset)
 
     @property
@@ -89,7 +88,7 @@ class Sinusoids(ClosedForm):
         return [(first, first + ramp), (max(last - ramp, first + ramp), last)] if ramp else []
 
     def at(self, time: FloatArray) -> FloatArray:
-        """See `ClosedForm.at`."""
+        """See `Profile.at`."""
         rows = self._series(time)
         if self.ramp:
             window = profile_of_levels(
@@ -148,17 +147,14 @@ class Sinusoids(ClosedForm):
             low, high = np.where(falling, middle, low), np.where(falling, high, middle)
         return (low + high) / 2
 
-    def raised(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.raised`."""
-        return replace(self, offset=add_constants(self.offset, by))
-
-    def scaled(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.scaled`."""
+    def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:
+        """See `ClosedForm.rescaled`."""
+        nothing = (0.0,) * self.components
         sine, cosine = (
-            tuple(multiply_constants(harmonic, by) for harmonic in harmonics)
+            tuple(rescale(harmonic, factors, nothing) for harmonic in harmonics)
             for harmonics in (self.sine, self.cosine)
         )
-        return replace(self, offset=multiply_constants(self.offset, by), sine=sine, cosine=cosine)
+        return replace(self, offset=rescale(self.offset, factors, constants), sine=sine, cosine=cosine)
 
     def _series(self, time: FloatArray) -> FloatArray:
         first, last = self.span

@@ -73,7 +73,7 @@ class PiecewiseProfile(ClosedForm):
 
     @property
     def components(self) -> int:
-        """See `ClosedForm.components`."""
+        """See `Profile.components`."""
         return self.parts[0].components
 
     @cached_property
@@ -104,13 +104,9 @@ class PiecewiseProfile(ClosedForm):
         parts = tuple(replace(part, span=later(part.span)) for part in self.parts)
         return replace(self, span=later(self.span), parts=parts)
 
-    def raised(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.raised`."""
-        return replace(self, parts=tuple(part.raised(by) for part in self.parts))
-
-    def scaled(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.scaled`."""
-        return replace(self, parts=tuple(part.scaled(by) for part in self.parts))
+    def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:
+        """See `ClosedForm.rescaled`."""
+        return replace(self, parts=tuple(part.rescaled(factors, constants) for part in self.parts))
 
     def jumps(self, orders: int) -> Iterator[Jump]:
         """Yield the jumps between parts, of the value and derivatives of order below `orders`."""

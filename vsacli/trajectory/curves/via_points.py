@@ -23,9 +23,8 @@ from vsacli.trajectory.curves.closed_form import (
     Formula,
     Use,
     Values,
-    add_constants,
-    multiply_constants,
     nan_for_none,
+    rescale,
 )
 
 SEAM = 1e-9
@@ -76,7 +75,7 @@ class ViaPoints(ClosedForm):
 
     @property
     def components(self) -> int:
-        """See `ClosedForm.components`."""
+        """See `Profile.components`."""
         return len(self.points[0])
 
     @cached_property
@@ -135,13 +134,9 @@ class ViaPoints(ClosedForm):
             rows[order, self._specified] = total / np.float64(last - first) ** order
         return rows
 
-    def raised(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.raised`."""
-        return replace(self, points=tuple(add_constants(point, by) for point in self.points))
-
-    def scaled(self, by: Sequence[float]) -> Self:
-        """See `ClosedForm.scaled`."""
-        return replace(self, points=tuple(multiply_constants(point, by) for point in self.points))
+    def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:
+        """See `ClosedForm.rescaled`."""
+        return replace(self, points=tuple(rescale(point, factors, constants) for point in self.points))
 
     def extremes(self) -> ProfileExtremes:
         """Return the smallest and largest values, from the zeros of the first derivative.

@@ -1,7 +1,7 @@
 """Splines through recorded samples or near them: choice of the kind and of knots, and uncertainty."""
 
 from vsacli.trajectory.fits.fit import Fit
-from vsacli.trajectory.fits.given import mismatches
+from vsacli.trajectory.fits.fit_text import mismatches
 from vsacli.trajectory.fits.selection import (
     AS_IT_ASKS_FOR,
     INTERPOLATE,

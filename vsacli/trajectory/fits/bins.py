@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
-from vsacli.trajectory.fits.banded_qr import BandedFactor, block_count, factorize, sort_rows
+from vsacli.trajectory.fits.least_squares import BandedFactor, block_count, factorize, sort_rows
 
 BLOCK_SAMPLES = 65536
 """Samples that are summed at a time; the last digits of the sums depend on it."""

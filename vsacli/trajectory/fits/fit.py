@@ -15,8 +15,7 @@ import numpy as np
 import scipy
 
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
-from vsacli.trajectory.fits.banded_qr import Posterior
-from vsacli.trajectory.fits.least_squares import local_basis, of_derivatives, of_least_squares
+from vsacli.trajectory.fits.least_squares import Posterior, local_basis, of_derivatives, of_least_squares
 from vsacli.trajectory.fits.noise import LeftOutMotion
 from vsacli.trajectory.fits.smoothing import Smoothing
 from vsacli.trajectory.fits.spectrum import FollowedNoise

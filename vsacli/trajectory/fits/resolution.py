@@ -14,8 +14,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray
 from vsacli.trajectory.fits.bins import BINS_PER_SPAN, BinMoments, Bins
-from vsacli.trajectory.fits.noise_floor import enough_spans
-from vsacli.trajectory.fits.penalized import Model, deviance, evidence, segment_of
+from vsacli.trajectory.fits.penalized import Model, deviance, enough_spans, evidence, segment_of
 
 CORRELATIONS = np.array([-0.5, -0.25, 0.0, 0.2, 0.4, 0.55, 0.7, 0.8, 0.87, 0.92, 0.95, 0.98])
 """Correlations of the noise of neighboring means in the first search."""

@@ -9,8 +9,7 @@ import numpy as np
 import scipy
 
 from vsacli.base.arrays import FloatArray
-from vsacli.trajectory.fits.banded_qr import Posterior
-from vsacli.trajectory.fits.least_squares import local_basis, of_derivatives
+from vsacli.trajectory.fits.least_squares import Posterior, local_basis, of_derivatives
 from vsacli.trajectory.fits.noise import Lines, is_rounding, spectral_lines, white_noise_level
 from vsacli.trajectory.fits.penalized import Model, falls, motion_power
 from vsacli.trajectory.fits.resolution import LEFT_OVER, KnownNoise, Resolution, find_resolution

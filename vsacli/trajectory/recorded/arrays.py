@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +11,9 @@ from vsacli.base.arrays import FloatArray, by_joint
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.signals import Signal
 from vsacli.trajectory.fits import METHODS, FitChoice
-from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import check_health
 from vsacli.trajectory.recorded.problems import sample_problems, time_problems
-from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples
+from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples, rounding_notes
 from vsacli.trajectory.times import RecordedTimes
 
 
@@ -34,11 +33,13 @@ def profiles_of_arrays(
     if fit not in (None, *METHODS):
         raise InputError.one(f"fit must be one of {', '.join(METHODS)}, not {fit!r}")
     times = checked_array("time", time, None)
-    records = [
-        record
-        for signal, arrays in signal_arrays.items()
-        for record in _samples_of_signal(signal, times, *arrays)
-    ]
+    records: list[SignalSamples] = []
+    for signal, (values, *derivatives) in signal_arrays.items():
+        if values is not None:
+            records.append(samples_of_arrays(signal, times, values, *derivatives))
+        elif any(derivative is not None for derivative in derivatives):
+            name = signal.names[0]
+            raise InputError.one(f"derivatives of a {name} are given, but not the {name}")
     problems = [*time_problems(times), *sample_problems(records)]
     if problems:
         raise InputError(Problem("", 0, str(problem)) for problem in problems)
@@ -46,16 +47,6 @@ def profiles_of_arrays(
     warnings = tuple(map(str, faults))
     profiles = {record.signal.key: SampledProfile.of(record, FitChoice(fit)) for record in records}
     return RecordedTimes(times, rounding_notes(times)), profiles, warnings
-
-
-def _samples_of_signal(
-    signal: Signal, times: FloatArray, values: npt.ArrayLike | None, *derivatives: npt.ArrayLike | None
-) -> Iterator[SignalSamples]:
-    if values is not None:
-        yield samples_of_arrays(signal, times, values, *derivatives)
-    elif any(derivative is not None for derivative in derivatives):
-        name = signal.names[0]
-        raise InputError.one(f"derivatives of a {name} are given, but not the {name}")
 
 
 def samples_of_arrays(

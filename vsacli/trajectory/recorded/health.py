@@ -16,7 +16,6 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
 from vsacli.base.units import Quantity, WrenchQuantity, time_text
 from vsacli.documents.time_column import UNITS, unit_of_steps
-from vsacli.trajectory.recorded.even_stamps import stamp_resolution
 from vsacli.trajectory.recorded.faults import (
     ORDER,
     Faults,
@@ -30,7 +29,7 @@ from vsacli.trajectory.recorded.faults import (
     saturated_stretches,
 )
 from vsacli.trajectory.recorded.problems import SampleProblem
-from vsacli.trajectory.recorded.samples import SignalSamples
+from vsacli.trajectory.recorded.samples import SignalSamples, stamp_resolution
 from vsacli.trajectory.recorded.thresholds import (
     ENOUGH_ROWS,
     GAP_STEPS,

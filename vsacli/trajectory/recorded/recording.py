@@ -31,7 +31,6 @@ from vsacli.trajectory.recorded.columns import (
     column_layout,
     trajectory_column_names,
 )
-from vsacli.trajectory.recorded.even_stamps import rounding_notes
 from vsacli.trajectory.recorded.health import check_health, unit_doubts
 from vsacli.trajectory.recorded.problems import (
     Disorder,
@@ -40,7 +39,7 @@ from vsacli.trajectory.recorded.problems import (
     sample_problems,
     time_problems,
 )
-from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples
+from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples, rounding_notes
 from vsacli.trajectory.times import RecordedTimes, ResampledTimes, Times
 from vsacli.trajectory.trajectory import Trajectory
 

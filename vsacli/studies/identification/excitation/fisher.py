@@ -69,14 +69,10 @@ class Information:
         self._systems = (*motors, self._links)
         torques = np.concatenate([block.tau_e for block in examples])
         self._sizes = np.sqrt(np.mean(torques**2, axis=0))
-        splits = self._splits(examples)
+        systems = zip(*map(self._slopes, examples), strict=True)
+        splits = [independence(np.concatenate(slopes), TOLERANCE) for slopes in systems]
         self._kept = [each.kept for each in splits]
         self.structural = tuple(self._unidentifiable(splits))
-
-    def _splits(self, examples: Sequence[Block]) -> list[Independence]:
-        """Return the split of each system's unknowns into those that motions distinguish and others."""
-        systems = zip(*map(self._slopes, examples), strict=True)
-        return [independence(np.concatenate(slopes), TOLERANCE) for slopes in systems]
 
     def _unidentifiable(self, splits: Sequence[Independence]) -> Iterator[str]:
         """Yield clauses on the parameters that no motion identifies."""
