@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import cycle, islice
 from pathlib import Path
@@ -16,9 +16,9 @@ from samples.drives import motion
 from samples.long_chains import random_chain
 from samples.marks import slow, slow_but
 from samples.robots import random_robot, vsa_3r
+from samples.spoiled import scaled, spoil_drive, spoil_torque
 
 from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
-from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.report import Report
 from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
@@ -26,8 +26,6 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.compute.engine.engines import Kernel
-from vsacli.dynamics.drive import drive
-from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.variants import Variants
 from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
@@ -165,6 +163,12 @@ def fast_recording(**options: Any) -> Trajectory:
     return Trajectory.from_samples(time, q, np.full_like(q, 1000.0), fit="interpolate", **options)
 
 
+@pytest.fixture
+def few_times_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compute as few times together as for long chains."""
+    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
+
+
 def ladder_of(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> tuple[float, float]:
     """Return the error of a run nearest to its bound, and that bound."""
     errors, bounds = ladder(RunDynamics(Variants.of_one(robot), [trajectory], engine=engine))
@@ -172,10 +176,10 @@ def ladder_of(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> t
 
 
 @pytest.mark.slow
-def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
+def test_how_many_times_are_computed_together_does_not_matter(request):
     """Those of long chains are computed some after the others."""
     whole = ladder_of(*load("7R"))
-    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
+    request.getfixturevalue("few_times_together")
     assert ladder_of(*load("7R")) == whole
 
 
@@ -205,7 +209,8 @@ def test_blocks_of_long_chains_do_not_grow_in_number(joints: int):
 
 
 @pytest.mark.slow
-def test_memory_of_long_chains_is_that_of_the_times_computed_together(monkeypatch):
+@pytest.mark.usefixtures("few_times_together")
+def test_memory_of_long_chains_is_that_of_the_times_computed_together():
     """All times at all scales, of eight derivatives, would take three times as much."""
     arm = load("7R")[0]
     joints = [
@@ -215,7 +220,6 @@ def test_memory_of_long_chains_is_that_of_the_times_computed_together(monkeypatc
     motion = RestToRest(signal=POSITION, span=(0.0, 3.0), start=(0.0,) * 40, end=(0.005,) * 40, degree=7)
     stiffness = ConstantProfile(signal=STIFFNESS, span=(0.0, 3.0), value=(2200.0,) * 40)
     trajectory = Trajectory(UniformTimes(3.0, 300.0), motion, {"stiffness": stiffness}, name="chain")
-    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
     tracemalloc.start()
     try:
         ladder_of(chain, trajectory)
@@ -256,45 +260,6 @@ def test_stamps_since_1970_pass():
 
 
 # Wrong results
-
-
-Defect = Callable[[FloatArray], FloatArray]
-
-
-def spoil_torque(
-    monkeypatch: pytest.MonkeyPatch, order: int, spoil: Callable[[FloatArray], FloatArray]
-) -> None:
-    """Let the recursion return a derivative of tau_e, (samples, joints), with a defect."""
-
-    class Spoiled(LinkTorques):
-        def __call__(self, rows: Sequence[FloatArray]) -> list[FloatArray]:
-            torques, joints = super().__call__(rows), len(self.robot.joints)
-            part = slice(order * joints, (order + 1) * joints)
-            torques[part] = list(spoil(np.stack(torques[part], axis=-1)).T)
-            return torques
-
-    monkeypatch.setattr("vsacli.dynamics.inverse.LinkTorques", Spoiled)
-
-
-def spoil_drive(
-    monkeypatch: pytest.MonkeyPatch,
-    name: str,
-    spoil: Callable[[FloatArray], FloatArray],
-    joint_name: str = "",
-) -> None:
-    """Let the actuation return a variable, (2, samples), with a defect, at one joint or at all."""
-
-    def spoiled(joint, *arguments) -> JointVariables:
-        driven = drive(joint, *arguments)
-        if joint_name not in ("", joint.name):
-            return driven
-        return driven._replace(**{name: spoil(getattr(driven, name))})
-
-    monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
-
-
-def scaled(factor: float) -> Defect:
-    return lambda values: values * factor
 
 
 @arms

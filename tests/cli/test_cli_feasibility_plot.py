@@ -49,9 +49,9 @@ def shaded(axes, label: str = "infeasible") -> list[tuple[float, float]]:
 
 
 @pytest.mark.slow
-def test_figure_is_all_that_is_written(vsacli, too_soft, tmp_path, monkeypatch):
+def test_figure_is_all_that_is_written(vsacli, too_soft, tmp_path, temporary_files):
     (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    temporary_files(tmp_path / "temporary")
     done = vsacli("check-feasibility", ROBOT, too_soft, "--plot", "figures")
     assert (done.code, done.err) == (3, f"wrote {FIGURE}\n")
     assert contents(tmp_path).keys() == {"soft.yaml", FIGURE}

@@ -8,10 +8,9 @@ import h5py
 import numpy as np
 import pytest
 from samples.command_line import REST_TO_REST, ROBOT, SEVEN_JOINTS, SEVEN_JOINTS_MOTION, contents, installed
+from samples.spoiled import scaled, spoil_torque
 
 from vsacli.analysis import run_dynamics
-from vsacli.dynamics import inverse as steps
-from vsacli.dynamics.elastic_torques import LinkTorques
 
 GRAVITY = 9.81
 SPRING, HARDENING = 400.0, 2000.0
@@ -198,12 +197,7 @@ def test_quiet_and_verbose_change_stderr_alone(vsacli, motion):
 
 
 def test_derivative_wrong_by_one_percent_fails_the_self_check(vsacli, tmp_path, motion, monkeypatch):
-    class Broken(LinkTorques):
-        def __call__(self, rows):
-            *others, ddtau_e = super().__call__(rows)
-            return [*others, 1.01 * ddtau_e]
-
-    monkeypatch.setattr(steps, "LinkTorques", Broken)
+    spoil_torque(monkeypatch, 2, scaled(1.01))
     done = vsacli("invdyn", ROBOT, motion)
     assert done.code == 1
     assert "SELF CHECK FAILED" in done.out.splitlines()[0]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.drives import ALIKE, joint_with, motion, springs
-from samples.engines import assert_agree, demands, kinds_of_steps, random_wrench
+from samples.engines import assert_agree, demands, kinds_of_steps, program, random_wrench
 from samples.marks import needs_compiler, slow, slow_but
 from samples.robots import MotionArrays, random_motion, random_robot, vsa_3r
 
@@ -24,7 +24,7 @@ from vsacli.actuators.laws.sinh import Sinh
 from vsacli.actuators.laws.tendons import Exponential, Quadratic
 from vsacli.analysis.run import Run
 from vsacli.base.flags import Flag
-from vsacli.compute.engine import choose, compiler
+from vsacli.compute.engine import choose
 from vsacli.compute.engine.engines import Engine
 from vsacli.dynamics.deflection_rows import IntegratedRows
 from vsacli.dynamics.elastic_torques import link_torques
@@ -44,12 +44,15 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("programs")
+
+
 @pytest.fixture
-def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+def quickly(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compile without optimization, for code that is run on a few samples only."""
-    flags = tuple("-O0" if flag == "-O2" else flag for flag in compiler.FLAGS)
-    monkeypatch.setattr(compiler, "FLAGS", flags)
-    compiler._examined.cache_clear()
+    monkeypatch.setenv("CC", str(program(programs, "quickcc", 'exec cc "$@" -O0')))
 
 
 def compiled(robot: Robot, threads: int = 1, frame: str | None = None) -> Engine:
@@ -174,11 +177,9 @@ def joined(robot: Robot, motion: MotionArrays, starts: list[int]) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names processors of that kind")
 @pytest.mark.parametrize("processor", ["x86-64", slow("haswell")])
-def test_shorter_vectors_agree(processor: str, monkeypatch: pytest.MonkeyPatch):
+def test_shorter_vectors_agree(processor: str, programs: Path, monkeypatch: pytest.MonkeyPatch):
     """2 lanes without, 4 with functions of math.h for vectors; any number of samples is left over."""
-    flags = tuple(f"-march={processor}" if flag == compiler.NATIVE else flag for flag in compiler.FLAGS)
-    monkeypatch.setattr(compiler, "FLAGS", flags)
-    compiler._examined.cache_clear()
+    monkeypatch.setenv("CC", str(program(programs, f"cc-{processor}", f'exec cc "$@" -march={processor}')))
     robot = one_joint(ALIKE, Cubic(k=440, k_c=2000))
     for samples in (SAMPLES, SAMPLES + 1, 3):
         motion = demands(robot, samples)

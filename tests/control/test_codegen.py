@@ -6,6 +6,7 @@ import hashlib
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -24,7 +25,6 @@ from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag
 from vsacli.base.variables import VARIABLES
 from vsacli.base.version import __version__
-from vsacli.control.codegen import interface
 from vsacli.control.codegen.project import Project, generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
 from vsacli.dynamics.inverse import compute_block
@@ -363,10 +363,9 @@ def test_files_of_two_robots_do_not_go_together(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_function_of_too_many_operations_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_function_of_too_many_operations_is_left_out(most_operations: Callable[..., None]) -> None:
     """The limit is not reached by any arm; the recursion of this one takes 4300, feedback 6300."""
-    monkeypatch.setattr(interface, "MOST_WRITTEN_OUT", 5800)
-    monkeypatch.setattr(interface, "MOST_OF_CALLS", 5000)
+    most_operations(5800, 5000)
     made = generate(shipped_robot("lwr_7r_vsa"))
     assert made.omitted == ["no feedback_linearization: a step takes more than 5000 operations"]
     assert "feedback_linearization" not in made.files["lwr_7r_vsa.h"]
@@ -374,9 +373,8 @@ def test_a_function_of_too_many_operations_is_left_out(monkeypatch: pytest.Monke
     assert "There is no feedback\\_linearization: a step takes more than 5000 operations.\n" in readme
 
 
-def test_a_robot_of_too_many_operations_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(interface, "MOST_WRITTEN_OUT", 1000)
-    monkeypatch.setattr(interface, "MOST_OF_CALLS", 100)
+def test_a_robot_of_too_many_operations_is_refused(most_operations: Callable[..., None]) -> None:
+    most_operations(1000, 100)
     match = "no C code can be made of lwr-7r-vsa: link_torques: a step takes more than 100 operations"
     with pytest.raises(InputError, match=match):
         generate(shipped_robot("lwr_7r_vsa"))

@@ -472,13 +472,13 @@ def test_the_documents_count_operations() -> None:
 
 
 @pytest.mark.slow
-def test_a_long_arm_of_calls_steps_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_arm_of_calls_steps_as_well(tmp_path: Path, most_operations: Callable[..., None]) -> None:
     robot = random_chain(6)
     derivative = state_derivative_function(robot)
     inputs = ReferenceResults(robot).inputs(derivative)
     found = []
     for folder, most in (("written_out", interface.MOST_WRITTEN_OUT), ("calls", 500)):
-        monkeypatch.setattr(interface, "MOST_WRITTEN_OUT", most)
+        most_operations(most)
         derivative = state_derivative_function(robot)
         step = step_function(robot, derivative)
         code = compiled_robot(tmp_path / folder, robot, [derivative, step], "double")

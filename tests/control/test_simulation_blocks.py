@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tracemalloc
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -38,12 +39,22 @@ CASES = {
 }
 
 
+@pytest.fixture
+def divide(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Set the samples of a block; their noise is drawn for some fewer at a time."""
+
+    def into(samples: int) -> None:
+        for module, name, size in ((history, "BLOCK", samples), (sensors, "DRAWN", samples - 2)):
+            monkeypatch.setattr(module, name, size)
+
+    return into
+
+
 @pytest.mark.parametrize("case", slow_but({"feedforward", "budget for nothing"}, CASES))
-def test_results_do_not_depend_on_the_division_into_blocks(monkeypatch, case):
+def test_results_do_not_depend_on_the_division_into_blocks(divide, case):
     conditions = CASES[case]
     whole = simulate(vsa_3r(), short_motion(3), engine="numpy", **conditions)
-    monkeypatch.setattr(history, "BLOCK", 7)
-    monkeypatch.setattr(sensors, "DRAWN", 5)
+    divide(7)
     run = SimulationRun(vsa_3r(), short_motion(3), engine="numpy", **conditions)
     blocks = list(run)
     assert len(blocks) == len(whole.history.time) == 1 or len(blocks) >= 5
@@ -53,8 +64,8 @@ def test_results_do_not_depend_on_the_division_into_blocks(monkeypatch, case):
         np.testing.assert_array_equal(divided, values, err_msg=name)
 
 
-def test_an_early_end_is_in_the_last_block_alone(monkeypatch):
-    monkeypatch.setattr(history, "BLOCK", 7)
+def test_an_early_end_is_in_the_last_block_alone(divide):
+    divide(7)
     stiff = short_motion(3, stiffness=(1100, 200))  # below what the load allows, from a time on
     run = SimulationRun(vsa_3r(), stiff, engine="numpy")
     *others, last = list(run)
@@ -64,8 +75,8 @@ def test_an_early_end_is_in_the_last_block_alone(monkeypatch):
 
 
 @pytest.mark.slow
-def test_memory_does_not_grow_with_the_duration(monkeypatch):
-    monkeypatch.setattr(history, "BLOCK", 512)
+def test_memory_does_not_grow_with_the_duration(divide):
+    divide(512)
 
     def peak(duration: float) -> int:
         motion = short_motion(3, duration=duration, rate=4000)

@@ -6,7 +6,6 @@ import dataclasses
 import itertools
 import json
 import math
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -280,10 +279,12 @@ def test_every_robot_that_comes_along_is_described(vsacli: Any, name: str) -> No
     assert len(table) >= 7
 
 
-def test_the_cache_is_shown_and_emptied(vsacli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_cache_is_shown_and_emptied(
+    vsacli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, temporary_files: Any
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    temporary_files(tmp_path / "temporary")
     folder = tmp_path / "cache" / "vsacli"
     left = ".vsacli-000000000000-1-1-0123456789abcdef.tmp"
     for key in ("a", "b"):

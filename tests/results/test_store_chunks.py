@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import errno
-import os
 import threading
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import h5py
 import numpy as np
@@ -24,6 +23,7 @@ from samples.results import (
     write_result,
     writing,
 )
+from samples.system_errors import fail_with
 
 from vsacli.base.errors import StorageError
 from vsacli.base.outputs import Staged
@@ -175,16 +175,10 @@ def test_an_exception_of_the_caller_ends_the_thread(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("small_chunks", "in_a_thread")
-def test_a_disk_that_fails_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_fails_meanwhile(tmp_path: Path, before_system_call: Any) -> None:
     """Whatever the disk says to the thread is said of the file, which gets no name."""
-    sync = os.fsync
-
-    def failing(descriptor: int) -> None:
-        if threading.current_thread().name == "vsacli-syncing":
-            raise OSError(errno.EIO, os.strerror(errno.EIO))
-        sync(descriptor)
-
-    monkeypatch.setattr(os, "fsync", failing)
+    in_thread = fail_with(errno.EIO, lambda _: threading.current_thread().name == "vsacli-syncing")
+    before_system_call("fsync", in_thread)
     with pytest.raises(StorageError, match=r"r\.h5.*Input/output error"):
         write_result(tmp_path / "r.h5", random_block(10 * ROWS, 2))
     assert list(tmp_path.iterdir()) == []

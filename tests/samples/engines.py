@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
@@ -65,3 +67,11 @@ def assert_agree(found: Block, expected: Block, tolerances: Mapping[str, float] 
 def kinds_of_steps(block: Block) -> dict[Flag, int]:
     """How many joints' steps have each of the flags."""
     return {flag: int(np.count_nonzero(block.flags & flag)) for flag in Flag}
+
+
+def program(folder: Path, name: str, text: str) -> Path:
+    """Write a shell script to a folder, to be called as a command."""
+    path = folder / name
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return path

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples.excitations import shorten_searches
 from samples.shipped import shipped_robot, shipped_run
 
 from vsacli import inverse_dynamics, load_trajectory
@@ -19,8 +20,6 @@ from vsacli.studies.identification.excitation import (
     Excitation,
     ImpossibleError,
     excitation_text,
-    fisher,
-    plan,
     plan_excitation,
 )
 from vsacli.studies.identification.excitation.family import MARGIN
@@ -33,9 +32,7 @@ BETWEEN = 0.01
 @pytest.fixture(autouse=True, scope="module")
 def _short_searches() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "STARTS", 9)
-        patch.setattr(plan, "STEPS", 30)
-        patch.setattr(fisher, "RECORDS", 1)
+        shorten_searches(patch, steps=30)
         yield
 
 
