@@ -315,11 +315,11 @@ def test_a_csv_name_for_an_hdf5_file_is_refused(vsacli, tmp_path, command):
         ImportError(f"fast.so: cannot open shared object file: {os.strerror(errno.EMFILE)}"),
     ],
 )
-def test_too_many_open_files_are_no_bug(vsacli, monkeypatch, error):
-    def command(**_: object) -> None:
+def test_too_many_open_files_are_no_bug(vsacli, command_is, error):
+    def fail() -> None:
         raise error
 
-    monkeypatch.setattr(group, "main", command)
+    command_is(fail)
     outcome = vsacli("schema")
     advice = "too many files are open; `ulimit -n 256` allows more"
     assert (outcome.code, outcome.err) == (4, f"the command cannot go on: {advice}\n")

@@ -10,8 +10,6 @@ import pytest
 from samples.command_line import REST_TO_REST, ROBOT, SEVEN_JOINTS, SEVEN_JOINTS_MOTION, contents, installed
 from samples.spoiled import scaled, spoil_torque
 
-from vsacli.analysis import run_dynamics
-
 GRAVITY = 9.81
 SPRING, HARDENING = 400.0, 2000.0
 """K and K_c of every spring of the 3R arm."""
@@ -112,16 +110,6 @@ def test_json_is_all_there_is_on_stdout(vsacli, tmp_path, too_soft):
     assert done.err == "wrote vsa_3r-soft.h5\n"
 
 
-@pytest.fixture
-def no_computing(monkeypatch):
-    """Fail the test if anything is computed."""
-
-    def compute(*_arguments, **_options):
-        pytest.fail("computed before the output was checked")
-
-    monkeypatch.setattr(run_dynamics, "block_of", compute)
-
-
 @pytest.mark.usefixtures("no_computing")
 @pytest.mark.parametrize("taken", ["r.h5", "figures/r-motion.png", "figures/r-elastic-torque.png"])
 def test_existing_file_is_refused_before_anything_is_computed(vsacli, tmp_path, motion, taken):
@@ -206,11 +194,8 @@ def test_derivative_wrong_by_one_percent_fails_the_self_check(vsacli, tmp_path, 
     assert root_attributes(tmp_path / "vsa_3r-move.h5")["verdict"] == "self_check_failed"
 
 
-def test_bug_leaves_a_traceback_a_sentence_and_no_file(vsacli, tmp_path, motion, monkeypatch):
-    def compute(*_arguments, **_options):
-        raise RuntimeError("boom")
-
-    monkeypatch.setattr(run_dynamics, "block_of", compute)
+def test_bug_leaves_a_traceback_a_sentence_and_no_file(vsacli, tmp_path, motion, computing_fails):
+    computing_fails(RuntimeError("boom"))
     done = vsacli("invdyn", ROBOT, motion)
     assert (done.code, done.out) == (1, "")
     assert done.err.startswith("Traceback (most recent call last)")

@@ -170,11 +170,13 @@ def test_peaks_of_a_polynomial_are_the_published_ones() -> None:
     assert (description["samples"], description["duration"]) == (4001, 4)
 
 
-def test_ranges_go_over_all_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    trajectory = load_trajectory(REPOSITORY / "trajectories" / "rest_to_rest.yaml", ARM)
-    whole = describe_trajectory(trajectory, ARM.joint_names)
-    monkeypatch.setattr("vsacli.files.info.trajectory_info.BLOCK_SAMPLES", 100)
-    assert describe_trajectory(trajectory, ARM.joint_names) == whole
+def test_ranges_go_over_all_blocks() -> None:
+    """Extremes are at start, middle and end, of which 8192 samples are less than a half."""
+    path = REPOSITORY / "trajectories" / "rest_to_rest.yaml"
+    few, many = (load_trajectory(path, ARM, {"rate": rate}) for rate in (100, 5000))
+    for name in ("q", "dq", "d4q", "stiffness"):
+        coarse, fine = (describe_trajectory(each, ARM.joint_names)["joints"][1][name] for each in (few, many))
+        assert fine == pytest.approx(coarse)
 
 
 def test_robot_on_the_command_line(vsacli: Any) -> None:

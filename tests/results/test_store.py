@@ -213,8 +213,8 @@ def test_xarray_opens_the_groups_too(path):
 
 
 @pytest.mark.slow
-def test_blocks_of_any_size_give_the_same_file(tmp_path, block, monkeypatch):
-    monkeypatch.setattr("vsacli.results.store.new_file.CHUNK_BYTES", 2**11)  # several chunks in 250 samples
+def test_blocks_of_any_size_give_the_same_file(tmp_path, block, chunks):
+    chunks(2**11)  # several chunks in 250 samples
 
     def contents(step):
         with h5py.File(write_result(tmp_path / f"{step}.h5", block, step=step)) as file:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -37,17 +37,26 @@ ROWS = 32
 
 
 @pytest.fixture
-def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+def small_chunks(chunks: Callable[[int], None]) -> None:
     """Several chunks in a few samples."""
-    monkeypatch.setattr(new_file, "CHUNK_BYTES", ROWS * 2 * 2 * 8)
+    chunks(ROWS * 2 * 2 * 8)
 
 
 @pytest.fixture
-def in_a_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Short files, too, are written in a thread, and stored by another."""
-    monkeypatch.setattr(new_file, "BEHIND_FROM", 0)
-    monkeypatch.setattr(new_file, "BEHIND", 5000)
-    monkeypatch.setattr(new_file, "SYNCED", 3000)
+def write_behind(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, int], None]:
+    """Have short files, too, written in a thread, and stored by another; set the bytes that may wait."""
+
+    def wait_for(writing: int, storing: int) -> None:
+        for name, size in (("BEHIND_FROM", 0), ("BEHIND", writing), ("SYNCED", storing)):
+            monkeypatch.setattr(new_file, name, size)
+
+    return wait_for
+
+
+@pytest.fixture
+def in_a_thread(write_behind: Callable[[int, int], None]) -> None:
+    """Samples are written in a thread."""
+    write_behind(5000, 3000)
 
 
 def threads() -> list[str]:
@@ -186,10 +195,9 @@ def test_a_disk_that_fails_meanwhile(tmp_path: Path, before_system_call: Any) ->
 
 
 @pytest.fixture
-def behind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[NewFile]:
+def behind(write_behind: Callable[[int, int], None], tmp_path: Path) -> Iterator[NewFile]:
     """A file all of whose tasks are done in a thread; 10 bytes may wait."""
-    monkeypatch.setattr(new_file, "BEHIND_FROM", 0)
-    monkeypatch.setattr(new_file, "BEHIND", 10)
+    write_behind(10, new_file.SYNCED)
     file = NewFile(Staged.unnamed(tmp_path / "r.h5"))
     yield file
     file.discard()
