@@ -9,11 +9,9 @@ import re
 
 from samples.command_line import REPOSITORY
 
-from vsacli import laws, load_robot
-from vsacli.actuators.motor import Motor
+from vsacli import Limits, Motor, laws, load_robot
 from vsacli.dynamics import limits
 from vsacli.results.store.reader import RANGES, SIZES
-from vsacli.robot.joint import Limits
 from vsacli.studies.search import fixed_text
 from vsacli.studies.sizing.sizing import KEPT
 from vsacli.trajectory.curves.closed_form import ClosedForm

@@ -11,10 +11,18 @@ from samples.full_model import Drive
 from samples.mechanisms import DAMPING, DEVICES, INERTIA
 from scipy.integrate import simpson
 
-from vsacli import Gains, InitialError, Result, State, inverse_dynamics, simulate, state_derivative
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.actuators.serial import Serial
+from vsacli import (
+    Gains,
+    InitialError,
+    Motor,
+    Result,
+    Rigid,
+    Serial,
+    State,
+    inverse_dynamics,
+    simulate,
+    state_derivative,
+)
 from vsacli.base.errors import InvalidRecordError
 
 DEVICE = DEVICES["awas"]

@@ -14,14 +14,10 @@ from samples.springs import SPRINGS
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import brentq
 
-from vsacli import inverse_dynamics
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
+from vsacli import Antagonistic, Elastic, Flag, Motor, inverse_dynamics
 from vsacli.actuators.laws import Cubic, Exponential, FourBar, Polynomial, Quadratic, SpringLaw
-from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.errors import InvalidRecordError
-from vsacli.base.flags import Flag
 
 MOTOR = Motor(inertia=0.2, damping=0.1)
 NONE = (np.nan, np.nan)

@@ -19,36 +19,32 @@ from samples.drives import (
 )
 from samples.robots import vsa_3r
 
-from vsacli import inverse_dynamics
-from vsacli.actuators.antagonistic import Antagonistic
+from vsacli import Antagonistic, Flag, InputError, Joint, Limits, Motor, inverse_dynamics, mechanisms
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.laws.tendons import Quadratic
-from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import margin, reach_flags
 from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.base.flags import LIMITS, MIN_MARGIN, Flag
+from vsacli.base.flags import LIMITS, MIN_MARGIN
 from vsacli.dynamics.drive import drive
-from vsacli.robot.joint import Joint, Limits
 
 MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "det_A")
 LOST_AT_A_FOLD = ("dphi", "dtheta", "ddtheta", "tau_motor")
 
 
-def flags_of(joint: Joint, **given: FloatArray | float) -> list[Flag]:
+def flags_of(joint: Joint, **given: np.ndarray | float) -> list[Flag]:
     return [Flag(int(bits)) for bits in drive(joint, command(**given)).flags]
 
 
-def corridor(lower: float, upper: float, *, critical: bool = True, slack: bool = False) -> PairSolution:
+def corridor(
+    lower: float, upper: float, *, critical: bool = True, slack: bool = False
+) -> mechanisms.PairSolution:
     """A corridor both ends of which are critical points, or neither is."""
     ends = np.array([lower]), np.array([upper]), np.array([critical]), np.array([critical])
-    return PairSolution(*ends, np.array([slack]), np.zeros(1), np.zeros(1))
+    return mechanisms.PairSolution(*ends, np.array([slack]), np.zeros(1), np.zeros(1))
 
 
-def reach(stiffness: float, solution: PairSolution) -> Flag:
+def reach(stiffness: float, solution: mechanisms.PairSolution) -> Flag:
     return Flag(int(reach_flags(np.array([stiffness]), solution)[0]))
 
 
@@ -119,7 +115,7 @@ def test_threshold_must_be_a_margin(threshold: float):
 # What is NaN
 
 
-def values_of(driven: JointVariables, name: str) -> FloatArray:
+def values_of(driven: JointVariables, name: str) -> np.ndarray:
     """(samples, ...) of a variable of the motors."""
     return np.moveaxis(getattr(driven, name), -1, 0)
 

@@ -11,13 +11,18 @@ import h5py
 import numpy as np
 import pytest
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
-from vsacli.actuators.motor import Motor
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError, InvalidRecordError
-from vsacli.dynamics.forward import State, state_derivative
+from vsacli import (
+    InputError,
+    Motor,
+    Robot,
+    State,
+    inverse_dynamics,
+    load_robot,
+    load_trajectory,
+    state_derivative,
+)
+from vsacli.base.errors import InvalidRecordError
 from vsacli.results.store.reader import StoredResult
-from vsacli.robot.model import Robot
 
 HEAD = "format: vsacli-robot/1\nname: rig\njoints:\n"
 JOINT = """\
@@ -73,13 +78,13 @@ def rig(motors: list[str], name: str = "rig.yaml") -> Robot:
     return load_robot(name)
 
 
-def columns(path: str) -> dict[str, FloatArray]:
+def columns(path: str) -> dict[str, np.ndarray]:
     with Path(path).open() as file:
         header, *rows = csv.reader(file)
     return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
 
 
-def same(found: FloatArray, expected: FloatArray) -> None:
+def same(found: np.ndarray, expected: np.ndarray) -> None:
     scale = np.nanmax(np.abs(expected), initial=0)
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING * scale)
 
@@ -104,7 +109,7 @@ def test_accelerations_are_those_of_the_motor_on_the_joint_side():
         same(geared, reflected)
 
 
-def exported(vsacli: Callable[..., Any], *options: str) -> dict[str, FloatArray]:
+def exported(vsacli: Callable[..., Any], *options: str) -> dict[str, np.ndarray]:
     """Columns of a result of the geared rig."""
     rig(SHAFT)
     assert vsacli("invdyn", "rig.yaml", "move.yaml", "-o", "result.h5", "--overwrite").code in (0, 3)

@@ -10,14 +10,9 @@ from samples.full_model import Drive, PlanarArm, springs_of
 from samples.law_energies import SAMPLES
 from samples.springs import SPRINGS, measured
 
-from vsacli import inverse_dynamics, simulate
-from vsacli.actuators.antagonistic import Antagonistic
+from vsacli import Antagonistic, Flag, Motor, Serial, inverse_dynamics, mechanisms, simulate
 from vsacli.actuators.laws import Cubic, Exponential, Polynomial
-from vsacli.actuators.mechanisms.shifted_cams import ShiftedCams
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.serial import Serial
 from vsacli.base.errors import InvalidRecordError
-from vsacli.base.flags import Flag
 
 HEAVY = PlanarArm(lengths=[0.4], masses=[6.0], centers=[0.25], inertias=[0.12], damping=[0.2])
 """A pendulum that turns both cams by different angles."""
@@ -26,7 +21,7 @@ MOTORS = (Motor(inertia=0.2, damping=0.1), Motor(inertia=0.02, damping=0.05))
 
 
 def serial(first: str, second: str, branch: str = "positive") -> Serial:
-    cams = ShiftedCams(spring=(SAMPLES[first].law, SAMPLES[second].law), branch=branch)
+    cams = mechanisms.ShiftedCams(spring=(SAMPLES[first].law, SAMPLES[second].law), branch=branch)
     return Serial(motor=MOTORS, mechanism=cams)
 
 
@@ -71,7 +66,7 @@ def test_an_arm_with_a_pair_and_cams_follows() -> None:
 def test_the_solution_is_that_of_the_pair(law: str, branch: str) -> None:
     spring = SPRINGS[law][0][0], SPRINGS[law][1][0]
     pair = Antagonistic(motor=(MOTORS[0],) * 2, spring=spring, branch=branch)
-    cams = Serial(motor=MOTORS, mechanism=ShiftedCams(spring=spring, branch=branch))
+    cams = Serial(motor=MOTORS, mechanism=mechanisms.ShiftedCams(spring=spring, branch=branch))
     rng = np.random.default_rng(3)
     tau_e, stiffness, q = rng.uniform(-4, 4, 200), rng.uniform(20, 200, 200), rng.uniform(-2, 2, 200)
     one, other = (each.solve(tau_e, stiffness, q) for each in (pair, cams))
@@ -110,7 +105,7 @@ def test_a_simulation_ends_where_a_cam_does(ending: tuple[int, ...]) -> None:
     turns, cubic = np.linspace(-0.4, 0.4, 25), SAMPLES["cubic"].law
     short = measured(turns, cubic.torque(turns))
     plant, model = (
-        robot_of(HEAVY, [Serial(motor=MOTORS, mechanism=ShiftedCams(spring=laws))])
+        robot_of(HEAVY, [Serial(motor=MOTORS, mechanism=mechanisms.ShiftedCams(spring=laws))])
         for laws in (tuple(short if side in ending else cubic for side in range(2)), (cubic, cubic))
     )
     simulation = simulate(plant, motion_of([(290, 1500)]), model=model)
@@ -144,4 +139,4 @@ def test_like_cams_have_no_other_branch() -> None:
 )
 def test_what_no_cams_can_be_is_refused(options: dict, message: str) -> None:
     with pytest.raises(InvalidRecordError, match=message):
-        ShiftedCams(**options)
+        mechanisms.ShiftedCams(**options)

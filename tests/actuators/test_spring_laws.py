@@ -12,10 +12,9 @@ import pytest
 from oracles.spring_scan import turned
 from samples.springs import SPRINGS, measured
 
-from vsacli.actuators import laws
+from vsacli import laws
 from vsacli.actuators.laws import LAWS, Cubic, Exponential, FourBar, Polynomial, Quadratic, Sinh, SpringLaw
 from vsacli.actuators.laws.four_bar import STRETCH_MARGIN
-from vsacli.base.arrays import FloatArray
 
 EPS = float(np.finfo(float).eps)
 
@@ -58,14 +57,14 @@ EVERY = {
 every_law = pytest.mark.parametrize("law", EVERY.values(), ids=EVERY)
 
 
-def deflections(law: SpringLaw, reach: float = 1.2) -> FloatArray:
+def deflections(law: SpringLaw, reach: float = 1.2) -> np.ndarray:
     """From tiny ones up to the end of the domain or a reach, on every side where the law holds."""
     low, high = (min(max(end, -reach), reach) for end in law.domain)
     shares = np.concatenate((np.geomspace(1e-9, 0.1, 9), np.linspace(0.2, 1, 9)))
     return np.concatenate((low * shares[::-1], high * shares)) if low else high * shares
 
 
-def conditioning(law: SpringLaw, phi: FloatArray) -> FloatArray:
+def conditioning(law: SpringLaw, phi: np.ndarray) -> np.ndarray:
     """How much the rounding of the deflection itself weighs: next to the stretched linkage a lot."""
     if isinstance(law, FourBar):
         return 1 / (1 - (law.ratio * np.sin(phi / 2)) ** 2)

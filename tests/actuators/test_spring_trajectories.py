@@ -11,21 +11,28 @@ import pytest
 from samples.drives import springs
 from samples.marks import slow_but
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
+from vsacli import (
+    DenavitHartenberg,
+    Flag,
+    Inertia,
+    Joint,
+    Link,
+    Result,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+    load_robot,
+    load_trajectory,
+)
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.four_bar import FourBar
 from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.laws.sinh import Sinh
 from vsacli.actuators.laws.tendons import Exponential, Quadratic
-from vsacli.analysis.result import Result
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag, has_flag
+from vsacli.base.flags import has_flag
 from vsacli.base.signals import POSITION
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.trajectory import Trajectory
 
 ARM = """\
 format: vsacli-robot/1
@@ -123,7 +130,7 @@ LOAD = 20.0
 """N m."""
 
 
-def dip(laws: tuple[SpringLaw, SpringLaw], closest: float) -> tuple[Result, FloatArray]:
+def dip(laws: tuple[SpringLaw, SpringLaw], closest: float) -> tuple[Result, np.ndarray]:
     """A still arm whose stiffness comes down to within a relative distance of the fold at half time.
 
     Returns the result and the stiffness of the fold.

@@ -20,19 +20,13 @@ from samples.plants import elastic, rigid, with_actuators
 from samples.robots import vsa_3r
 from samples.spoiled import scaled, spoil_drive
 
-from vsacli.analysis.run import inverse_dynamics
+from vsacli import Limits, Robot, Trajectory, fixes, inverse_dynamics, load_robot, load_trajectory
 from vsacli.dynamics.integrated_deflections import integrate_deflections
 from vsacli.results.charts.figures import feasibility
 from vsacli.results.charts.stored import StoredCharts
 from vsacli.results.plots import compare_files, plot_stored
 from vsacli.results.plots import drawn as drawn_sheet
-from vsacli.robot.file import load_robot
-from vsacli.robot.joint import Limits
-from vsacli.robot.model import Robot
-from vsacli.studies.search import fixes
 from vsacli.studies.search.fix_report import NotPossible, StiffnessOffset, StiffnessProfile
-from vsacli.trajectory.file import load_trajectory
-from vsacli.trajectory.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[2]
 ROBOT, TRAJECTORY = ROOT / "robots" / "mixed_3r.yaml", ROOT / "trajectories" / "mixed_3r.yaml"

@@ -12,22 +12,15 @@ from samples.marks import slow
 from samples.robots import random_robot
 from scipy.optimize import minimize_scalar
 
-from vsacli import inverse_dynamics
-from vsacli.actuators.motor import Motor
+from vsacli import Flag, Limits, Motor, Report, Robot, Trajectory, inverse_dynamics
 from vsacli.actuators.reach import margin
 from vsacli.analysis.between_samples import SAMPLES_ONLY, SCANNED
-from vsacli.analysis.report import Report
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.joint import Limits
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 DURATION = 6.0
 CASES = [("R", 7.0), ("P", 103.0), *(slow(*case) for case in [("P", 7.0), ("R", 40.0), ("R", 103.0)])]
@@ -57,9 +50,9 @@ def swinging(rate: float, joints: int = 1, stiffness: float = 1500.0, swing: flo
     return Trajectory(UniformTimes(DURATION, rate), position, {"stiffness": of_stiffness}, name="swinging")
 
 
-def size(robot: Robot, trajectory: Trajectory, name: str, times: FloatArray) -> FloatArray:
+def size(robot: Robot, trajectory: Trajectory, name: str, times: np.ndarray) -> np.ndarray:
     """Size of a variable of the only joint, of motors that of the larger one; (samples,)."""
-    values: FloatArray = np.abs(getattr(compute_block(robot, trajectory.at(times)), name)[:, 0])
+    values: np.ndarray = np.abs(getattr(compute_block(robot, trajectory.at(times)), name)[:, 0])
     return values if values.ndim == 1 else values.max(axis=1)
 
 

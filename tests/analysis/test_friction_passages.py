@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from samples.fixes import pendulum
 
-from vsacli import Robot, Trajectory, inverse_dynamics
-from vsacli.actuators.friction import Friction
+from vsacli import Friction, Robot, Trajectory, inverse_dynamics
 from vsacli.analysis.run import Run
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.inverse import compute_block

@@ -18,16 +18,13 @@ from samples.marks import slow, slow_but
 from samples.robots import random_robot, vsa_3r
 from samples.spoiled import scaled, spoil_drive, spoil_torque
 
-from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
-from vsacli.analysis.report import Report
+from vsacli import Report, Robot, Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
-from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.compute.engine.engines import Kernel
 from vsacli.dynamics.variants import Variants
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.times import UniformTimes
 
@@ -189,7 +186,7 @@ class Counted:
     def __init__(self) -> None:
         self.calls = 0
 
-    def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
+    def run(self, kernel: Kernel, rows: Sequence[np.ndarray]) -> np.ndarray:
         self.calls += 1
         return np.zeros((kernel.outputs, len(rows[0])))
 
@@ -283,7 +280,7 @@ def test_a_single_wrong_joint_fails(joint: int, order: int, monkeypatch):
 def test_torque_wrong_for_a_moment_fails(monkeypatch):
     """A defect of a fiftieth of the values, such as a wrong branch would make."""
 
-    def spoil(torque: FloatArray) -> FloatArray:
+    def spoil(torque: np.ndarray) -> np.ndarray:
         return torque * np.where(torque > np.quantile(torque, 0.98), 1.01, 1)
 
     spoil_torque(monkeypatch, 2, spoil)
@@ -331,7 +328,7 @@ def test_missing_numbers_of_regular_steps_fail(name: str, monkeypatch):
 def test_a_single_missing_deflection_fails(monkeypatch):
     robot, trajectory = load("3R")
 
-    def spoil(phi: FloatArray) -> FloatArray:
+    def spoil(phi: np.ndarray) -> np.ndarray:
         lost = (np.arange(phi.shape[1]) == 2000) & (phi.shape[1] == trajectory.samples)
         return np.where(lost, math.nan, phi)
 

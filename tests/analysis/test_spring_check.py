@@ -10,7 +10,6 @@ from samples.spoiled import spoil_drive
 from vsacli import inverse_dynamics
 from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.analysis.self_check import RunCheck
-from vsacli.base.arrays import FloatArray
 from vsacli.dynamics.variants import Variants
 
 RUN = "vsa_3r", "rest_to_rest"
@@ -32,7 +31,7 @@ def test_a_program_that_is_wrong_in_a_stretch_is_found_apart_from_it(first: int)
 def test_the_residual_of_every_step_counts(monkeypatch):
     """Also of one that is not among those whose laws are evaluated apart."""
 
-    def shift_one_sample(phi: FloatArray) -> FloatArray:
+    def shift_one_sample(phi: np.ndarray) -> np.ndarray:
         return phi + 1e-9 * (np.arange(phi.shape[1]) == phi.shape[1] // 3 + 1)
 
     spoil_drive(monkeypatch, "phi", shift_one_sample)

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 from samples.system_errors import fail_with
 
+from vsacli import InputError, StorageError
 from vsacli.base import storage
-from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import ENDING, Interrupted, unwinding_when_ended
 from vsacli.base.outputs import Outputs, Staged
 from vsacli.base.storage import reporting_storage_errors, temporary_folder

@@ -11,9 +11,9 @@ from samples.command_line import REPOSITORY, ROBOT, Outcome, contents, edited
 from samples.generated_code import STRICT, compile_c
 from samples.marks import needs_compiler
 
+from vsacli import Robot
 from vsacli.cli.console import Exit
 from vsacli.control.codegen.project import prefix_of
-from vsacli.robot.model import Robot
 
 Run = Callable[..., Outcome]
 

@@ -12,9 +12,8 @@ import pytest
 from samples.command_line import REPOSITORY, ROBOT, edited
 from samples.marks import slow
 
+from vsacli import load_robot, load_trajectory
 from vsacli.documents.reading import read_changes
-from vsacli.robot.file import load_robot
-from vsacli.trajectory.file import load_trajectory
 
 MIXED = REPOSITORY / "robots" / "mixed_3r.yaml"
 PANDA = REPOSITORY / "robots" / "panda_7r.yaml"

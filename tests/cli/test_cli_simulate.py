@@ -11,7 +11,7 @@ import pytest
 import xarray
 from samples.command_line import REPOSITORY, ROBOT, contents, edited
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import OF_ANY_ROBOT
 from vsacli.cli.console import Exit

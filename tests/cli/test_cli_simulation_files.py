@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, contents, edited, installed
 
-from vsacli.base.arrays import FloatArray
 from vsacli.results.plots import compare_files
 from vsacli.results.store.reader import open_stored
 
@@ -58,14 +57,14 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def stored(path: Path, name: str) -> FloatArray:
+def stored(path: Path, name: str) -> np.ndarray:
     """A variable, read without vsacli; (samples, ...)."""
     with h5py.File(path) as file:
-        values: FloatArray = file[name][:]
+        values: np.ndarray = file[name][:]
     return values
 
 
-def parsed(text: str) -> tuple[list[str], FloatArray]:
+def parsed(text: str) -> tuple[list[str], np.ndarray]:
     header, *rows = csv.reader(io.StringIO(text))
     return header, np.array(rows, dtype=float)
 

@@ -18,7 +18,7 @@ from samples.marks import needs_compiler, slow
 from samples.shipped import shipped_robot
 from samples.trees import hand
 
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot
 from vsacli.compute.control_flow import Keyed, call, repeat
 from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.compiler import FLAGS, Library
@@ -30,7 +30,6 @@ from vsacli.compute.tracing.row_functions import CallingRowFunction
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.robot.model import Robot
 
 EXACT = ("-O0", "-ffp-contract=off")
 """Quickly compiled; products and sums are not contracted, which depends on what lies in one function."""
@@ -150,7 +149,7 @@ def library(kernel: Kernel, folder: Path, *, calling: bool) -> Library:
     return Library(folder / f"{name}.so", kernel.outputs)
 
 
-def on_a_large_stack(function: Callable[[], FloatArray]) -> FloatArray:
+def on_a_large_stack(function: Callable[[], np.ndarray]) -> np.ndarray:
     """Each value that is written out in one piece has a place there if nothing is optimized."""
     usual = threading.stack_size(2**29)
     try:
@@ -160,7 +159,7 @@ def on_a_large_stack(function: Callable[[], FloatArray]) -> FloatArray:
         threading.stack_size(usual)
 
 
-def rows_of(kernel: InverseDynamics, samples: int) -> list[FloatArray]:
+def rows_of(kernel: InverseDynamics, samples: int) -> list[np.ndarray]:
     frame = kernel.frame
     motion = demands(kernel.robot, samples, wrench=None if frame is None else random_wrench(samples, frame))
     return kernel.arguments.pack(

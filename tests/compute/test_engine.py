@@ -14,8 +14,7 @@ from samples.engines import assert_agree, demands, kinds_of_steps, program, rand
 from samples.marks import needs_compiler, slow, slow_but
 from samples.robots import MotionArrays, random_motion, random_robot, vsa_3r
 
-from vsacli import load_robot
-from vsacli.actuators.antagonistic import Antagonistic
+from vsacli import Antagonistic, Flag, Robot, link_torques, load_robot
 from vsacli.actuators.laws import SpringLaw
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.four_bar import FourBar
@@ -23,13 +22,10 @@ from vsacli.actuators.laws.polynomial import Polynomial
 from vsacli.actuators.laws.sinh import Sinh
 from vsacli.actuators.laws.tendons import Exponential, Quadratic
 from vsacli.analysis.run import Run
-from vsacli.base.flags import Flag
 from vsacli.compute.engine import choose
 from vsacli.compute.engine.engines import Engine
 from vsacli.dynamics.deflection_rows import IntegratedRows
-from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.dynamics.inverse import InverseDynamics, block_of, compute_block
-from vsacli.robot.model import Robot
 
 pytestmark = needs_compiler
 

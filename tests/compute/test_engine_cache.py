@@ -16,6 +16,7 @@ from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 from samples.system_errors import fail_with
 
+from vsacli import link_torques
 from vsacli.base.storage import staging_name
 from vsacli.compute.engine import cache, choose
 from vsacli.compute.engine.cache import (
@@ -26,7 +27,7 @@ from vsacli.compute.engine.cache import (
     open_cache,
 )
 from vsacli.compute.engine.libraries import _loaded
-from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques
 
 KERNEL = LinkTorques(vsa_3r())
 MOTION = random_motion(vsa_3r(), 50, seed=1)

@@ -19,7 +19,7 @@ from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 from samples.shipped import shipped_robot
 
-from vsacli.base.errors import InputError
+from vsacli import InputError, Robot, link_torques
 from vsacli.compute.engine import NUMPY, choice, choose, compiler
 from vsacli.compute.engine.cache import CHECKSUM, LIBRARY, open_cache
 from vsacli.compute.engine.choice import LOOK_FROM, in_usual_blocks, settle
@@ -30,10 +30,9 @@ from vsacli.compute.engine.libraries import Code, _loaded, load
 from vsacli.compute.engine.trial import Trial
 from vsacli.compute.tracing import is_of_calls
 from vsacli.dynamics.balances import BalancedDynamics
-from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.energy import IntervalEnergy
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.robot.model import Robot
 
 KERNEL = LinkTorques(vsa_3r())
 

@@ -11,12 +11,11 @@ from samples.marks import needs_compiler, slow_but
 from samples.robots import random_motion, vsa_3r
 from samples.simulated import short_motion
 
-from vsacli import simulate
-from vsacli.base.errors import InputError
+from vsacli import InputError, link_torques, simulate
 from vsacli.compute.engine import choose
 from vsacli.compute.engine.cache import LIBRARY
 from vsacli.compute.engine.libraries import _loaded
-from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques
 
 pytestmark = needs_compiler
 

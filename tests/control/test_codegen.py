@@ -21,14 +21,11 @@ from samples.robots import random_robot
 from samples.shipped import shipped_robot, shipped_run
 from samples.springs import SPRINGS
 
-from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
+from vsacli import Flag, InputError, Robot, __version__
 from vsacli.base.variables import VARIABLES
-from vsacli.base.version import __version__
 from vsacli.control.codegen.project import Project, generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Robot
 
 ROBOTS: dict[str, Robot] = {
     "one joint": random_robot("R", seed=1),

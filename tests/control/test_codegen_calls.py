@@ -13,10 +13,10 @@ from samples.long_chains import mixed_chain
 from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
 
+from vsacli import Robot
 from vsacli.control.codegen import interface
 from vsacli.control.codegen.cost import table_bytes, worst_cost
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.robot.model import Robot
 
 pytestmark = needs_compiler
 

@@ -13,12 +13,7 @@ from samples.generated_code import STRICT, compile_c, compiled_robot, write_file
 from samples.marks import needs_compiler, slow, slow_but
 from samples.shipped import shipped_robot
 
-from vsacli import State, state_derivative
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.friction import Friction
-from vsacli.actuators.motor import Motor
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli import Elastic, Friction, InputError, Motor, Robot, State, state_derivative
 from vsacli.base.variables import Block
 from vsacli.control.codegen.parameters import PARAMETERS, check_parameters, with_parameters
 from vsacli.control.codegen.plant_functions import state_derivative_function
@@ -26,7 +21,6 @@ from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import CASES, ReferenceResults
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
 
 SAMPLES = 30
@@ -66,12 +60,12 @@ def possible(robot: Robot) -> list[Parameter]:
     return chosen
 
 
-def argument(chosen: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, FloatArray]:
+def argument(chosen: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, np.ndarray]:
     """The structure of the parameters over all samples."""
     return {"_".join(each.by_index): np.full(SAMPLES, values[str(each)]) for each in chosen}
 
 
-def close(found: Mapping[str, FloatArray], block: Block) -> None:
+def close(found: Mapping[str, np.ndarray], block: Block) -> None:
     """Sums are added up in another order where numbers are not folded, which costs some roundings."""
     for name, values in found.items():
         expected = expected_of(block, name)

@@ -17,18 +17,23 @@ from samples.robots import random_robot
 from samples.shipped import shipped_robot
 from samples.two_hands import two_hands
 
-from vsacli import InputError, load_robot
-from vsacli.base.arrays import FloatArray
+from vsacli import (
+    FeedbackLinearization,
+    Gains,
+    InputError,
+    Integral,
+    Motion,
+    Wrench,
+    link_torques,
+    load_robot,
+)
 from vsacli.base.signals import POSITION
-from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES, Wrench, WrenchFrame, wrench_components
+from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES, WrenchFrame, wrench_components
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.gains import Gains, Integral
-from vsacli.control.linearization import FeedbackLinearization
-from vsacli.dynamics.elastic_torques import TORQUES, link_torques
+from vsacli.dynamics.elastic_torques import TORQUES
 from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.motion import Motion
 
 pytestmark = needs_compiler
 
@@ -41,11 +46,11 @@ def drawn_wrench(frame: WrenchFrame) -> Wrench:
     return Wrench(*drawn, frame=frame)
 
 
-def arrays_of(wrench: Wrench) -> dict[str, FloatArray]:
+def arrays_of(wrench: Wrench) -> dict[str, np.ndarray]:
     return {name: getattr(wrench, name) for name in WRENCH_NAMES}
 
 
-def assert_close(found: FloatArray, expected: FloatArray, share: float = CLOSE) -> None:
+def assert_close(found: np.ndarray, expected: np.ndarray, share: float = CLOSE) -> None:
     np.testing.assert_array_equal(np.isnan(found), np.isnan(expected))
     there = np.isfinite(expected)
     np.testing.assert_allclose(

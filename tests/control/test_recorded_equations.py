@@ -18,19 +18,23 @@ from samples.simulated import short_motion
 from samples.single_joint import single_joint, step_of
 from scipy.integrate import DOP853
 
-from vsacli.actuators.friction import Friction
+from vsacli import (
+    Friction,
+    Gains,
+    InitialError,
+    InputError,
+    Motor,
+    Rigid,
+    perturbed,
+    simulate,
+    simulate_perturbed,
+)
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.errors import InputError
 from vsacli.compute.engine import compiler
-from vsacli.control.gains import Gains
-from vsacli.control.simulation import InitialError, perturbed, simulate
 from vsacli.control.simulation.compiled_loop import LARGEST_GROWTH, dop853_with_stages
 from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.loop_code import loop_code, record_loop
 from vsacli.control.simulation.loop_equations import Computing, LoopEquations, RecordedEquations
-from vsacli.control.simulation.perturbation import simulate_perturbed
 
 AGREEMENT = 1e-11
 """Relative to the largest rate: rounding of 1e-16 times the condition of M, up to 1e4 with seven joints."""

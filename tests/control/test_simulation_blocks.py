@@ -12,17 +12,8 @@ from samples.marks import slow_but
 from samples.robots import vsa_3r
 from samples.simulated import short_motion
 
-from vsacli.base.errors import InputError
-from vsacli.control.gains import Gains
-from vsacli.control.simulation import (
-    InitialError,
-    Sensors,
-    SimulationRun,
-    history,
-    perturbed,
-    sensors,
-    simulate,
-)
+from vsacli import Gains, InitialError, InputError, Sensors, perturbed, simulate
+from vsacli.control.simulation import SimulationRun, history, sensors
 
 GAINS = Gains.from_poles([-20] * 4, [-20] * 2)
 FAST = Gains.from_poles([-200] * 4, [-200] * 2)

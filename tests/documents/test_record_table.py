@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import pytest
 
+from vsacli import InputError
 from vsacli.base import units
-from vsacli.base.errors import InputError
 from vsacli.documents.fields import POSITIVE, Name, number, value
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_table import read_records

@@ -14,24 +14,29 @@ from samples.full_model import Drive, springs_of
 from samples.marks import slow
 from samples.mechanisms import DEVICES
 
-from vsacli import Gains, Robot, inverse_dynamics, simulate
+from vsacli import (
+    Antagonistic,
+    Damper,
+    Elastic,
+    Flag,
+    Gains,
+    InputError,
+    Motor,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+    laws,
+    simulate,
+)
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.damped_springs import DampedSprings
-from vsacli.actuators.damper import Damper
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command
 from vsacli.analysis.run import Run
-from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
 from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
 from vsacli.dynamics.internal_motion import March, _CellSolution, _Peaks, internal_motions
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 MOTOR = Motor(inertia=0.2, damping=0.1)
 PARALLEL = Damper(location="transmission", range=(0, 10))
@@ -44,7 +49,7 @@ def pair(q: Any, *theta: Any) -> Any:
 
 CASES: dict[str, tuple[Actuator, Drive, Ends]] = {
     "antagonistic": (
-        Antagonistic(motor=(MOTOR, MOTOR), spring=(Cubic(k=400, k_c=2000),) * 2),
+        Antagonistic(motor=(MOTOR, MOTOR), spring=(laws.Cubic(k=400, k_c=2000),) * 2),
         Drive(np.diag([0.2, 0.2]), [0.1, 0.1], springs_of(pair, 2)),
         (900, 1200),
     ),
@@ -229,7 +234,7 @@ def test_it_starts_where_the_robot_says() -> None:
 @pytest.mark.slow
 def test_beyond_the_largest_torque_it_is_unstable() -> None:
     """Sides that differ have a largest torque at a stiffness; it starts beyond, and comes back at once."""
-    springs = Cubic(k=30, k_c=100), Cubic(k=30, k_c=900)
+    springs = laws.Cubic(k=30, k_c=100), laws.Cubic(k=30, k_c=900)
     actuator = Antagonistic(motor=(MOTOR, MOTOR), spring=springs)
     damper = Damper(location="transmission", range=(0, 10), start=0.3325)
     result = inverse_dynamics(robot_of(LINK, [actuator], [damper]), motion_of([(90, 90)], [(5, 5)]))

@@ -16,18 +16,21 @@ from samples.shipped import shipped_run
 from samples.simulated import short_motion
 from scipy.interpolate import PPoly, make_interp_spline
 
-from vsacli import inverse_dynamics, link_torques
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.friction import REST, Friction, FrictionLaws
+from vsacli import (
+    Antagonistic,
+    Elastic,
+    Friction,
+    Motor,
+    Report,
+    Rigid,
+    Robot,
+    inverse_dynamics,
+    link_torques,
+)
+from vsacli.actuators.friction import REST, FrictionLaws
 from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
 from vsacli.analysis.dry_friction import DryFrictionSummary
-from vsacli.analysis.report import Report
-from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InvalidRecordError
-from vsacli.robot.model import Robot
 
 ROUNDING = 1e-8
 """Of the energy that flows: Hermite's rule at 1 kHz leaves about 1e-10."""
@@ -158,7 +161,7 @@ def test_the_full_model_with_friction_follows(kinds):
     assert np.abs(result.q[-1] - (START + MOVE)).max() < 1e-12  # it moved
 
 
-def turning_points(time: FloatArray, theta: FloatArray) -> FloatArray:
+def turning_points(time: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Where a motor turns back, and both ends, by a spline of degree 7."""
     spline = make_interp_spline(time, theta, k=7)
     turns = PPoly.from_spline(spline.derivative()).roots(extrapolate=False)
@@ -166,7 +169,7 @@ def turning_points(time: FloatArray, theta: FloatArray) -> FloatArray:
     return spline(np.sort(np.concatenate((ends, turns[(turns > ends[0]) & (turns < ends[1])]))))
 
 
-def lost_to(friction: Friction, time: FloatArray, theta: FloatArray, dtheta: FloatArray) -> float:
+def lost_to(friction: Friction, time: np.ndarray, theta: np.ndarray, dtheta: np.ndarray) -> float:
     """Work against friction: of the sign function by the ways forward and back, else by the power."""
     if friction.width:
         power = np.array([law(friction, velocity) * velocity for velocity in dtheta])
@@ -177,7 +180,7 @@ def lost_to(friction: Friction, time: FloatArray, theta: FloatArray, dtheta: Flo
     return float((size * np.abs(ways)).sum() + friction.offset * ways.sum())
 
 
-def damped(time: FloatArray, damping: float, velocity: FloatArray) -> float:
+def damped(time: np.ndarray, damping: float, velocity: np.ndarray) -> float:
     spline = make_interp_spline(time, damping * velocity**2, k=5).antiderivative()
     return float(spline(time[-1]) - spline(time[0]))
 

@@ -8,18 +8,17 @@ from samples.blurred import Blurred, random_covariances
 from samples.plants import elastic, rigid, with_actuators
 from samples.robots import random_robot, vsa_3r
 
+from vsacli import Motion, Trajectory, Wrench
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.variables import UNCERTAIN, VARIABLES
-from vsacli.base.wrench import WRENCH_NAMES, Wrench
+from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.dynamics import uncertainty
 from vsacli.dynamics.inverse import compute_block
 from vsacli.dynamics.uncertainty import MARGIN, Uncertainty
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
-from vsacli.trajectory.motion import Motion
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 SPAN = (0.0, 2.0)
 SIZES = 1e-5 * np.array([1.0, 10.0, 100.0, 1e3, 1e4])

@@ -13,14 +13,11 @@ from samples.marks import needs
 from samples.shipped import shipped_run
 from scipy.integrate import trapezoid
 
-from vsacli import inverse_dynamics, load_robot, open_result, simulate
-from vsacli.actuators.motor import Motor
+from vsacli import Flag, InputError, Motor, Robot, inverse_dynamics, load_robot, open_result, simulate
 from vsacli.actuators.reach import LIMIT_ROUNDING
-from vsacli.base.errors import InputError, InvalidRecordError
-from vsacli.base.flags import Flag
+from vsacli.base.errors import InvalidRecordError
 from vsacli.base.outputs import Outputs
 from vsacli.results.store.writer import ResultWriter
-from vsacli.robot.model import Robot
 
 SHAFT = {"gear_ratio": -20.0, "side": "shaft", "torque_constant": 0.2, "resistance": 1.5}
 

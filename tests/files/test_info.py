@@ -14,14 +14,10 @@ import pytest
 from samples.command_line import REPOSITORY, ROBOT, rest_to_rest, without_hint
 from samples.marks import slow, slow_but
 
-from vsacli.dynamics.elastic_torques import link_torques
+from vsacli import Joint, Limits, Pose, Robot, link_torques, load_robot, load_trajectory
 from vsacli.files.info.robot_info import describe_robot, free_range, reach, reach_bounds, static_load
 from vsacli.files.info.trajectory_info import describe_trajectory
-from vsacli.robot.file import load_robot
-from vsacli.robot.joint import Joint, Limits, Pose
 from vsacli.robot.kinematics import frames
-from vsacli.robot.model import Robot
-from vsacli.trajectory.file import load_trajectory
 
 ARM = load_robot(ROBOT)
 NAMES = sorted(path.stem for path in (REPOSITORY / "robots").glob("*.yaml"))

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from oracles.lagrange import Chain, Derivatives
-from vsacli.base.arrays import FloatArray
 
 
 @dataclass(frozen=True)
 class Cloud:
     """Masses (points,) at fixed positions (points, 3) in a link frame."""
 
-    masses: FloatArray
-    points: FloatArray
+    masses: np.ndarray
+    points: np.ndarray
 
     @property
     def mass(self) -> float:
@@ -24,7 +23,7 @@ class Cloud:
         return float(self.masses.sum())
 
     @property
-    def com(self) -> FloatArray:
+    def com(self) -> np.ndarray:
         """Center of mass."""
         return self.masses @ self.points / self.mass
 
@@ -48,7 +47,7 @@ def random_cloud(rng: np.random.Generator, points: int) -> Cloud:
     return Cloud(rng.uniform(0.1, 1, points), rng.uniform((-0.5, -0.2, 0.0), (0.1, 0.3, 0.6), (points, 3)))
 
 
-def torques(chain: Chain, clouds: Sequence[Cloud]) -> FloatArray:
+def torques(chain: Chain, clouds: Sequence[Cloud]) -> np.ndarray:
     """Torques (samples, joints) that drive the clouds, without damping; of the chain only the motion is used.
 
     Each point needs the force m (r'' - g). Its share of a joint's torque is the moment of that force about
@@ -67,8 +66,8 @@ def torques(chain: Chain, clouds: Sequence[Cloud]) -> FloatArray:
 
 
 def _torque(
-    frame: FloatArray, revolute: bool, pose: Derivatives, cloud: Cloud, gravity: FloatArray
-) -> FloatArray:
+    frame: np.ndarray, revolute: bool, pose: Derivatives, cloud: Cloud, gravity: np.ndarray
+) -> np.ndarray:
     axis, origin = frame[:, None, :3, 2], frame[:, None, :3, 3]
     forces = cloud.masses[:, None] * (_moved(pose[2], cloud.points) - gravity)
     arms = _moved(pose[0], cloud.points) - origin
@@ -76,8 +75,8 @@ def _torque(
     return np.sum(vectors * axis, axis=(1, 2))
 
 
-def _moved(pose: FloatArray, points: FloatArray) -> FloatArray:
+def _moved(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Positions (samples, points, 3) in the base frame, or their derivative if `pose` is that of the pose."""
     homogeneous = np.column_stack([points, np.ones(len(points))])
-    moved: FloatArray = pose[:, None] @ homogeneous[:, :, None]
+    moved: np.ndarray = pose[:, None] @ homogeneous[:, :, None]
     return moved[..., :3, 0]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from samples.results import python, random_block, write_result
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.variables import Block
 from vsacli.results.exports.formats import CSV

@@ -14,7 +14,7 @@ from samples.marks import slow_but
 from samples.results import STORED, python, random_block, write_result
 from scipy.io import loadmat
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.variables import Block
 from vsacli.results.exports import FORMATS, formats
 from vsacli.results.exports.result_format import UndefinedSamplesError, export_result

@@ -25,7 +25,7 @@ from samples.results import (
 )
 from samples.system_errors import fail_with
 
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.outputs import Staged
 from vsacli.base.variables import Block
 from vsacli.results.store import new_file

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from samples.results import PlannedTrajectory, python, random_block, robot, write_result, writing
 
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.interrupts import interrupts_deferred
 from vsacli.results.store.reader import StoredResult
 

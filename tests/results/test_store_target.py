@@ -15,7 +15,7 @@ from samples.results import (
     writing,
 )
 
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.outputs import Outputs
 from vsacli.results.store.reader import StoredResult
 

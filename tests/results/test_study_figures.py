@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from samples.studies import DRAWN, study
 from scipy.stats import binomtest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.tables import ReportText
 from vsacli.cli.main import run
 from vsacli.results.charts.study_points import StudyPoints

@@ -9,16 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.base.errors import InputError, InvalidRecordError
-from vsacli.robot.file import load_robot
-from vsacli.robot.model import Robot
-from vsacli.trajectory.file import load_trajectory
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli import (
+    Antagonistic,
+    Elastic,
+    InputError,
+    Motor,
+    Rigid,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+    load_robot,
+    load_trajectory,
+)
+from vsacli.base.errors import InvalidRecordError
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 

@@ -12,17 +12,12 @@ from samples.robots import random_actuator, random_motion, random_robot
 from samples.shipped import shipped_robot
 from samples.trees import random_tree, random_wrenches, reordered, without_resistance
 
-from vsacli import forward_kinematics, inverse_dynamics
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
+from vsacli import Elastic, Motor, Rigid, Trajectory, forward_kinematics, inverse_dynamics, link_torques
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_drives import Start
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 ROUNDING = 1e-12
 """Of inverse dynamics, relative to the largest torque: sums of some hundred terms, each good to 1e-16, and

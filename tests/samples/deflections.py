@@ -10,11 +10,8 @@ import numpy as np
 
 from samples.drives import motion as arm_motion
 from samples.robots import vsa_3r
-from vsacli import Trajectory, inverse_dynamics
-from vsacli.analysis.result import Result
-from vsacli.base.arrays import FloatArray
+from vsacli import Result, Robot, Trajectory, inverse_dynamics
 from vsacli.dynamics.integrated_deflections import IntegratedDeflections, integrate_deflections
-from vsacli.robot.model import Robot
 
 ARM = dataclasses.replace(vsa_3r(), joints=vsa_3r().joints[:2])
 """Base and shoulder: the base carries nothing while the arm is still, the shoulder the weight of its link."""
@@ -62,16 +59,16 @@ class Dip:
     components: int = 2
 
     @property
-    def breakpoints(self) -> FloatArray:
+    def breakpoints(self) -> np.ndarray:
         return np.array([0.0, 2.0])
 
-    def at(self, time: FloatArray) -> FloatArray:
+    def at(self, time: np.ndarray) -> np.ndarray:
         away = time - self.bottom
         dip = [self.floor + self.bend * away**2, 2 * self.bend * away, np.full_like(time, 2 * self.bend)]
         steady = [np.full_like(time, 1000.0), np.zeros_like(time), np.zeros_like(time)]
         return np.stack([np.stack([first, other]) for first, other in zip(dip, steady, strict=True)])
 
-    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
+    def samples(self, _start: int, _stop: int, time: np.ndarray, /) -> np.ndarray:
         return self.at(time)
 
     @property

@@ -7,16 +7,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from samples.full_model import Drive, FullModel, PlanarArm
-from vsacli import inverse_dynamics
+from vsacli import (
+    Damper,
+    DenavitHartenberg,
+    Inertia,
+    Joint,
+    Link,
+    Result,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+)
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.damper import Damper
-from vsacli.analysis.result import Result
 from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 LINK = PlanarArm(lengths=[0.4], masses=[1.5], centers=[0.25], inertias=[0.03], damping=[0.2])
 """A pendulum."""

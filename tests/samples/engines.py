@@ -10,12 +10,9 @@ import numpy as np
 
 from samples.robots import random_motion
 from samples.signals import by_name
-from vsacli.base.flags import Flag
+from vsacli import Flag, Motion, Robot, Wrench
 from vsacli.base.variables import Block
-from vsacli.base.wrench import Wrench
 from vsacli.dynamics.inverse import COMPUTED, compute_block
-from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
 
 AGREEMENT = 1e-12
 """Relative to a variable's peak, where the margin exceeds `CLEAR`: rounding of 1e-16 over that margin."""

@@ -10,30 +10,34 @@ from typing import Any
 import numpy as np
 
 from samples.robots import vsa_3r
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
+from vsacli import (
+    Antagonistic,
+    DenavitHartenberg,
+    Flag,
+    Inertia,
+    Joint,
+    Limits,
+    Link,
+    Motor,
+    Robot,
+    Trajectory,
+    laws,
+)
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.variables import Block
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
-from vsacli.robot.model import Robot
 from vsacli.studies.search import Fix, write_fixed
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 PAPER_END = (math.pi / 2, math.pi / 4, -math.pi / 3)
 BASE, SHOULDER, ELBOW = range(3)
 K, K_C = 400.0, 2000.0
 """Constants of the springs of Table I."""
 
-CUBIC = Cubic(k=K, k_c=K_C)
+CUBIC = laws.Cubic(k=K, k_c=K_C)
 
 
 def rest_to_rest(
@@ -73,7 +77,7 @@ def changed(
     return dataclasses.replace(robot, joints=tuple(joints))
 
 
-def pendulum(spring: SpringLaw = CUBIC, letter: str = "R", mass: float = 5.0) -> Robot:
+def pendulum(spring: laws.SpringLaw = CUBIC, letter: str = "R", mass: float = 5.0) -> Robot:
     """One joint: a point mass 0.5 m from a horizontal axis, or on a vertical slide."""
     turning = letter == "R"
     joint = Joint(
@@ -87,7 +91,7 @@ def pendulum(spring: SpringLaw = CUBIC, letter: str = "R", mass: float = 5.0) ->
     return Robot(name="pendulum", gravity=gravity, joints=(joint,))
 
 
-def lowest_stiffness(tau_e: FloatArray) -> FloatArray:
+def lowest_stiffness(tau_e: np.ndarray) -> np.ndarray:
     """Closed bound of two springs of Table I, solved by bisection on the deflection they share."""
     low, high = np.zeros_like(tau_e), np.full_like(tau_e, 1.0)
     for _ in range(60):

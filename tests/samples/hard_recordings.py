@@ -23,14 +23,9 @@ from scipy.signal import butter, cheby1, cheby2, ellip, sosfiltfilt, sosfreqz
 
 from samples.random_recordings import fourier_series
 from samples.recorded_torques import MOTOR, lifting
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
+from vsacli import Elastic, Motion, Motor, Rigid, Robot, Trajectory
 from vsacli.analysis.run import Run
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Robot
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
 
 FAMILIES = ("rounded", "pendulum", "controller", "ringing")
 

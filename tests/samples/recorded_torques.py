@@ -11,18 +11,23 @@ from scipy.interpolate import make_interp_spline
 
 from samples.noisy_records import MOTIONS, Record, record
 from samples.random_recordings import Recording
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
+from vsacli import (
+    Antagonistic,
+    DenavitHartenberg,
+    Elastic,
+    Inertia,
+    Joint,
+    Link,
+    Motion,
+    Motor,
+    Robot,
+    Trajectory,
+    laws,
+)
 from vsacli.analysis.run import Run
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile
-from vsacli.trajectory.motion import Motion
-from vsacli.trajectory.trajectory import Trajectory
 
 STIFFNESS_ASKED = 1200.0
 """Of the antagonistic arm, N m/rad."""
@@ -77,7 +82,7 @@ def lifting(actuator, *, horizontal: bool = False) -> Robot:
     return Robot(name="arm", gravity=gravity, joints=(joint,))
 
 
-MOTOR, SPRING = Motor(inertia=1.98, damping=1e-4), Cubic(k=400, k_c=2000)
+MOTOR, SPRING = Motor(inertia=1.98, damping=1e-4), laws.Cubic(k=400, k_c=2000)
 ARMS = {
     "antagonistic": lifting(Antagonistic(motor=(MOTOR, MOTOR), spring=(SPRING, SPRING))),
     "elastic": lifting(Elastic(motor=MOTOR, stiffness=1000.0)),
@@ -104,7 +109,7 @@ def robot_of(arm: Arm) -> Robot:
     motor = Motor(inertia=arm.motor_inertia, damping=1e-4)
     if not arm.antagonistic:
         return lifting(Elastic(motor=motor, stiffness=arm.k), horizontal=arm.horizontal)
-    spring = Cubic(k=arm.k, k_c=arm.k_c)
+    spring = laws.Cubic(k=arm.k, k_c=arm.k_c)
     return lifting(Antagonistic(motor=(motor, motor), spring=(spring, spring)), horizontal=arm.horizontal)
 
 

@@ -8,26 +8,19 @@ import numpy as np
 from scipy.linalg import expm
 
 from samples.robots import vsa_3r
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.base.arrays import FloatArray
+from vsacli import Elastic, Gains, InitialError, Motor, Robot, State, Tolerances, Trajectory
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.control.gains import Gains
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, LinearizingFeedback
 from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.history import History, concatenate_histories, continuous, histories
-from vsacli.control.simulation.integrator import Integrator, Tolerances
+from vsacli.control.simulation.integrator import Integrator
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
-from vsacli.control.simulation.start import InitialError
 from vsacli.control.simulation.tabulated import TabulatedReference
-from vsacli.dynamics.forward import State
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 
 def short_motion(
@@ -99,8 +92,8 @@ def linearized_run(
 
 
 def error_course(
-    poles: list[complex], first: float, times: FloatArray, *, integral: bool = False
-) -> FloatArray:
+    poles: list[complex], first: float, times: np.ndarray, *, integral: bool = False
+) -> np.ndarray:
     """Solution of the linear error dynamics (33) from (first, 0, 0, ...), with the integral zero at first."""
     companion = np.diag(np.ones(len(poles) - 1), 1)
     companion[-1] = -np.poly(poles).real[:0:-1]

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
+from vsacli import DenavitHartenberg, Elastic, Inertia, Joint, Link, Motor, Rigid, Robot, Trajectory
 from vsacli.base.signals import POSITION
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 LINK_INERTIA = 0.5
 """kg m^2 (kg)."""

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from vsacli.actuators.transmission import JointVariables
-from vsacli.base.arrays import FloatArray
 from vsacli.dynamics import inverse
 from vsacli.dynamics.elastic_torques import LinkTorques
 
-Defect = Callable[[FloatArray], FloatArray]
+Defect = Callable[[np.ndarray], np.ndarray]
 
 
 def scaled(factor: float) -> Defect:
@@ -24,7 +23,7 @@ def spoil_torque(monkeypatch: pytest.MonkeyPatch, order: int, defect: Defect) ->
     """Let (36)-(60) return a derivative of tau_e, (samples, joints), with a defect."""
 
     class Spoiled(LinkTorques):
-        def __call__(self, rows: Sequence[FloatArray]) -> list[FloatArray]:
+        def __call__(self, rows: Sequence[np.ndarray]) -> list[np.ndarray]:
             torques, joints = super().__call__(rows), len(self.robot.joints)
             part = slice(order * joints, (order + 1) * joints)
             torques[part] = list(defect(np.stack(torques[part], axis=-1)).T)

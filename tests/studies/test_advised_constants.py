@@ -11,25 +11,21 @@ import pytest
 from samples.command_line import ROBOT
 from samples.shipped import shipped_robot
 
-from vsacli import fixes, load_robot, load_trajectory
+from vsacli import Joint, Robot, Trajectory, fixes, load_robot, load_trajectory
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.joint import Joint
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 MIN_MARGIN = 0.01
 ADVICE = re.compile(r"a stiffness of at (least|most) (\S+)")
 
-Motion = Callable[[FloatArray], Trajectory]
+Motion = Callable[[np.ndarray], Trajectory]
 """A motion with a constant stiffness of each joint, (joints,)."""
 
 
-def random_motion(seed: int) -> tuple[Robot, Motion, FloatArray]:
+def random_motion(seed: int) -> tuple[Robot, Motion, np.ndarray]:
     """A robot on a random motion, and a stiffness too low at rest, or too high for its motors (odd seeds)."""
     rng = np.random.default_rng(seed)
     robot = shipped_robot(("vsa_3r", "vsa_3r", "rp_2", "vsa_3r")[seed % 4])
@@ -38,7 +34,7 @@ def random_motion(seed: int) -> tuple[Robot, Motion, FloatArray]:
     duration, rate = float(rng.uniform(0.8, 3)), int(rng.integers(50, 400))
     position = RestToRest(signal=POSITION, span=(0.0, duration), degree=9, start=start, end=end)
 
-    def motion(stiffness: FloatArray) -> Trajectory:
+    def motion(stiffness: np.ndarray) -> Trajectory:
         level = ConstantProfile(signal=STIFFNESS, span=position.span, value=tuple(stiffness.tolist()))
         return Trajectory(UniformTimes(duration, rate), position, {"stiffness": level}, name="random")
 

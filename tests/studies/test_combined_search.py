@@ -10,9 +10,8 @@ import pytest
 from samples.fixes import BASE, accepted, changed, rest_to_rest
 from samples.robots import vsa_3r
 
-from vsacli import fixes
+from vsacli import Limits, fixes
 from vsacli.analysis.run import Run
-from vsacli.robot.joint import Limits
 from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.combined import (
     LARGEST_FACTOR,

@@ -11,17 +11,17 @@ import pytest
 from samples.excitations import shorten_searches
 from samples.shipped import shipped_robot, shipped_run
 
-from vsacli import inverse_dynamics, load_trajectory
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.robot.joint import Limits
-from vsacli.robot.model import Robot
-from vsacli.studies.identification.excitation import (
+from vsacli import (
     Excitation,
-    ImpossibleError,
+    InputError,
+    Limits,
+    Robot,
     excitation_text,
+    inverse_dynamics,
+    load_trajectory,
     plan_excitation,
 )
+from vsacli.studies.identification.excitation import ImpossibleError
 from vsacli.studies.identification.excitation.family import MARGIN
 
 BETWEEN = 0.01
@@ -113,7 +113,7 @@ def test_the_same_seed_finds_the_same(planned: Excitation) -> None:
     assert excitation_text(other) != excitation_text(planned)
 
 
-def scaled_condition(columns: list[FloatArray]) -> float:
+def scaled_condition(columns: list[np.ndarray]) -> float:
     """By singular values."""
     matrix = np.stack([column.ravel() / np.linalg.norm(column) for column in columns], axis=1)
     singular = np.linalg.svd(matrix, compute_uv=False)

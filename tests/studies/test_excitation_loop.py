@@ -13,9 +13,9 @@ from samples.excitations import shorten_searches
 from samples.robot_files import write_robot
 from samples.shipped import shipped_robot
 
-from vsacli import identify
+from vsacli import identify, plan_excitation
 from vsacli.robot.parameters import parameters
-from vsacli.studies.identification.excitation import Noise, plan_excitation
+from vsacli.studies.identification.excitation import Noise
 from vsacli.studies.identification.excitation.fisher import executed, noisy_record
 from vsacli.studies.identification.identification import WORDS, solutions
 from vsacli.studies.identification.identification_report import numbers_of

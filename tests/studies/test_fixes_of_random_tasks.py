@@ -11,10 +11,8 @@ import pytest
 from samples.infeasible_tasks import random_task
 from samples.marks import slow_but
 
-from vsacli import load_robot, load_trajectory
-from vsacli.base.flags import Flag
+from vsacli import Flag, Motion, load_robot, load_trajectory
 from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.motion import Motion
 
 MARGIN = 0.01
 FINER = 10

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, rest_to_rest
 
-from vsacli import load_robot, load_trajectory, sensitivity
+from vsacli import InputError, load_robot, load_trajectory, sensitivity
 from vsacli.actuators.reach import margin
-from vsacli.base.errors import InputError
 from vsacli.dynamics.inverse import compute_block
 from vsacli.results.charts.ranking import Ranking
 from vsacli.results.plots import ranking_figure

@@ -8,14 +8,12 @@ from samples.random_recordings import fourier_series
 from samples.recorded_torques import MOTOR, lifting
 from scipy.signal import butter, ellip, sosfiltfilt, sosfreqz
 
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.rigid import Rigid
+from vsacli import Elastic, Rigid, Trajectory
 from vsacli.analysis.run import Run
 from vsacli.trajectory.fits import LEAST_SQUARES, SMOOTH, fit_samples
 from vsacli.trajectory.fits.left_over import left_out_motion
 from vsacli.trajectory.fits.noise import white_noise_level
 from vsacli.trajectory.fits.ringing import ringing_ends
-from vsacli.trajectory.trajectory import Trajectory
 
 TIME = np.arange(901) / 100
 STEP = 0.01

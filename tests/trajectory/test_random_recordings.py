@@ -11,8 +11,8 @@ from samples.random_recordings import NOISES, SHAPES, draw
 from samples.recorded_torques import robot_of
 from scipy.signal import bessel, butter, cheby1, cheby2, firwin, lfilter, sosfilt
 
+from vsacli import Motion
 from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.motion import Motion
 
 SEEDS = range(0, 24, 2)
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError, Trajectory
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
@@ -15,7 +15,6 @@ from vsacli.trajectory.curves.steps import PiecewiseProfile
 from vsacli.trajectory.recorded.arrays import samples_of_arrays
 from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 EPS = np.finfo(float).eps
 NAMES = [*POSITION.names, *STIFFNESS.names]

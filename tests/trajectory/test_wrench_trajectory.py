@@ -7,11 +7,9 @@ import pytest
 from samples.robots import vsa_3r
 from samples.wrenches import held
 
-from vsacli import Trajectory, inverse_dynamics
-from vsacli.base.errors import InputError
+from vsacli import InputError, Trajectory, inverse_dynamics, link_torques
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES
-from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
