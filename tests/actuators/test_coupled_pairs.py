@@ -11,8 +11,7 @@ from samples.full_model import Drive, springs_of
 from samples.law_energies import SAMPLES
 from samples.marks import needs_compiler, slow_but
 
-from vsacli import Antagonistic, Motor, inverse_dynamics, laws
-from vsacli.base.errors import InvalidRecordError
+from vsacli import Antagonistic, InputError, Motor, inverse_dynamics, laws
 
 MOTOR = Motor(inertia=0.2, damping=0.1)
 RANGE = (290.0, 340.0)
@@ -102,5 +101,5 @@ def test_the_compiled_engine_agrees() -> None:
     ],
 )
 def test_a_coupling_has_no_end(coupling: laws.SpringLaw, message: str) -> None:
-    with pytest.raises(InvalidRecordError, match=message):
+    with pytest.raises(InputError, match=message):
         pair(coupling)

@@ -14,10 +14,9 @@ from samples.springs import SPRINGS
 from scipy.interpolate import make_interp_spline
 from scipy.optimize import brentq
 
-from vsacli import Antagonistic, Elastic, Flag, Motor, inverse_dynamics
+from vsacli import Antagonistic, Elastic, Flag, InputError, Motor, inverse_dynamics
 from vsacli.actuators.laws import Cubic, Exponential, FourBar, Polynomial, Quadratic, SpringLaw
 from vsacli.actuators.transmission import Command, JointVariables
-from vsacli.base.errors import InvalidRecordError
 
 MOTOR = Motor(inertia=0.2, damping=0.1)
 NONE = (np.nan, np.nan)
@@ -118,9 +117,9 @@ def test_beyond_the_end_of_its_law_a_spring_carries_nothing(law: SpringLaw) -> N
 
 
 def test_a_law_or_a_stiffness_but_not_both() -> None:
-    with pytest.raises(InvalidRecordError, match=r"missing key 'stiffness' .* or 'spring'"):
+    with pytest.raises(InputError, match=r"missing key 'stiffness' .* or 'spring'"):
         Elastic(motor=MOTOR)
-    with pytest.raises(InvalidRecordError, match="stiffness: the law of `spring` says already how stiff"):
+    with pytest.raises(InputError, match="stiffness: the law of `spring` says already how stiff"):
         Elastic(motor=MOTOR, stiffness=3, spring=Cubic(k=1, k_c=1))
 
 

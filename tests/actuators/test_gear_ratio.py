@@ -19,10 +19,9 @@ from vsacli import (
     inverse_dynamics,
     load_robot,
     load_trajectory,
+    open_result,
     state_derivative,
 )
-from vsacli.base.errors import InvalidRecordError
-from vsacli.results.store.reader import StoredResult
 
 HEAD = "format: vsacli-robot/1\nname: rig\njoints:\n"
 JOINT = """\
@@ -185,7 +184,7 @@ def test_a_robot_with_single_motors_stores_its_ratios_too(vsacli: Callable[..., 
     vsacli("invdyn", "rig.yaml", "move.yaml", "-o", "result.h5")
     assert vsacli("export", "result.h5", "-o", "joint.csv").code == 0
     assert vsacli("export", "result.h5", "-o", "motor.csv", "--side", "motor").code == 0
-    with StoredResult.open("result.h5") as result:
+    with open_result("result.h5") as result:
         np.testing.assert_array_equal(result.gear_ratio, [[20, np.nan]])
     same(20 * columns("motor.csv")["a.tau_motor_shaft_1"], columns("joint.csv")["a.tau_motor_1"])
 
@@ -220,5 +219,5 @@ def test_a_motor_knows_both_sides():
     motor = Motor(inertia=0.01, gear_ratio=-100, side="shaft")
     assert (motor.inertia, motor.at_joint.inertia) == (0.01, pytest.approx(100))
     assert motor.at_joint.max_torque == np.inf
-    with pytest.raises(InvalidRecordError, match="Motor: gear_ratio: must be finite and not zero, not nan"):
+    with pytest.raises(InputError, match="Motor: gear_ratio: must be finite and not zero, not nan"):
         Motor(inertia=0.01, gear_ratio=float("nan"))

@@ -17,7 +17,6 @@ from samples.marks import slow
 from samples.shipped import shipped_robot, shipped_run
 
 from vsacli import Friction, InputError, Motor, Robot, identify, inverse_dynamics, load_robot, simulate
-from vsacli.base.errors import InvalidRecordError
 from vsacli.files.file_kinds import DOCUMENTS
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.urdf import urdf_model
@@ -210,7 +209,7 @@ def test_without_a_side_both_readings_are_shown(kind, motor, message, tmp_path):
 
 
 def test_without_a_side_python_says_the_same_with_both_units():
-    with pytest.raises(InvalidRecordError, match=r"= 1 kg m\^2 \(kg if prismatic\) at the joint, or"):
+    with pytest.raises(InputError, match=r"= 1 kg m\^2 \(kg if prismatic\) at the joint, or"):
         Motor(inertia=1e-4, gear_ratio=100)
 
 

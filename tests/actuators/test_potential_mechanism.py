@@ -16,7 +16,6 @@ from samples.marks import slow_but
 
 from vsacli import Flag, InputError, inverse_dynamics, laws, load_robot, load_trajectory, mechanisms
 from vsacli.actuators.reach import reach_flags
-from vsacli.base.errors import InvalidRecordError
 
 ROBOT = """
 format: vsacli-robot/1
@@ -188,7 +187,7 @@ def random_potential(number: int) -> mechanisms.Potential:
                 start=mechanisms.BranchStart(theta_1=float(draw(-0.6, 0.6)), theta_2=float(draw(-1.5, 1.5))),
                 range=mechanisms.PotentialRange(phi=(-1, 1), theta_2=(-2, 2)),
             )
-        except InvalidRecordError:
+        except InputError:
             continue
     raise AssertionError("no state of this potential can be the start")
 
@@ -317,7 +316,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_is_refused_and_why(case: str) -> None:
     changes, message = REFUSED[case]
-    with pytest.raises(InvalidRecordError) as refused:
+    with pytest.raises(InputError) as refused:
         replace(AWAS, **changes)
     assert message in str(refused.value)
 

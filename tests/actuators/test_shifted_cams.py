@@ -10,9 +10,8 @@ from samples.full_model import Drive, PlanarArm, springs_of
 from samples.law_energies import SAMPLES
 from samples.springs import SPRINGS, measured
 
-from vsacli import Antagonistic, Flag, Motor, Serial, inverse_dynamics, mechanisms, simulate
+from vsacli import Antagonistic, Flag, InputError, Motor, Serial, inverse_dynamics, mechanisms, simulate
 from vsacli.actuators.laws import Cubic, Exponential, Polynomial
-from vsacli.base.errors import InvalidRecordError
 
 HEAVY = PlanarArm(lengths=[0.4], masses=[6.0], centers=[0.25], inertias=[0.12], damping=[0.2])
 """A pendulum that turns both cams by different angles."""
@@ -138,5 +137,5 @@ def test_like_cams_have_no_other_branch() -> None:
     ],
 )
 def test_what_no_cams_can_be_is_refused(options: dict, message: str) -> None:
-    with pytest.raises(InvalidRecordError, match=message):
+    with pytest.raises(InputError, match=message):
         mechanisms.ShiftedCams(**options)

@@ -12,12 +12,11 @@ from samples.marks import slow
 from samples.robots import random_robot
 from scipy.optimize import minimize_scalar
 
-from vsacli import Flag, Limits, Motor, Report, Robot, Trajectory, inverse_dynamics
+from vsacli import Flag, Limits, Motor, Report, Robot, Trajectory, inverse_dynamics, motor_torques
 from vsacli.actuators.reach import margin
 from vsacli.analysis.between_samples import SAMPLES_ONLY, SCANNED
 from vsacli.analysis.run import Run
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.inverse import compute_block
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
@@ -52,7 +51,7 @@ def swinging(rate: float, joints: int = 1, stiffness: float = 1500.0, swing: flo
 
 def size(robot: Robot, trajectory: Trajectory, name: str, times: np.ndarray) -> np.ndarray:
     """Size of a variable of the only joint, of motors that of the larger one; (samples,)."""
-    values: np.ndarray = np.abs(getattr(compute_block(robot, trajectory.at(times)), name)[:, 0])
+    values: np.ndarray = np.abs(getattr(motor_torques(robot, trajectory.at(times)), name)[:, 0])
     return values if values.ndim == 1 else values.max(axis=1)
 
 
@@ -161,7 +160,7 @@ def three_joints(rate: float = 103.0) -> tuple[Robot, Trajectory]:
     """Steps all of which are feasible, and stiffnesses below the corridor between them."""
     robot = random_robot("RRR", seed=3)
     trajectory = swinging(rate, joints=3)
-    block = compute_block(robot, trajectory.at(np.linspace(0, DURATION, 5 * int(DURATION * rate) + 1)))
+    block = motor_torques(robot, trajectory.at(np.linspace(0, DURATION, 5 * int(DURATION * rate) + 1)))
     lower = block.stiffness_min
     at_steps, everywhere = lower[::5].max(axis=0), lower.max(axis=0)
     stiffness = np.where(everywhere > at_steps + 1e-3, (at_steps + everywhere) / 2, 2 * everywhere)
@@ -193,7 +192,7 @@ def test_every_dip_below_the_corridor_is_found_and_its_nearest_step_marked() -> 
     robot, trajectory = three_joints()
     assert trajectory.samples > SCANNED
     dense = trajectory.at(np.linspace(0, DURATION, 100 * (trajectory.samples - 1) + 1))
-    block = compute_block(robot, dense)
+    block = motor_torques(robot, dense)
     gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
     result = inverse_dynamics(robot, trajectory)
     assert result.report.verdict == "infeasible"

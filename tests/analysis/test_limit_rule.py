@@ -20,12 +20,11 @@ from samples.marks import exhaustive, needs_compiler
 from samples.shipped import shipped_robot
 from scipy.optimize import minimize_scalar
 
-from vsacli import Flag, Limits, Report, Robot, Trajectory
+from vsacli import Flag, Limits, Report, Robot, Trajectory, motor_torques
 from vsacli.actuators.reach import LimitCheck
 from vsacli.analysis.run import Run
 from vsacli.base.flags import LIMITS, has_flag
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.inverse import compute_block
 from vsacli.dynamics.limits import worst_excess
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
@@ -60,7 +59,7 @@ class Task(NamedTuple):
 
     def size(self, times: np.ndarray) -> np.ndarray:
         """The size of the quantity, of motors the larger one, (times,)."""
-        values: np.ndarray = getattr(compute_block(self.robot, self.trajectory.at(times)), self.name)
+        values: np.ndarray = getattr(motor_torques(self.robot, self.trajectory.at(times)), self.name)
         values = np.abs(values[:, self.joint])
         return values if values.ndim == 1 else np.fmax.reduce(values, axis=1)
 
@@ -128,14 +127,14 @@ def random_task(seed: int) -> Task | None:
     names = [name for name in BOUNDED if name != "stiffness" or chosen[index]]
     name = str(rng.choice(names))
     free = Trajectory(times, position, _stiffness(np.where(chosen, 1e4, np.nan), 0.0, span), name="random")
-    dense = compute_block(robot, free.at(np.linspace(*span, 401)))
+    dense = motor_torques(robot, free.at(np.linspace(*span, 401)))
     level = np.where(chosen, rng.uniform(1.2, 2.0, count) * np.fmax.reduce(dense.stiffness_min), np.nan)
     if not np.isfinite(level[chosen]).all() or (level[chosen] <= 0).any():
         return None
     stiffness = _stiffness(level, 0.05, span)
     trajectory = Trajectory(times, position, stiffness, name="random")
     task = Task(robot, trajectory, index, name)
-    flags = compute_block(robot, trajectory.at(np.linspace(*span, 401))).flags
+    flags = motor_torques(robot, trajectory.at(np.linspace(*span, 401))).flags
     sprung = getattr(robot.joints[index].actuator, "spring", None) is not None
     if flags.any() or (name == "phi" and not sprung) or not np.isfinite(task.size(np.array([0.1]))).all():
         return None

@@ -11,11 +11,11 @@ import pytest
 import xarray
 from samples.command_line import REPOSITORY, ROBOT, contents, edited
 
-from vsacli import InputError
+from vsacli import InputError, open_result
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import OF_ANY_ROBOT
 from vsacli.cli.console import Exit
-from vsacli.results.store.reader import StoredResult, StoredSimulation
+from vsacli.results.store.reader import StoredSimulation
 
 FEEDBACK = ("--controller", "feedback-linearization")
 
@@ -234,4 +234,4 @@ def test_files_that_exist_are_kept(vsacli, quick, tmp_path):
 def test_a_simulation_is_no_result_of_invdyn(vsacli, quick, tmp_path):
     vsacli("simulate", ROBOT, quick, "-o", "s.h5")
     with pytest.raises(InputError, match="is a simulation, expected a result"):
-        StoredResult.open(tmp_path / "s.h5")
+        open_result(tmp_path / "s.h5")

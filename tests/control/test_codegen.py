@@ -21,11 +21,10 @@ from samples.robots import random_robot
 from samples.shipped import shipped_robot, shipped_run
 from samples.springs import SPRINGS
 
-from vsacli import Flag, InputError, Robot, __version__
+from vsacli import Flag, InputError, Robot, __version__, motor_torques
 from vsacli.base.variables import VARIABLES
 from vsacli.control.codegen.project import Project, generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
-from vsacli.dynamics.inverse import compute_block
 
 ROBOTS: dict[str, Robot] = {
     "one joint": random_robot("R", seed=1),
@@ -114,7 +113,7 @@ def test_a_potential_in_single_precision_is_feasible_along_its_trajectory(tmp_pa
     """Tolerances of the continuation lay below single precision: 908 of 1001 samples were infeasible."""
     robot, trajectory = shipped_run("sliding_anchor_1r", "sliding_anchor_1r")
     motion = trajectory.at(np.linspace(0, trajectory.duration, 101))
-    expected = compute_block(robot, motion)
+    expected = motor_torques(robot, motion)
     function = inverse_dynamics_function(robot)
     command = {
         name: motion.variables()[name] for _, given in function.arguments for name in given.layout.shapes
@@ -329,7 +328,7 @@ def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
     function, command = inverse_dynamics_function(robot), commands(robot, 200, seed=9)
     command = {key: values.astype(np.float32).astype(float) for key, values in command.items()}
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "float")(function, command)
-    block = compute_block(robot, motion_of(command))
+    block = motor_torques(robot, motion_of(command))
     with np.errstate(invalid="ignore"):
         margin = (block.stiffness - block.stiffness_min) / block.stiffness - 0.1 + 1e-3
     for key, values in found.items():

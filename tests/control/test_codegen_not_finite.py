@@ -14,14 +14,14 @@ from samples.plants import all_rigid
 from samples.shipped import shipped_robot
 from samples.springs import SPRINGS
 
-from vsacli import Flag, InputError, Robot
+from vsacli import Flag, InputError, Robot, motor_torques
 from vsacli.compute.engine import choose
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import ReferenceResults
-from vsacli.dynamics.inverse import InverseDynamics, compute_block
+from vsacli.dynamics.inverse import InverseDynamics
 
 pytestmark = needs_compiler
 
@@ -151,9 +151,9 @@ def test_all_that_computes_agrees_on_what_is_not_finite(name: str, tmp_path: Pat
     (command,) = arguments(function, rows)
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "double")(function, command)
     with np.errstate(all="ignore"):
-        by_numpy = compute_block(robot, motion_of(command))
+        by_numpy = motor_torques(robot, motion_of(command))
     compiled = choose("c", InverseDynamics(robot), len(rows)).engine
-    by_c = compute_block(robot, motion_of(command), engine=compiled)
+    by_c = motor_torques(robot, motion_of(command), engine=compiled)
     for name_of, values in found.items():
         for block in (by_numpy, by_c):
             expected = expected_of(block, name_of)

@@ -13,14 +13,13 @@ from samples.generated_code import STRICT, compile_c, compiled_robot, write_file
 from samples.marks import needs_compiler, slow, slow_but
 from samples.shipped import shipped_robot
 
-from vsacli import Elastic, Friction, InputError, Motor, Robot, State, state_derivative
+from vsacli import Elastic, Friction, InputError, Motor, Robot, State, motor_torques, state_derivative
 from vsacli.base.variables import Block
 from vsacli.control.codegen.parameters import PARAMETERS, check_parameters, with_parameters
 from vsacli.control.codegen.plant_functions import state_derivative_function
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import CASES, ReferenceResults
-from vsacli.dynamics.inverse import compute_block
 from vsacli.robot.parameters import Parameter, parameters
 
 SAMPLES = 30
@@ -92,7 +91,7 @@ def test_results_are_those_of_a_robot_with_these_numbers(name: str, tmp_path: Pa
     others = {path: value * rng.uniform(1, 1.03) for path, value in nominal.items()}
     for values in (nominal, others):
         found, _ = code(function, command, argument(chosen, values))
-        close(found, compute_block(robot.replace(values), motion_of(command)))
+        close(found, motor_torques(robot.replace(values), motion_of(command)))
 
 
 @pytest.mark.cases(2)

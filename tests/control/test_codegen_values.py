@@ -14,12 +14,12 @@ from samples.robots import random_robot
 from samples.shipped import shipped_robot
 from samples.springs import SPRINGS
 
-from vsacli import FeedbackLinearization, Flag, Gains, Integral, Robot, State, link_torques
+from vsacli import FeedbackLinearization, Flag, Gains, Integral, Robot, State, link_torques, motor_torques
 from vsacli.base.signals import POSITION
 from vsacli.base.variables import Block
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.dynamics.inverse import TORQUES, compute_block
+from vsacli.dynamics.inverse import TORQUES
 
 pytestmark = needs_compiler
 
@@ -51,7 +51,7 @@ def check_inverse_dynamics(robot: Robot, folder: Path, rtol_of_upper: float = 0.
     """
     function, command = inverse_dynamics_function(robot), commands(robot, SAMPLES, seed=2)
     found, returned = compiled_robot(folder / "c", robot, [function], "double")(function, command)
-    block = compute_block(robot, motion_of(command))
+    block = motor_torques(robot, motion_of(command))
     np.testing.assert_array_equal(found.pop("flags"), block.flags)
     np.testing.assert_array_equal(returned, np.bitwise_or.reduce(block.flags, axis=1))
     for name, values in found.items():
@@ -110,7 +110,7 @@ def test_inverse_dynamics_of_what_is_no_number(tmp_path: Path) -> None:
     command["stiffness"][6:, 2] = np.nan, np.inf
     found, returned = compiled_robot(tmp_path / "c", robot, [function], "double")(function, command)
     with np.errstate(all="ignore"):
-        block = compute_block(robot, motion_of(command))
+        block = motor_torques(robot, motion_of(command))
     np.testing.assert_array_equal(found["flags"], block.flags)
     np.testing.assert_array_equal(np.isnan(found["tau_motor"]), np.isnan(block.tau_motor))
     bad = [0, 1, 2, 5, 6]

@@ -26,6 +26,7 @@ from vsacli import (
     Wrench,
     link_torques,
     load_robot,
+    motor_torques,
 )
 from vsacli.base.signals import POSITION
 from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES, WrenchFrame, wrench_components
@@ -33,7 +34,6 @@ from vsacli.control.codegen.feedback_function import feedback_linearization_func
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.dynamics.elastic_torques import TORQUES
-from vsacli.dynamics.inverse import compute_block
 
 pytestmark = needs_compiler
 
@@ -74,7 +74,7 @@ def test_inverse_dynamics_under_a_wrench(tmp_path: Path) -> None:
     robot, wrench = shipped_robot("vsa_3r"), drawn_wrench("base")
     command = {**commands(robot, SAMPLES, seed=2), "stiffness": np.full((SAMPLES, 3), 1200.0)}
     motion = motion_of(command)
-    block = compute_block(robot, Motion.of(motion.time, motion.of_joints, wrench))
+    block = motor_torques(robot, Motion.of(motion.time, motion.of_joints, wrench))
     function = inverse_dynamics_function(robot, "base")
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "double")(
         function, command, arrays_of(wrench)
@@ -124,7 +124,7 @@ def test_functions_under_wrenches_by_tool(tmp_path: Path) -> None:
     }
     command = {**commands(robot, SAMPLES, seed=2), "stiffness": np.full((SAMPLES, 3), 1200.0)}
     motion = motion_of(command)
-    block = compute_block(robot, Motion.of(motion.time, motion.of_joints, wrench))
+    block = motor_torques(robot, Motion.of(motion.time, motion.of_joints, wrench))
     functions = [make(robot, frame) for make in (link_torques_function, inverse_dynamics_function)]
     call = compiled_robot(tmp_path / "c", robot, functions, "double")
     of_links, _ = call(functions[0], {name: command[name] for name in POSITION.names}, by_tool)

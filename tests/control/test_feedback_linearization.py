@@ -29,10 +29,10 @@ from vsacli import (
     feedback_linearization,
     laws,
     link_torques,
+    motor_torques,
     state_derivative,
 )
 from vsacli.control.poles import gains_from_text, load_gains, parse_poles
-from vsacli.dynamics.inverse import compute_block
 
 GAINS = Gains.from_poles([-9, -10, -11 + 4j, -11 - 4j], [-12, -15])
 
@@ -61,7 +61,7 @@ def at(record, index):
 def test_on_the_reference_it_gives_the_computed_torques():
     robot, trajectory = vsa_3r(), motion(rate=20)
     command = trajectory.block(0, trajectory.samples)
-    computed = compute_block(robot, command)
+    computed = motor_torques(robot, command)
     state = State(computed.q, computed.dq, computed.theta, computed.dtheta)
     torque = feedback_linearization(robot, state, command, GAINS)
     # phi carries 1e-16/margin, here 1e-14, and the gains, up to 1e4, magnify what that does to d3q

@@ -25,11 +25,11 @@ from vsacli import (
     Motor,
     Robot,
     laws,
+    motor_torques,
 )
 from vsacli.actuators.transmission import Command
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.dynamics.drive import drive
-from vsacli.dynamics.inverse import compute_block
 
 NAN = np.nan
 OF_MOTORS = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "motor_power")
@@ -41,7 +41,7 @@ def computed(robot: Robot, motion: MotionArrays, stiffness: float = NAN) -> Bloc
     """A block of unrelated steps at a constant stiffness."""
     sigma = np.full_like(motion[0], stiffness)
     rates = np.zeros_like(sigma)
-    return compute_block(robot, Motion(np.arange(float(len(sigma))), *motion, by_name(sigma, rates, rates)))
+    return motor_torques(robot, Motion(np.arange(float(len(sigma))), *motion, by_name(sigma, rates, rates)))
 
 
 def gentle(robot: Robot, samples: int, seed: int) -> MotionArrays:

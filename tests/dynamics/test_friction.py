@@ -20,6 +20,7 @@ from vsacli import (
     Antagonistic,
     Elastic,
     Friction,
+    InputError,
     Motor,
     Report,
     Rigid,
@@ -30,7 +31,6 @@ from vsacli import (
 from vsacli.actuators.friction import REST, FrictionLaws
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.analysis.dry_friction import DryFrictionSummary
-from vsacli.base.errors import InvalidRecordError
 
 ROUNDING = 1e-8
 """Of the energy that flows: Hermite's rule at 1 kHz leaves about 1e-10."""
@@ -262,11 +262,11 @@ def test_the_report_says_once_where_torques_are_open():
 
 def test_friction_between_links_must_be_smooth_and_of_one_size():
     robot, _ = shipped_run("vsa_3r", "rest_to_rest")
-    with pytest.raises(InvalidRecordError, match=r"width: must be positive: .* give the friction to"):
+    with pytest.raises(InputError, match=r"width: must be positive: .* give the friction to"):
         with_friction(robot, None, Friction(coulomb=(1.0, 1.0)))
-    with pytest.raises(InvalidRecordError, match=r"give their mean 2.5, and half their difference .*: -0.5"):
+    with pytest.raises(InputError, match=r"give their mean 2.5, and half their difference .*: -0.5"):
         with_friction(robot, None, SMOOTH)
-    with pytest.raises(InvalidRecordError, match=r"width: must be at least 1e-30 in size, not 1e-160"):
+    with pytest.raises(InputError, match=r"width: must be at least 1e-30 in size, not 1e-160"):
         with_friction(robot, None, Friction(coulomb=(1.0, 1.0), width=1e-160))  # its square is no number
     only_offset = with_friction(robot, None, Friction(coulomb=(0.0, 0.0), offset=1.0))
     found = link_torques(only_offset, np.zeros(3)).tau_e - link_torques(robot, np.zeros(3)).tau_e

@@ -12,9 +12,8 @@ from samples.drives import ALIKE, command, joint_with, motion
 from samples.robots import vsa_3r
 from scipy.optimize import brentq
 
-from vsacli import Result, inverse_dynamics, laws, load_robot, load_trajectory
+from vsacli import Result, inverse_dynamics, laws, load_robot, load_trajectory, motor_torques
 from vsacli.dynamics.drive import drive
-from vsacli.dynamics.inverse import compute_block
 
 ROOT = Path(__file__).parents[2]
 ARM = load_robot(ROOT / "robots" / "vsa_3r.yaml")
@@ -142,7 +141,7 @@ def test_snap_is_not_zero_at_the_ends(rising: Result):
 def base_margin_and_torque(duration: float) -> tuple[float, float]:
     """Smallest margin and largest motor torque of joint 1, sampled finely enough for either."""
     trajectory = motion(duration=duration)
-    block = compute_block(ARM, trajectory.at(np.linspace(0, duration, 10_001)))
+    block = motor_torques(ARM, trajectory.at(np.linspace(0, duration, 10_001)))
     margin: np.ndarray = 1 - block.stiffness_min[:, 0] / block.stiffness[:, 0]
     return float(margin.min()), float(np.nanmax(np.abs(block.tau_motor[:, 0])))
 

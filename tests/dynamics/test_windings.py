@@ -15,7 +15,6 @@ from scipy.integrate import trapezoid
 
 from vsacli import Flag, InputError, Motor, Robot, inverse_dynamics, load_robot, open_result, simulate
 from vsacli.actuators.reach import LIMIT_ROUNDING
-from vsacli.base.errors import InvalidRecordError
 from vsacli.base.outputs import Outputs
 from vsacli.results.store.writer import ResultWriter
 
@@ -92,7 +91,7 @@ REFUSED = {
 
 @pytest.mark.parametrize(("fields", "reason"), REFUSED.values(), ids=REFUSED)
 def test_what_is_missing_is_named(fields, reason):
-    with pytest.raises(InvalidRecordError, match=reason):
+    with pytest.raises(InputError, match=reason):
         Motor(inertia=1.0, **fields)
 
 

@@ -21,7 +21,6 @@ from vsacli import (
     load_robot,
     load_trajectory,
 )
-from vsacli.base.errors import InvalidRecordError
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 
@@ -276,5 +275,5 @@ def test_a_stiffness_with_gaps_is_refused() -> None:
 
 def test_a_rigid_joint_in_python_has_no_stiffness_to_limit() -> None:
     [joint] = robot(RIGID).joints
-    with pytest.raises(InvalidRecordError, match="has no stiffness to limit"):
+    with pytest.raises(InputError, match="has no stiffness to limit"):
         replace(joint, limits=replace(joint.limits, stiffness=(1.0, 2.0)))

@@ -8,12 +8,11 @@ import numpy as np
 
 from samples.robots import random_robot
 from samples.springs import SPRINGS
-from vsacli import Antagonistic, Flag, Limits, Motion, Motor, Robot
+from vsacli import Antagonistic, Flag, Limits, Motion, Motor, Robot, motor_torques
 from vsacli.actuators.reach import margin
 from vsacli.base.flags import has_flag
 from vsacli.base.variables import Block
 from vsacli.control.codegen.robot_functions import command_structure
-from vsacli.dynamics.inverse import compute_block
 
 SCALES = {"q": 1.0, "dq": 1.0, "ddq": 2.0, "d3q": 5.0, "d4q": 20.0, "dstiffness": 100.0, "ddstiffness": 500.0}
 """Half-widths of what is drawn, SI units."""
@@ -46,7 +45,7 @@ def commands(robot: Robot, samples: int, seed: int) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(seed)
     shape = (samples, len(robot.joints))
     drawn = {name: rng.uniform(-scale, scale, shape) for name, scale in SCALES.items()}
-    block = compute_block(robot, motion_of({**drawn, "stiffness": np.ones(shape)}))
+    block = motor_torques(robot, motion_of({**drawn, "stiffness": np.ones(shape)}))
     lower = np.nan_to_num(block.stiffness_min)
     upper = np.minimum(np.nan_to_num(block.stiffness_max), 4 * lower)
     stiffness = lower + rng.uniform(-0.2, 1.2, shape) * (upper - lower)
@@ -59,7 +58,7 @@ def commands(robot: Robot, samples: int, seed: int) -> dict[str, np.ndarray]:
 def reachable(robot: Robot) -> np.ndarray:
     """Random commands that can be executed, (commands, signals, joints)."""
     drawn = commands(robot, 1000, seed=1)
-    flags = compute_block(robot, motion_of(drawn)).flags
+    flags = motor_torques(robot, motion_of(drawn)).flags
     chosen = np.stack([drawn[array.name] for array in command_structure(robot).arrays], axis=1)
     return chosen[~has_flag(flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=1)]
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from samples.robots import random_motion
 from samples.signals import by_name
-from vsacli import Flag, Motion, Robot, Wrench
+from vsacli import Flag, Motion, Robot, Wrench, motor_torques
 from vsacli.base.variables import Block
-from vsacli.dynamics.inverse import COMPUTED, compute_block
+from vsacli.dynamics.inverse import COMPUTED
 
 AGREEMENT = 1e-12
 """Relative to a variable's peak, where the margin exceeds `CLEAR`: rounding of 1e-16 over that margin."""
@@ -29,7 +29,7 @@ def demands(robot: Robot, samples: int, seed: int = 1, wrench: Wrench | None = N
     motion = MOTION_SCALE * np.array(random_motion(robot, samples, seed))
     rates = rng.uniform(-500, 500, (2, *motion[0].shape))
     time = np.arange(float(samples))
-    reach = compute_block(
+    reach = motor_torques(
         robot, Motion(time, *motion, by_name(np.ones_like(motion[0]), *rates), wrench=wrench)
     )
     lower = np.nan_to_num(reach.stiffness_min, nan=1.0)

@@ -21,12 +21,11 @@ from vsacli import (
     Motor,
     Robot,
     Trajectory,
+    inverse_dynamics,
     laws,
 )
-from vsacli.analysis.run import Run
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.base.variables import Block
 from vsacli.studies.search import Fix, write_fixed
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
@@ -103,21 +102,16 @@ def lowest_stiffness(tau_e: np.ndarray) -> np.ndarray:
 
 def smallest_margin(robot: Robot, trajectory: Trajectory) -> float:
     """Over all steps and joints, from the closed bound."""
-    return min(
-        float(np.min((block.stiffness - lowest_stiffness(block.tau_e)) / block.stiffness))
-        for block in Run(robot, trajectory)
-    )
+    result = inverse_dynamics(robot, trajectory)
+    return float(np.min((result.stiffness - lowest_stiffness(result.tau_e)) / result.stiffness))
 
 
 def accepted(robot: Robot, trajectory: Trajectory, min_margin: float = 0.01) -> bool:
     """The rule, read off the corridor and the flags of a run."""
-    return all(_accepted(block, min_margin) for block in Run(robot, trajectory))
-
-
-def _accepted(block: Block, min_margin: float) -> bool:
-    room = np.minimum(block.stiffness - block.stiffness_min, block.stiffness_max - block.stiffness)
-    narrow = np.any(room / block.stiffness < min_margin)  # NaN where a joint has no corridor
-    return not narrow and not np.any(block.flags & ~np.uint32(Flag.NEAR_SINGULAR))
+    result = inverse_dynamics(robot, trajectory)
+    room = np.minimum(result.stiffness - result.stiffness_min, result.stiffness_max - result.stiffness)
+    narrow = np.any(room / result.stiffness < min_margin)  # NaN where a joint has no corridor
+    return not narrow and not np.any(result.flags & ~np.uint32(Flag.NEAR_SINGULAR))
 
 
 def pushed(trajectory: Trajectory, frame: str = "base") -> Trajectory:

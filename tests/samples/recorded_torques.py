@@ -22,11 +22,11 @@ from vsacli import (
     Motor,
     Robot,
     Trajectory,
+    inverse_dynamics,
     laws,
+    motor_torques,
 )
-from vsacli.analysis.run import Run
 from vsacli.base.signals import STIFFNESS
-from vsacli.dynamics.inverse import compute_block
 from vsacli.trajectory.curves import ConstantProfile
 
 STIFFNESS_ASKED = 1200.0
@@ -118,17 +118,15 @@ def judge(recording: Recording) -> Verdict:
     q, stiffness = recording.position.recorded[:, None], recording.stiffness
     firm = {} if stiffness is None else {"stiffness": stiffness.recorded[:, None]}
     trajectory = Trajectory.from_samples(recording.time, q, **firm)
-    run = Run(robot_of(recording.arm), trajectory)
-    blocks = list(run)
+    result = inverse_dynamics(robot_of(recording.arm), trajectory)
     true = motor_torque(recording.arm, *recording.truth).T
     starts, ends = zip(*(each.fit.unreliable for each in trajectory.estimates.values()), strict=True)
     time = recording.time
     inside = (time >= min(max(starts), time[-1] / 4)) & (time <= time[-1] - min(max(ends), time[-1] / 4))
     torque, deviation = (
-        np.concatenate([getattr(block, name) for block in blocks])[inside, 0, : true.shape[1]]
-        for name in ("tau_motor", "tau_motor_std")
+        getattr(result, name)[inside, 0, : true.shape[1]] for name in ("tau_motor", "tau_motor_std")
     )
-    return Verdict(run.report().verdict, _error(torque, deviation, true[inside]))
+    return Verdict(result.report.verdict, _error(torque, deviation, true[inside]))
 
 
 def outcomes(motion: str, color: str, seed: int, rate: int) -> Iterator[Outcome]:
@@ -142,15 +140,15 @@ def outcomes(motion: str, color: str, seed: int, rate: int) -> Iterator[Outcome]
     inside = (of.time >= start) & (of.time <= end)
     for name, robot in ARMS.items():
         chosen = {"stiffness": firm} if name == "antagonistic" else {}
-        run = Run(robot, Trajectory(recorded.times, recorded.position, chosen, name=motion))
-        blocks = list(run)
-        true = compute_block(robot, exact)
+        trajectory = Trajectory(recorded.times, recorded.position, chosen, name=motion)
+        result = inverse_dynamics(robot, trajectory)
+        true = motor_torques(robot, exact)
         motors = slice(robot.joints[0].actuator.motor_count)
         torque, deviation, fourth, of_fourth = (
-            np.concatenate([getattr(block, variable) for block in blocks])[inside, 0]
+            getattr(result, variable)[inside, 0]
             for variable in ("tau_motor", "tau_motor_std", "d4q", "d4q_std")
         )
-        report = run.report()
+        report = result.report
         yield Outcome(
             arm=name,
             verdict=report.verdict,

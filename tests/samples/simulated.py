@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from samples.robots import vsa_3r
-from vsacli import Elastic, Gains, InitialError, Motor, Robot, State, Tolerances, Trajectory
+from vsacli import Elastic, Gains, InitialError, Motor, Robot, State, Tolerances, Trajectory, motor_torques
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, LinearizingFeedback
@@ -17,7 +17,6 @@ from vsacli.control.simulation.history import History, concatenate_histories, co
 from vsacli.control.simulation.integrator import Integrator
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.tabulated import TabulatedReference
-from vsacli.dynamics.inverse import compute_block
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
@@ -66,7 +65,7 @@ def start_of(robot: Robot, paired: Robot, trajectory: Trajectory, error: Initial
     command = dataclasses.replace(
         command, q=command.q + error.q, commanded={**command.commanded, "stiffness": stiffness}
     )
-    block = compute_block(paired, command)
+    block = motor_torques(paired, command)
     theta, dtheta = block.theta[0].copy(), block.dtheta[0].copy()
     for index, joint in enumerate(robot.joints):
         if isinstance(joint.actuator, Elastic):

@@ -11,10 +11,17 @@ import pytest
 from samples.command_line import ROBOT
 from samples.shipped import shipped_robot
 
-from vsacli import Joint, Robot, Trajectory, fixes, load_robot, load_trajectory
-from vsacli.analysis.run import Run
+from vsacli import (
+    Joint,
+    Robot,
+    Trajectory,
+    fixes,
+    inverse_dynamics,
+    load_robot,
+    load_trajectory,
+    motor_torques,
+)
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.inverse import compute_block
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.times import UniformTimes
 
@@ -38,12 +45,12 @@ def random_motion(seed: int) -> tuple[Robot, Motion, np.ndarray]:
         level = ConstantProfile(signal=STIFFNESS, span=position.span, value=tuple(stiffness.tolist()))
         return Trajectory(UniformTimes(duration, rate), position, {"stiffness": level}, name="random")
 
-    rest = compute_block(robot, motion(np.full(len(reach), 1e5)).at(np.array([0.0])))
+    rest = motor_torques(robot, motion(np.full(len(reach), 1e5)).at(np.array([0.0])))
     lowest = rest.stiffness_min[0]
     if seed % 2 == 0:
         return robot, motion, np.round(lowest * rng.uniform(0.85, 1.01, len(reach)), 2)
     stiffness = np.round(1.5 * lowest, 2)
-    torque = np.abs(compute_block(robot, motion(stiffness).at(np.array([0.0]))).tau_motor[0]).max(axis=-1)
+    torque = np.abs(motor_torques(robot, motion(stiffness).at(np.array([0.0]))).tau_motor[0]).max(axis=-1)
     joints = tuple(map(_weakened, robot.joints, (0.85 * torque).tolist()))
     return dataclasses.replace(robot, joints=joints), motion, stiffness
 
@@ -62,10 +69,7 @@ def advised(robot: Robot, trajectory: Trajectory) -> Iterator[tuple[int, str]]:
 
 def fixed(robot: Robot, trajectory: Trajectory, index: int) -> bool:
     """Whether a joint has its margin and keeps its limits, at samples and between them."""
-    run = Run(robot, trajectory, min_margin=MIN_MARGIN)
-    for _ in run:
-        pass
-    joint = run.report().joints[index]
+    joint = inverse_dynamics(robot, trajectory).report.joints[index]
     return joint.margin >= MIN_MARGIN and not any(map(joint.shows, ("infeasible", "singular", "over_limit")))
 
 

@@ -22,8 +22,7 @@ from samples.fixes import (
 from samples.marks import slow
 from samples.robots import vsa_3r
 
-from vsacli import Elastic, Limits, Motor, Trajectory, fixes, laws
-from vsacli.analysis.run import Run
+from vsacli import Elastic, Limits, Motor, Trajectory, fixes, inverse_dynamics, laws
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.cutting_planes import smallest_offset
 from vsacli.studies.search.fix_report import NotPossible, StiffnessOffset
@@ -49,8 +48,7 @@ def reason(robot, trajectory):
 
 
 def peak_load(robot, trajectory):
-    (block,) = Run(robot, trajectory)
-    return np.abs(block.tau_e).max(axis=0)
+    return np.abs(inverse_dynamics(robot, trajectory).tau_e).max(axis=0)
 
 
 @pytest.mark.cases(1)

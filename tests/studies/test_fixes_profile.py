@@ -21,7 +21,6 @@ from samples.robots import vsa_3r
 from scipy.integrate import trapezoid
 
 from vsacli import Limits, Trajectory, fixes, inverse_dynamics, laws, link_torques
-from vsacli.analysis.run import Run
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.fix_report import NotPossible
@@ -213,8 +212,7 @@ def test_profile_holds_between_the_steps():
 def test_motor_limit_asks_for_a_smoother_or_wider_profile():
     trajectory = rest_to_rest(0.5)
     fastest, free = profile(vsa_3r(), trajectory)
-    (block,) = Run(vsa_3r(), fastest)
-    peak = float(np.abs(block.tau_motor[:, BASE]).max())
+    peak = float(np.abs(inverse_dynamics(vsa_3r(), fastest).tau_motor[:, BASE]).max())
     robot = changed(BASE, motor={"max_torque": 0.8 * peak})
     fixed, found = profile(robot, trajectory)
     assert accepted(robot, fixed, MARGIN)
