@@ -19,9 +19,7 @@ from samples.drives import (
 )
 from samples.robots import vsa_3r
 
-from vsacli import Antagonistic, Flag, InputError, Joint, Limits, Motor, inverse_dynamics, mechanisms
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.tendons import Quadratic
+from vsacli import Antagonistic, Flag, InputError, Joint, Limits, Motor, inverse_dynamics, laws, mechanisms
 from vsacli.actuators.reach import margin, reach_flags
 from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
@@ -205,10 +203,10 @@ def test_limits_of_a_side_are_its_own(side: int, variable: str, limit: str, bit:
         float(getattr(drive(joint_with(springs(ALIKE, ALIKE)), command(**asked)), variable)[side, 0])
     )
     for factor, expected in [(1.0, Flag(0)), (1 + 1e-6, Flag(0)), (1 - 1e-6, bit)]:
-        motors, laws = [Motor(inertia=3, damping=0.1)] * 2, [ALIKE] * 2
-        parts = laws if limit == "max_deflection" else motors
+        motors, sides = [Motor(inertia=3, damping=0.1)] * 2, [ALIKE] * 2
+        parts = sides if limit == "max_deflection" else motors
         parts[side] = dataclasses.replace(parts[side], **{limit: factor * reached})
-        actuator = Antagonistic(motor=(motors[0], motors[1]), spring=(laws[0], laws[1]))
+        actuator = Antagonistic(motor=(motors[0], motors[1]), spring=(sides[0], sides[1]))
         assert flags_of(joint_with(actuator), **asked) == [expected]
 
 
@@ -220,12 +218,12 @@ def test_running_along_a_limit_is_within_it():
 
 
 def test_limits_do_not_flag_what_does_not_exist():
-    actuator = springs(*[Cubic(k=400, k_c=2000, max_deflection=1e-6)] * 2)
+    actuator = springs(*[laws.Cubic(k=400, k_c=2000, max_deflection=1e-6)] * 2)
     assert flags_of(joint_with(actuator), stiffness=700.0) == [Flag.INFEASIBLE]
 
 
 def test_limits_do_not_move_the_corridor():
-    limited = springs(*[Cubic(k=400, k_c=2000, max_deflection=1e-3)] * 2)
+    limited = springs(*[laws.Cubic(k=400, k_c=2000, max_deflection=1e-3)] * 2)
     for name in ("phi", "tau_motor", "stiffness_min", "stiffness_max"):
         free, held = (drive(joint_with(each), command(tau_e=20.0)) for each in (None, limited))
         if name != "tau_motor":
@@ -235,7 +233,7 @@ def test_limits_do_not_move_the_corridor():
 
 
 def test_the_deflection_limit_of_a_tendon_holds_on_both_sides():
-    actuator = springs(*[Quadratic(k=1000, max_deflection=0.1)] * 2)
+    actuator = springs(*[laws.Quadratic(k=1000, max_deflection=0.1)] * 2)
     found = drive(joint_with(actuator), command(stiffness=1000.0))  # 2 k |phi| on either side
     np.testing.assert_allclose(found.phi[:, 0], [0.25, -0.25], rtol=1e-12)
     checks = [check.motor for check in actuator.limits if check.flag is Flag.DEFLECTION_LIMIT]
@@ -249,7 +247,7 @@ def test_the_deflection_limit_of_a_tendon_holds_on_both_sides():
 
 def test_other_branch_may_reach_less_stiffness_under_heavy_load():
     """Beyond the load at which the inner piece splits off, the two branches end at different folds."""
-    unlike = springs(ALIKE, Cubic(k=440, k_c=2000))
+    unlike = springs(ALIKE, laws.Cubic(k=440, k_c=2000))
     tau_e = np.array([100.0, 400.0])
     lower = lower_by_branch(joint_with(unlike), tau_e)
     # Below that load both end at the only fold; a root finder each.

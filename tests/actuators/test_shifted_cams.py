@@ -10,8 +10,7 @@ from samples.full_model import Drive, PlanarArm, springs_of
 from samples.law_energies import SAMPLES
 from samples.springs import SPRINGS, measured
 
-from vsacli import Antagonistic, Flag, InputError, Motor, Serial, inverse_dynamics, mechanisms, simulate
-from vsacli.actuators.laws import Cubic, Exponential, Polynomial
+from vsacli import Antagonistic, Flag, InputError, Motor, Serial, inverse_dynamics, laws, mechanisms, simulate
 
 HEAVY = PlanarArm(lengths=[0.4], masses=[6.0], centers=[0.25], inertias=[0.12], damping=[0.2])
 """A pendulum that turns both cams by different angles."""
@@ -104,8 +103,8 @@ def test_a_simulation_ends_where_a_cam_does(ending: tuple[int, ...]) -> None:
     turns, cubic = np.linspace(-0.4, 0.4, 25), SAMPLES["cubic"].law
     short = measured(turns, cubic.torque(turns))
     plant, model = (
-        robot_of(HEAVY, [Serial(motor=MOTORS, mechanism=mechanisms.ShiftedCams(spring=laws))])
-        for laws in (tuple(short if side in ending else cubic for side in range(2)), (cubic, cubic))
+        robot_of(HEAVY, [Serial(motor=MOTORS, mechanism=mechanisms.ShiftedCams(spring=cams))])
+        for cams in (tuple(short if side in ending else cubic for side in range(2)), (cubic, cubic))
     )
     simulation = simulate(plant, motion_of([(290, 1500)]), model=model)
     assert "a spring left the range of its law" in str(simulation.report.ending)
@@ -131,9 +130,12 @@ def test_like_cams_have_no_other_branch() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"spring": (Polynomial(c1=3),) * 2}, "spring: both are linear"),
-        ({"spring": (Exponential(c=1, a=2),) * 2, "branch": "negative"}, "branch: must be positive"),
-        ({"spring": (Cubic(k=1, k_c=2, max_deflection=1),) * 2}, "max_deflection: is not known of a cam"),
+        ({"spring": (laws.Polynomial(c1=3),) * 2}, "spring: both are linear"),
+        ({"spring": (laws.Exponential(c=1, a=2),) * 2, "branch": "negative"}, "branch: must be positive"),
+        (
+            {"spring": (laws.Cubic(k=1, k_c=2, max_deflection=1),) * 2},
+            "max_deflection: is not known of a cam",
+        ),
     ],
 )
 def test_what_no_cams_can_be_is_refused(options: dict, message: str) -> None:

@@ -14,13 +14,7 @@ from samples.engines import assert_agree, demands, kinds_of_steps, program, rand
 from samples.marks import needs_compiler, slow, slow_but
 from samples.robots import MotionArrays, random_motion, random_robot, vsa_3r
 
-from vsacli import Antagonistic, Flag, Robot, link_torques, load_robot
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.four_bar import FourBar
-from vsacli.actuators.laws.polynomial import Polynomial
-from vsacli.actuators.laws.sinh import Sinh
-from vsacli.actuators.laws.tendons import Exponential, Quadratic
+from vsacli import Antagonistic, Flag, Robot, laws, link_torques, load_robot
 from vsacli.analysis.run import Run
 from vsacli.compute.engine import choose
 from vsacli.compute.engine.engines import Engine
@@ -55,8 +49,8 @@ def compiled(robot: Robot, threads: int = 1, frame: str | None = None) -> Engine
     return choose("c", InverseDynamics(robot, frame), 1, threads).engine
 
 
-def one_joint(*laws: SpringLaw) -> Robot:
-    return Robot(name="one-joint", joints=(joint_with(springs(*laws)),))
+def one_joint(*two_laws: laws.SpringLaw) -> Robot:
+    return Robot(name="one-joint", joints=(joint_with(springs(*two_laws)),))
 
 
 @pytest.mark.slow
@@ -83,13 +77,13 @@ def test_seven_joints_agree():
 
 PAIRS = {
     "cubic": (ALIKE, ALIKE),
-    "cubics": (ALIKE, Cubic(k=440, k_c=2000)),
-    "polynomial": (Polynomial(c1=400, c3=900, c5=9000), Polynomial(c1=400, c3=900, c5=9000)),
-    "sinh": (Sinh(k=5, a=7), Sinh(k=6, a=7)),
-    "sinhs": (Sinh(k=5, a=7), Sinh(k=6, a=8)),
-    "exponential": (Exponential(c=5, a=7), Exponential(c=5, a=7)),
-    "quadratic": (Quadratic(k=800), Quadratic(k=800)),
-    "four_bar": (FourBar(k=400, ratio=1.5), FourBar(k=400, ratio=1.5)),
+    "cubics": (ALIKE, laws.Cubic(k=440, k_c=2000)),
+    "polynomial": (laws.Polynomial(c1=400, c3=900, c5=9000), laws.Polynomial(c1=400, c3=900, c5=9000)),
+    "sinh": (laws.Sinh(k=5, a=7), laws.Sinh(k=6, a=7)),
+    "sinhs": (laws.Sinh(k=5, a=7), laws.Sinh(k=6, a=8)),
+    "exponential": (laws.Exponential(c=5, a=7), laws.Exponential(c=5, a=7)),
+    "quadratic": (laws.Quadratic(k=800), laws.Quadratic(k=800)),
+    "four_bar": (laws.FourBar(k=400, ratio=1.5), laws.FourBar(k=400, ratio=1.5)),
 }
 
 
@@ -176,7 +170,7 @@ def joined(robot: Robot, motion: MotionArrays, starts: list[int]) -> np.ndarray:
 def test_shorter_vectors_agree(processor: str, programs: Path, monkeypatch: pytest.MonkeyPatch):
     """2 lanes without, 4 with functions of math.h for vectors; any number of samples is left over."""
     monkeypatch.setenv("CC", str(program(programs, f"cc-{processor}", f'exec cc "$@" -march={processor}')))
-    robot = one_joint(ALIKE, Cubic(k=440, k_c=2000))
+    robot = one_joint(ALIKE, laws.Cubic(k=440, k_c=2000))
     for samples in (SAMPLES, SAMPLES + 1, 3):
         motion = demands(robot, samples)
         assert_agree(compute_block(robot, motion, engine=compiled(robot)), compute_block(robot, motion))

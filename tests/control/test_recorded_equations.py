@@ -25,11 +25,11 @@ from vsacli import (
     InputError,
     Motor,
     Rigid,
+    laws,
     perturbed,
     simulate,
     simulate_perturbed,
 )
-from vsacli.actuators.laws.cubic import Cubic
 from vsacli.compute.engine import compiler
 from vsacli.control.simulation.compiled_loop import LARGEST_GROWTH, dop853_with_stages
 from vsacli.control.simulation.ending import Budget
@@ -292,7 +292,7 @@ def test_motors_that_stick_are_left_to_the_text():
 
 
 @dataclasses.dataclass(frozen=True)
-class _Own(Cubic):
+class _Own(laws.Cubic):
     """A law whose text takes what arrays of numbers have, and arrays of symbols have not."""
 
     def torque(self, phi):
@@ -300,7 +300,7 @@ class _Own(Cubic):
 
 
 @dataclasses.dataclass(frozen=True)
-class _Deciding(Cubic):
+class _Deciding(laws.Cubic):
     """One that decides by a number."""
 
     def torque(self, phi):
@@ -310,8 +310,8 @@ class _Deciding(Cubic):
 @pytest.mark.slow
 @pytest.mark.parametrize("law", [_Own, _Deciding])
 def test_laws_that_cannot_be_recorded_are_left_to_the_text(law):
-    laws = [each(k=380.0, k_c=3500.0) for each in (law, Cubic)]
-    robot, plain = (with_joint(vsa_3r(), 1, joint_with(springs(each, each))) for each in laws)
+    both = [each(k=380.0, k_c=3500.0) for each in (law, laws.Cubic)]
+    robot, plain = (with_joint(vsa_3r(), 1, joint_with(springs(each, each))) for each in both)
     own, usual = (simulate(each, short_motion(3), engine="auto") for each in (robot, plain))
     assert own.history.q == pytest.approx(usual.history.q, abs=1e-8)
     assert own.provenance == PLAIN

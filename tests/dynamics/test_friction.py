@@ -26,10 +26,10 @@ from vsacli import (
     Rigid,
     Robot,
     inverse_dynamics,
+    laws,
     link_torques,
 )
 from vsacli.actuators.friction import REST, FrictionLaws
-from vsacli.actuators.laws.cubic import Cubic
 from vsacli.analysis.dry_friction import DryFrictionSummary
 
 ROUNDING = 1e-8
@@ -62,16 +62,16 @@ def with_friction(robot: Robot, of_motors: Friction | None, of_joints: Friction 
 @pytest.mark.parametrize("friction", [SHARP, SMOOTH, Friction(coulomb=(1.0, 1.0), width=1e-3)])
 def test_several_laws_at_once_are_the_law(friction):
     velocity = np.array([[-2.0, 0.3], [-1e-4, 1e-9], [0.0, 5.0]])
-    laws = FrictionLaws.of([friction, None])
-    assert laws is not None
+    frictions = FrictionLaws.of([friction, None])
+    assert frictions is not None
     expected = [[law(friction, v), 0.0] for v in velocity[:, 0]]
-    np.testing.assert_allclose(laws.torque(velocity), expected, rtol=1e-15)  # rounding
+    np.testing.assert_allclose(frictions.torque(velocity), expected, rtol=1e-15)  # rounding
 
 
 def test_what_rests_has_no_direction():
-    laws = FrictionLaws.of([SHARP])
-    assert laws is not None
-    found = laws.torque(np.array([[-2 * REST], [-REST], [0.0], [REST], [2 * REST]]))[:, 0]
+    frictions = FrictionLaws.of([SHARP])
+    assert frictions is not None
+    found = frictions.torque(np.array([[-2 * REST], [-REST], [0.0], [REST], [2 * REST]]))[:, 0]
     np.testing.assert_allclose(found, [-2.9, 0.1, 0.1, 0.1, 2.1], rtol=1e-15)  # rounding
 
 
@@ -115,7 +115,7 @@ def test_friction_between_links_and_its_derivatives_are_those_of_sympy():
 MOTOR = Motor(inertia=0.2, damping=0.1, friction=SMOOTH)
 DRIVES = {
     "antagonistic": (
-        Antagonistic(motor=(MOTOR, MOTOR), spring=(Cubic(k=400, k_c=2000),) * 2),
+        Antagonistic(motor=(MOTOR, MOTOR), spring=(laws.Cubic(k=400, k_c=2000),) * 2),
         Drive(
             np.diag([0.2, 0.2]),
             [0.1, 0.1],
