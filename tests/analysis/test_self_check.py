@@ -15,18 +15,16 @@ import pytest
 from samples.drives import motion
 from samples.long_chains import random_chain
 from samples.marks import slow, slow_but
+from samples.moves import move
 from samples.robots import random_robot, vsa_3r
 from samples.spoiled import scaled, spoil_drive, spoil_torque
 
 from vsacli import Report, Robot, Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
-from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.compute.engine.engines import Kernel
 from vsacli.dynamics.variants import Variants
-from vsacli.trajectory.curves import ConstantProfile, RestToRest
-from vsacli.trajectory.times import UniformTimes
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = {
@@ -107,30 +105,16 @@ def test_motion_far_too_fast_is_infeasible_but_sound(duration: float):
 def test_hardly_feasible_motions_pass(seed: int):
     """Some probes fall next to a fold, which the joint passes in a moment; these seeds were looked for."""
     rng = np.random.default_rng(seed)
-    span = (0.0, round(10 ** rng.uniform(-2, -0.5), 4))
+    duration = round(10 ** rng.uniform(-2, -0.5), 4)
     start, end = rng.uniform(-2, 2, (2, 3)).round(2)
-    trajectory = Trajectory(
-        UniformTimes(span[1], 20 / span[1]),
-        RestToRest(signal=POSITION, span=span, degree=9, start=tuple(start), end=tuple(end)),
-        {
-            "stiffness": RestToRest(
-                signal=STIFFNESS, span=span, degree=5, start=(2000.0,) * 3, end=(9000.0,) * 3
-            )
-        },
-        name="hasty",
-    )
+    stiffness = [2000.0] * 3, [9000.0] * 3
+    trajectory = move(duration, 20 / duration, (start, end), degrees=(9, 5), stiffness=stiffness)
     assert_sound(inverse_dynamics(random_robot("RPR", seed), trajectory).report)
 
 
 @pytest.mark.parametrize("duration", [0.05, 1, 600])
 def test_standing_still_passes(duration: float):
-    span = (0.0, duration)
-    hold = Trajectory(
-        UniformTimes(duration, 20 / duration),
-        ConstantProfile(signal=POSITION, span=span, value=(0.3, 0.2, 0.1)),
-        {"stiffness": ConstantProfile(signal=STIFFNESS, span=span, value=(850.0,) * 3)},
-        name="hold",
-    )
+    hold = move(duration, 20 / duration, ([0.3, 0.2, 0.1],) * 2, stiffness=([850.0] * 3,) * 2)
     assert_sound(inverse_dynamics(vsa_3r(), hold).report)
 
 
@@ -195,11 +179,8 @@ class Counted:
 def test_blocks_of_long_chains_do_not_grow_in_number(joints: int):
     """A block is as much work as the chain is long, and the shorter; in blocks the check must not grow."""
     robot = random_chain(joints)
-    position, stiffness = (
-        ConstantProfile(signal=each, span=(0.0, 1.0), value=(900.0,) * joints)
-        for each in (POSITION, STIFFNESS)
-    )
-    hold = Trajectory(UniformTimes(1.0, 20.0), position, {"stiffness": stiffness}, name="hold")
+    still = ([900.0] * joints,) * 2
+    hold = move(1.0, 20.0, still, stiffness=still)
     counted = Counted()
     ladder_of(robot, hold, counted)
     assert counted.calls == 2  # 4 and 20 if there were as many times as for short ones
@@ -214,9 +195,7 @@ def test_memory_of_long_chains_is_that_of_the_times_computed_together():
         replace(joint, name=f"joint_{number}") for number, joint in enumerate(islice(cycle(arm.joints), 40))
     ]
     chain = replace(arm, gravity=(0.0, 0.0, 0.0), joints=tuple(joints))
-    motion = RestToRest(signal=POSITION, span=(0.0, 3.0), start=(0.0,) * 40, end=(0.005,) * 40, degree=7)
-    stiffness = ConstantProfile(signal=STIFFNESS, span=(0.0, 3.0), value=(2200.0,) * 40)
-    trajectory = Trajectory(UniformTimes(3.0, 300.0), motion, {"stiffness": stiffness}, name="chain")
+    trajectory = move(3.0, 300.0, ([0.0] * 40, [0.005] * 40), stiffness=([2200.0] * 40,) * 2)
     tracemalloc.start()
     try:
         ladder_of(chain, trajectory)

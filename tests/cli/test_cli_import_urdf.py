@@ -174,7 +174,7 @@ def test_overwriting(vsacli, tmp_path):
         (["--hold", "left_finger=0", "--hold", "left_finger=1"], "'left_finger' is held twice"),
         (
             ["--hold", "left_finger=1 deg"],
-            "'1 deg' is an angle; expected a number in m",
+            "'1 deg' is an angle",
         ),
         (["--tip", "flang"], "--tip: there is no link 'flang'; did you mean 'flange'?"),
     ],

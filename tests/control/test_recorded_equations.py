@@ -272,7 +272,7 @@ def test_code_that_serves_many_runs_is_compiled_sooner(monkeypatch):
 def test_without_a_compiler_runs_go_on(monkeypatch):
     monkeypatch.setenv("CC", "nocc")
     assert _run("auto", gains=GAINS).provenance == PLAIN
-    with pytest.raises(InputError, match=r"there is no C compiler 'nocc'; the engine numpy needs none"):
+    with pytest.raises(InputError, match=r"no C compiler 'nocc'"):
         _run("c")
 
 

@@ -139,7 +139,7 @@ def test_a_tendon_that_goes_slack_ends_the_run():
     # 509 N m/rad is what the shoulder's load takes; open loop, the error at the start swings below
     simulation = simulate(robot, motion((530.0,) * 3, (530.0,) * 3), initial_error=InitialError(0.02, 50))
     assert simulation.report.verdict == "infeasible"
-    assert "a spring left the range of its law" in simulation.report.ending
+    assert "a spring left the range" in simulation.report.ending
     phi = simulation.history.phi[-1]
     assert np.abs(phi * [1, -1]).min() == pytest.approx(0, abs=1e-9)  # the event's root in deflection
 

@@ -110,7 +110,7 @@ def test_what_cannot_be_a_position_is_refused() -> None:
     for function in (forward_kinematics, jacobian):
         with pytest.raises(InputError, match=r"q must have the shape \(3\) or \(samples, 3\), not \(2,\)"):
             function(vsa_3r(), [0, 0])
-        with pytest.raises(InputError, match="q must be an array of numbers: could not convert"):
+        with pytest.raises(InputError, match="q must be an array"):
             function(vsa_3r(), ["a", "b", "c"])
     with pytest.raises(InputError, match="unknown frame 'tool' of the Jacobian"):
         jacobian(vsa_3r(), [0, 0, 0], "tool")

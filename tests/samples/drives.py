@@ -8,13 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from samples.moves import move
 from samples.robots import vsa_3r
 from vsacli import Antagonistic, Joint, Limits, Motor, Robot, Trajectory, laws
 from vsacli.actuators.transmission import Command
-from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.drive import drive
-from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.times import UniformTimes
 
 ALIKE = laws.Cubic(k=400, k_c=2000)
 """Either spring of Table I."""
@@ -80,16 +78,6 @@ def motion(
     rate: float = 100,
 ) -> Trajectory:
     """Rest to rest from 0 to 90, 45, -60 deg."""
-    span = (0.0, duration)
-    return Trajectory(
-        UniformTimes(duration, rate),
-        RestToRest(
-            signal=POSITION, span=span, degree=7, start=(0,) * 3, end=(math.pi / 2, math.pi / 4, -math.pi / 3)
-        ),
-        {
-            "stiffness": RestToRest(
-                signal=STIFFNESS, span=span, degree=3, start=stiffness, end=end_stiffness or stiffness
-            )
-        },
-        name="rest-to-rest",
-    )
+    ends = (0,) * 3, (math.pi / 2, math.pi / 4, -math.pi / 3)
+    of_stiffness = stiffness, end_stiffness or stiffness
+    return move(duration, rate, ends, stiffness=of_stiffness, name="rest-to-rest")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from samples.moves import move
 from samples.robots import vsa_3r
 from vsacli import (
     Antagonistic,
@@ -25,11 +26,10 @@ from vsacli import (
     laws,
 )
 from vsacli.base.outputs import Outputs
-from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
+from vsacli.base.signals import WRENCH
 from vsacli.studies.search import Fix, write_fixed
-from vsacli.trajectory.curves import ConstantProfile, RestToRest
+from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.profile import WrenchProfile
-from vsacli.trajectory.times import UniformTimes
 
 PAPER_END = (math.pi / 2, math.pi / 4, -math.pi / 3)
 BASE, SHOULDER, ELBOW = range(3)
@@ -48,14 +48,8 @@ def rest_to_rest(
     rate: float = 250.0,
 ) -> Trajectory:
     """A polynomial of degree 7 at constant stiffness."""
-    times = UniformTimes(duration, rate)
     values = stiffness if isinstance(stiffness, tuple) else (stiffness,) * len(end)
-    return Trajectory(
-        times,
-        RestToRest(signal=POSITION, span=times.span, degree=7, start=start, end=end),
-        {"stiffness": ConstantProfile(signal=STIFFNESS, span=times.span, value=values)},
-        name="test",
-    )
+    return move(duration, rate, (start, end), stiffness=(values, values), name="test")
 
 
 def changed(

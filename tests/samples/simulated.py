@@ -7,9 +7,10 @@ import dataclasses
 import numpy as np
 from scipy.linalg import expm
 
+from samples.moves import move
 from samples.robots import vsa_3r
 from vsacli import Elastic, Gains, InitialError, Motor, Robot, State, Tolerances, Trajectory, motor_torques
-from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
+from vsacli.base.signals import WRENCH
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, LinearizingFeedback
 from vsacli.control.simulation.ending import Budget
@@ -19,7 +20,6 @@ from vsacli.control.simulation.loop_equations import Computing, RecordedEquation
 from vsacli.control.simulation.tabulated import TabulatedReference
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.profile import WrenchProfile
-from vsacli.trajectory.times import UniformTimes
 
 
 def short_motion(
@@ -34,18 +34,12 @@ def short_motion(
     """Rest to rest, each joint by `size` to and fro in turn; `wrench` is the frame of one that sets in."""
     span = (0.0, duration)
     ends = tuple(size * (-1) ** joint for joint in range(joints))
-    position = RestToRest(signal=POSITION, span=span, degree=7, start=(0.1,) * joints, end=ends)
     low, high = ((end,) * joints for end in stiffness)
     force = RestToRest(
         signal=WRENCH, span=span, degree=3, start=(0,) * 6, end=(15.0, -10.0, 12.0, 1.0, 2.0, -1.5)
     )
-    return Trajectory(
-        UniformTimes(duration, rate),
-        position,
-        {"stiffness": RestToRest(signal=STIFFNESS, span=span, degree=3, start=low, end=high)},
-        wrench=None if wrench is None else WrenchProfile(force, wrench),
-        name="short",
-    )
+    push = None if wrench is None else WrenchProfile(force, wrench)
+    return move(duration, rate, ((0.1,) * joints, ends), stiffness=(low, high), wrench=push, name="short")
 
 
 def mixed_3r() -> tuple[Robot, Robot]:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 from samples.command_line import ROBOT
+from samples.moves import move
 from samples.shipped import shipped_robot
 
 from vsacli import (
@@ -21,9 +22,6 @@ from vsacli import (
     load_trajectory,
     motor_torques,
 )
-from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.trajectory.curves import ConstantProfile, RestToRest
-from vsacli.trajectory.times import UniformTimes
 
 MIN_MARGIN = 0.01
 ADVICE = re.compile(r"a stiffness of at (least|most) (\S+)")
@@ -39,11 +37,9 @@ def random_motion(seed: int) -> tuple[Robot, Motion, np.ndarray]:
     reach = [0.3 if joint.type == "prismatic" else 1.0 for joint in robot.joints]
     start, end = (tuple((rng.uniform(-1, 1, len(reach)) * reach).tolist()) for _ in range(2))
     duration, rate = float(rng.uniform(0.8, 3)), int(rng.integers(50, 400))
-    position = RestToRest(signal=POSITION, span=(0.0, duration), degree=9, start=start, end=end)
 
     def motion(stiffness: np.ndarray) -> Trajectory:
-        level = ConstantProfile(signal=STIFFNESS, span=position.span, value=tuple(stiffness.tolist()))
-        return Trajectory(UniformTimes(duration, rate), position, {"stiffness": level}, name="random")
+        return move(duration, rate, (start, end), degrees=(9, 3), stiffness=(stiffness, stiffness))
 
     rest = motor_torques(robot, motion(np.full(len(reach), 1e5)).at(np.array([0.0])))
     lowest = rest.stiffness_min[0]

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from samples.moves import move
 from samples.robots import vsa_3r
 from samples.wrenches import held
 
 from vsacli import InputError, Trajectory, inverse_dynamics, link_torques
-from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
+from vsacli.base.signals import WRENCH
 from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.profile import WrenchProfile
-from vsacli.trajectory.times import UniformTimes
 
 frames = pytest.mark.parametrize("frame", WRENCH_FRAMES)
 
@@ -21,11 +21,8 @@ SPAN = (0.0, 2.0)
 
 def trajectory(wrench: WrenchProfile | None) -> Trajectory:
     """The 3R arm reaches out and stiffens within 2 s."""
-    position = RestToRest(signal=POSITION, span=SPAN, degree=7, start=(0, 0, 0), end=(1.5, 0.7, -1))
-    stiffness = RestToRest(signal=STIFFNESS, span=SPAN, degree=3, start=(850,) * 3, end=(1275,) * 3)
-    return Trajectory(
-        UniformTimes(2.0, 100.0), position, {"stiffness": stiffness}, wrench=wrench, name="reach"
-    )
+    ends = (0, 0, 0), (1.5, 0.7, -1)
+    return move(2.0, 100.0, ends, stiffness=((850,) * 3, (1275,) * 3), wrench=wrench, name="reach")
 
 
 def pushed(frame: str, profile_type: type[RestToRest] = RestToRest) -> Trajectory:
