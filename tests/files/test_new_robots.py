@@ -129,7 +129,7 @@ def test_a_later_joint_explains_what_is_new_about_it() -> None:
 
 
 def test_each_source_of_a_value_is_said_once_of_a_field_that_exists() -> None:
-    text = robot_template("RRRR", ("rigid", "elastic", "serial", "antagonistic"))
+    text = robot_template("R" * len(ACTUATORS), tuple(ACTUATORS))
     said = " ".join(re.sub(r"^.*?# ", "", line) for line in text.splitlines() if "# " in line)
     for field, source in SOURCES.items():
         name, _, key = field.partition(".")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
-from samples.drives import motion as arm_motion
+from samples.moves import move
 from samples.robots import vsa_3r
 from vsacli import Result, Robot, Trajectory, inverse_dynamics
 from vsacli.dynamics.integrated_deflections import IntegratedDeflections, integrate_deflections
@@ -29,12 +30,8 @@ def motion(
     start: tuple[float, float] = (850.0, 850.0), end: tuple[float, float] | None = None, rate: float = 100
 ) -> Trajectory:
     """Rest to rest of base and shoulder, in 2 s."""
-    whole = arm_motion((*start, 1.0), (*(end or start), 1.0), rate=rate)
-    position, stiffness = (
-        dataclasses.replace(profile, start=profile.start[:2], end=profile.end[:2])
-        for profile in (whole.position, whole.commanded["stiffness"])
-    )
-    return Trajectory(whole.times, position, {"stiffness": stiffness}, name="rest-to-rest")
+    ends = (0.0, 0.0), (math.pi / 2, math.pi / 4)
+    return move(2.0, rate, ends, stiffness=(start, end or start), name="rest-to-rest")
 
 
 def integrated(robot: Robot, trajectory: Trajectory, tolerance: float = 1e-12) -> Result:
