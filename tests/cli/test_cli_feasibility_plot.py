@@ -70,7 +70,7 @@ def test_bad_stretches_are_those_of_the_report(vsacli, too_soft, drawn_figures):
 def test_ways_that_end_are_shaded(vsacli, too_soft, drawn_figures):
     followed = ("--deflection-solver", "ode", "--set", "rate=25", "--json")
     done = vsacli("check-feasibility", ROBOT, too_soft, "--plot", "figures", *followed)
-    ends = [joint["stop"]["time"] for joint in json.loads(done.out)["deflections"]["joints"]]
+    ends = [joint["stopped"]["time"] for joint in json.loads(done.out)["deflections"]["joints"]]
     (figure,) = drawn_figures.values()
     for axes, end in zip(figure.axes, ends, strict=True):
         ((start, last),) = shaded(axes)
