@@ -14,7 +14,7 @@ import numpy as np
 from oracles.jets import Scalar, leibniz, matrix_product
 from oracles.kinematics import transform
 from oracles.lagrange import Array, Chain, Derivatives
-from vsacli import Robot
+from vsacli.robot.model import Robot
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from vsacli import Joint, Pose, Robot
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.joint import Joint, Pose
+from vsacli.robot.model import Robot
 
 STEP = 1e-30
 """A complex step has no cancellation, and the square of this one vanishes against 1."""
@@ -21,7 +23,7 @@ def tool_pose(robot: Robot, q: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
     return pose @ transform(robot.tool)
 
 
-def jacobian(robot: Robot, q: np.ndarray) -> np.ndarray:
+def jacobian(robot: Robot, q: FloatArray) -> FloatArray:
     """Velocity of the tool origin, and angular velocity, by joint velocities; base axes, (6, joints)."""
     columns = []
     for unit in np.eye(len(q)):

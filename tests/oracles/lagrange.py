@@ -24,8 +24,8 @@ import numpy.typing as npt
 
 from oracles.jets import Scalar, circle, leibniz, matrix_product
 from oracles.kinematics import transform
-from vsacli import Pose, Robot
-from vsacli.robot.joint import FRAME_0
+from vsacli.robot.joint import FRAME_0, Pose
+from vsacli.robot.model import Robot
 
 Array = npt.NDArray[Any]
 Derivatives = list[Array]

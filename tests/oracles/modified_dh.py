@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from vsacli import DenavitHartenberg, Inertia, Link, Pose, Robot, Tool
-from vsacli.robot.joint import FRAME_0
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.joint import FRAME_0, DenavitHartenberg, Inertia, Link, Pose, Tool
+from vsacli.robot.model import Robot
 
 
 class ModifiedJoint(NamedTuple):
@@ -24,15 +25,15 @@ class ModifiedJoint(NamedTuple):
     d: float
     theta: float
     mass: float
-    com: np.ndarray
-    inertia: np.ndarray
+    com: FloatArray
+    inertia: FloatArray
 
 
 class ModifiedChain:
     """The chain in the Pinocchio library, joint i behind its row at position zero."""
 
     def __init__(
-        self, joints: list[ModifiedJoint], gravity: np.ndarray, base: pin.SE3, tool: pin.SE3
+        self, joints: list[ModifiedJoint], gravity: FloatArray, base: pin.SE3, tool: pin.SE3
     ) -> None:
         self._model = pin.Model()
         self._model.gravity.linear = gravity
@@ -45,12 +46,12 @@ class ModifiedChain:
             placement = pin.SE3.Identity()
         self._data, self._tool = self._model.createData(), tool
 
-    def tool_pose(self, q: np.ndarray) -> np.ndarray:
+    def tool_pose(self, q: FloatArray) -> FloatArray:
         """The tool in the base, (4, 4)."""
         pin.forwardKinematics(self._model, self._data, q)
         return np.array((self._data.oMi[self._model.njoints - 1] * self._tool).homogeneous)
 
-    def torques(self, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+    def torques(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         """tau_e (samples, joints), without damping."""
         rows = zip(q, dq, ddq, strict=True)
         return np.array([pin.rnea(self._model, self._data, *row).copy() for row in rows])

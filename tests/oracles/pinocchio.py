@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from vsacli import DenavitHartenberg, Pose, Robot
-from vsacli.robot.joint import FRAME_0
+from vsacli.base.arrays import FloatArray
+from vsacli.robot.joint import FRAME_0, DenavitHartenberg, Pose
+from vsacli.robot.model import Robot
 
 
 def build(robot: Robot, *, modified: bool = False) -> pin.Model:
@@ -45,7 +46,7 @@ def _link(robot: Robot, index: int, modified: bool = False) -> pin.SE3:
     return pin.SE3.Identity() if modified else _row(robot.joints[index].dh)
 
 
-def torques(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+def torques(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
     """tau_e (samples, joints); Pinocchio's recursion knows no damping, so it is added here."""
     model, damping = build(robot), _damping(robot)
     data = model.createData()
@@ -53,7 +54,7 @@ def torques(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.
     return np.array(rows) + damping * dq
 
 
-def mass_matrices(robot: Robot, q: np.ndarray) -> np.ndarray:
+def mass_matrices(robot: Robot, q: FloatArray) -> FloatArray:
     """M(q), (samples, joints, joints), column by column.
 
     Pinocchio's own composition of M takes the joints of each subtree to have adjacent numbers.
@@ -66,7 +67,7 @@ def mass_matrices(robot: Robot, q: np.ndarray) -> np.ndarray:
     return np.array(rows).swapaxes(1, 2)
 
 
-def torque_regressor(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+def torque_regressor(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
     """Derivatives of tau_e, (samples, joints, 10 joints), by inertial parameters in Pinocchio's frames."""
     model = build(robot)
     data = model.createData()
@@ -74,7 +75,7 @@ def torque_regressor(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarra
     return np.array(rows)
 
 
-def poses(robot: Robot, q: np.ndarray, *, modified: bool = False) -> np.ndarray:
+def poses(robot: Robot, q: FloatArray, *, modified: bool = False) -> FloatArray:
     """Link frames and tool frames in the base frame, (samples, joints + tools, 4, 4)."""
     model = build(robot, modified=modified)
     data = model.createData()
@@ -87,7 +88,7 @@ def poses(robot: Robot, q: np.ndarray, *, modified: bool = False) -> np.ndarray:
     return np.array(rows)
 
 
-def jacobians(robot: Robot, q: np.ndarray, *, in_base: bool, tool: int = 0) -> np.ndarray:
+def jacobians(robot: Robot, q: FloatArray, *, in_base: bool, tool: int = 0) -> FloatArray:
     """Of the origin of a tool, velocity first, (samples, 6, joints), along the axes of base or tool."""
     model = build(robot)
     pose, carrier = _tools(robot)[tool]
@@ -100,12 +101,12 @@ def jacobians(robot: Robot, q: np.ndarray, *, in_base: bool, tool: int = 0) -> n
 
 def torques_under_wrench(
     robot: Robot,
-    motion: tuple[np.ndarray, np.ndarray, np.ndarray],
-    wrench: np.ndarray,
+    motion: tuple[FloatArray, FloatArray, FloatArray],
+    wrench: FloatArray,
     frames: Sequence[str | None],
     *,
     modified: bool = False,
-) -> np.ndarray:
+) -> FloatArray:
     """tau_e (samples, joints) at q, dq, ddq while `wrench`, (samples, 6 tools), is exerted on the tools.
 
     `frames` says for each tool along whose axes its components are, those of "base" or "end_effector".
@@ -132,7 +133,7 @@ def _tools(robot: Robot) -> list[tuple[Pose, int]]:
     return [(tool, names.index(tool.joint)) for tool in robot.tools]
 
 
-def torque_rates(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, d3q: np.ndarray) -> np.ndarray:
+def torque_rates(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray, d3q: FloatArray) -> FloatArray:
     """dtau_e (samples, joints), by the chain rule from Pinocchio's analytical derivatives."""
     model, damping = build(robot), _damping(robot)
     data = model.createData()
@@ -161,5 +162,5 @@ def _pose(pose: Pose) -> pin.SE3:
     return pin.SE3(pin.rpy.rpyToMatrix(*pose.rpy), np.array(pose.xyz))
 
 
-def _damping(robot: Robot) -> np.ndarray:
+def _damping(robot: Robot) -> FloatArray:
     return np.array([joint.damping for joint in robot.joints])

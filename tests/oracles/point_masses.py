@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from oracles.lagrange import Chain, Derivatives
+from vsacli.base.arrays import FloatArray
 
 
 @dataclass(frozen=True)
 class Cloud:
     """Masses (points,) at fixed positions (points, 3) in a link frame."""
 
-    masses: np.ndarray
-    points: np.ndarray
+    masses: FloatArray
+    points: FloatArray
 
     @property
     def mass(self) -> float:
@@ -23,7 +24,7 @@ class Cloud:
         return float(self.masses.sum())
 
     @property
-    def com(self) -> np.ndarray:
+    def com(self) -> FloatArray:
         """Center of mass."""
         return self.masses @ self.points / self.mass
 
@@ -47,7 +48,7 @@ def random_cloud(rng: np.random.Generator, points: int) -> Cloud:
     return Cloud(rng.uniform(0.1, 1, points), rng.uniform((-0.5, -0.2, 0.0), (0.1, 0.3, 0.6), (points, 3)))
 
 
-def torques(chain: Chain, clouds: Sequence[Cloud]) -> np.ndarray:
+def torques(chain: Chain, clouds: Sequence[Cloud]) -> FloatArray:
     """Torques (samples, joints) that drive the clouds, without damping; of the chain only the motion is used.
 
     Each point needs the force m (r'' - g). Its share of a joint's torque is the moment of that force about
@@ -66,8 +67,8 @@ def torques(chain: Chain, clouds: Sequence[Cloud]) -> np.ndarray:
 
 
 def _torque(
-    frame: np.ndarray, revolute: bool, pose: Derivatives, cloud: Cloud, gravity: np.ndarray
-) -> np.ndarray:
+    frame: FloatArray, revolute: bool, pose: Derivatives, cloud: Cloud, gravity: FloatArray
+) -> FloatArray:
     axis, origin = frame[:, None, :3, 2], frame[:, None, :3, 3]
     forces = cloud.masses[:, None] * (_moved(pose[2], cloud.points) - gravity)
     arms = _moved(pose[0], cloud.points) - origin
@@ -75,8 +76,8 @@ def _torque(
     return np.sum(vectors * axis, axis=(1, 2))
 
 
-def _moved(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _moved(pose: FloatArray, points: FloatArray) -> FloatArray:
     """Positions (samples, points, 3) in the base frame, or their derivative if `pose` is that of the pose."""
     homogeneous = np.column_stack([points, np.ones(len(points))])
-    moved: np.ndarray = pose[:, None] @ homogeneous[:, :, None]
+    moved: FloatArray = pose[:, None] @ homogeneous[:, :, None]
     return moved[..., :3, 0]

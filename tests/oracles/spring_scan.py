@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vsacli.base.arrays import BoolArray, FloatArray
+
 STEP = 1e-200
 LARGEST_TORQUE = 1e5
 """N m; what springs without an end are scanned up to."""
@@ -37,12 +39,12 @@ class Curve:
     torque: Callable[[Any], Any]
     ends: tuple[float, float] = (-math.inf, math.inf)
 
-    def stiffness(self, phi: np.ndarray) -> np.ndarray:
+    def stiffness(self, phi: FloatArray) -> FloatArray:
         """Derivative of the torque by a complex step, exact to rounding."""
-        derivative: np.ndarray = self.torque(phi + 1j * STEP).imag / STEP
+        derivative: FloatArray = self.torque(phi + 1j * STEP).imag / STEP
         return derivative
 
-    def deflection(self, torque: np.ndarray) -> np.ndarray:
+    def deflection(self, torque: FloatArray) -> FloatArray:
         """Inverse of the torque; its ends beyond them."""
         phis, torques = self._table
         phi = np.interp(torque, torques, phis)
@@ -64,7 +66,7 @@ class Curve:
         )
 
     @cached_property
-    def _table(self) -> tuple[np.ndarray, np.ndarray]:
+    def _table(self) -> tuple[FloatArray, FloatArray]:
         up, down = self._reach(self.ends[1], 1), self._reach(self.ends[0], -1)
         small = np.geomspace(1e-18, 0.1, 3000)
         shares = np.concatenate((small, np.linspace(0.1, 0.9, 3000)[1:-1], 1 - small[:1000:-1], [1.0]))
@@ -131,7 +133,7 @@ class Springs:
     first: Curve
     second: Curve
 
-    def stiffness(self, tau_1: np.ndarray, tau_e: float | np.ndarray) -> np.ndarray:
+    def stiffness(self, tau_1: FloatArray, tau_e: float | FloatArray) -> FloatArray:
         """Joint stiffness where side 1 has a torque and side 2 the rest."""
         phi_1, phi_2 = self.first.deflection(tau_1), self.second.deflection(tau_e - tau_1)
         return self.first.stiffness(phi_1) + self.second.stiffness(phi_2)
@@ -152,7 +154,7 @@ class Springs:
             return Corridor(inner, math.inf)
         return Corridor(min(outer, inner), max(outer, inner))
 
-    def _monotone_piece(self, nodes: np.ndarray, tau_e: float) -> tuple[float, float]:
+    def _monotone_piece(self, nodes: FloatArray, tau_e: float) -> tuple[float, float]:
         """Stiffness at the outer and the inner end, scanned ever finer where it turns around."""
         values = self.stiffness(nodes, tau_e)
         outer, sign = values[0], 0.0
@@ -169,7 +171,7 @@ class Springs:
             values = self.stiffness(nodes, tau_e)
         return float(outer), float(values.min() if sign < 0 else values.max())
 
-    def on_branch(self, tau_1: np.ndarray, tau_e: np.ndarray, nodes: int) -> np.ndarray:
+    def on_branch(self, tau_1: FloatArray, tau_e: FloatArray, nodes: int) -> BoolArray:
         """Whether the stiffness is monotone from a torque of side 1 to the largest preload; (samples,)."""
         shares = np.unique(np.concatenate((np.geomspace(1e-6, 1, nodes), np.linspace(0, 1, nodes))))[:, None]
         (_, high_1), (low_2, _) = self.first.torque_ends, self.second.torque_ends
@@ -177,11 +179,11 @@ class Springs:
         values = self.stiffness(tau_1 + shares * (largest - tau_1), tau_e)
         change = np.diff(values, axis=0)
         rounding = ROUNDING * values[1:]
-        monotone: np.ndarray = np.all(change >= -rounding, axis=0) | np.all(change <= rounding, axis=0)
+        monotone: BoolArray = np.all(change >= -rounding, axis=0) | np.all(change <= rounding, axis=0)
         return monotone
 
 
-def _nodes(tau_e: float, least: float, largest: float) -> np.ndarray:
+def _nodes(tau_e: float, least: float, largest: float) -> FloatArray:
     """Torques of side 1 from the largest to the least, dense where a side is relaxed."""
     size = max(abs(tau_e), 1.0)
     near = size * np.geomspace(1e-13, 4, 700)

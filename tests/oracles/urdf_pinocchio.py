@@ -10,6 +10,8 @@ from typing import TypeAlias
 import numpy as np
 import pinocchio as pin
 
+from vsacli.base.arrays import FloatArray
+
 Held: TypeAlias = Mapping[str, float]
 NOWHERE: Held = {}
 
@@ -30,8 +32,8 @@ class UrdfOracle:
         }
 
     def tip_pose(
-        self, joints: Sequence[str], base: str, tip: str, q: np.ndarray, held: Held = NOWHERE
-    ) -> np.ndarray:
+        self, joints: Sequence[str], base: str, tip: str, q: FloatArray, held: Held = NOWHERE
+    ) -> FloatArray:
         """The pose of one link in another, (4, 4), at the positions of the joints."""
         pin.framesForwardKinematics(self._model, self._data, self._configuration(joints, q, held))
         base_pose, tip_pose = (self._data.oMf[self._model.getFrameId(link, pin.BODY)] for link in (base, tip))
@@ -40,11 +42,11 @@ class UrdfOracle:
     def torques(
         self,
         joints: Sequence[str],
-        q: np.ndarray,
-        dq: np.ndarray,
-        ddq: np.ndarray,
+        q: FloatArray,
+        dq: FloatArray,
+        ddq: FloatArray,
         held: Held = NOWHERE,
-    ) -> np.ndarray:
+    ) -> FloatArray:
         """Torques of the joints without damping, (joints,), gravity along -z of the root link."""
         columns = [self._joint(name).idx_v for name in joints]
         rates = np.zeros((2, self._model.nv))
@@ -52,7 +54,7 @@ class UrdfOracle:
         torques = pin.rnea(self._model, self._data, self._configuration(joints, q, held), *rates)
         return np.array(torques[columns])
 
-    def _configuration(self, joints: Sequence[str], q: np.ndarray, held: Held) -> np.ndarray:
+    def _configuration(self, joints: Sequence[str], q: FloatArray, held: Held) -> FloatArray:
         """An unbounded revolute joint has the cosine and sine of its angle as configuration."""
         configuration = pin.neutral(self._model)
         known = {**held, **dict(zip(joints, q, strict=True))}

@@ -229,7 +229,7 @@ def test_a_refused_export_leaves_no_file(stored, block, tmp_path):
 
 FULL = """
 import resource
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.outputs import Outputs
 from vsacli.results.exports.formats import CSV
 from vsacli.results.exports.result_format import export_result

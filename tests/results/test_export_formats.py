@@ -227,7 +227,7 @@ def test_the_times_alone(stored, name):
 
 FULL = """
 import io, resource, sys
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.outputs import Outputs
 from vsacli.results.exports import FORMATS
 from vsacli.results.exports.result_format import export_result

@@ -28,7 +28,7 @@ SECONDS = 30
 
 READER = """
 import resource, sys
-from vsacli.base.errors import InputError, StorageError
+from vsacli import InputError, StorageError
 from vsacli.files.info import describe_file, render
 from vsacli.files.validation import check_files
 

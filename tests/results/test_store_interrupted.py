@@ -33,7 +33,7 @@ with writing("r.h5", robot(), PlannedTrajectory(10**7), overwrite=True) as write
 LIMITED = """
 import resource, sys
 from samples.results import random_block, write_result
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.interrupts import interrupts_deferred
 
 from vsacli.results.store import new_file

@@ -286,7 +286,7 @@ import numpy as np
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.base.signals import POSITION
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli import Trajectory
 times = UniformTimes(7.0, 1.0)
 still = ConstantProfile(signal=POSITION, span=times.span, value=(0.0,))
 closed = Trajectory(times, still, {}, name="still")
