@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import gc
 import io
+import os
 import signal
+import tempfile
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +16,7 @@ from pathlib import Path
 import pytest
 from samples.command_line import ROBOT, Outcome, rest_to_rest
 from samples.marks import spread
+from samples.system_errors import fail_with
 
 from vsacli.cli.main import run
 
@@ -47,6 +51,42 @@ def _interrupts() -> None:
     """A shell has what it starts in the background ignore Ctrl-C, which some tests send."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture
+def before_system_call(monkeypatch: pytest.MonkeyPatch) -> Callable[[str, Callable[..., object]], None]:
+    """Have a function called before each call of one of `os`; what it raises is the error of the system."""
+
+    def watch(name: str, function: Callable[..., object]) -> None:
+        genuine = getattr(os, name)
+
+        def call(*arguments: object, **options: object) -> object:
+            function(*arguments)
+            return genuine(*arguments, **options)
+
+        monkeypatch.setattr(os, name, call)
+
+    return watch
+
+
+@pytest.fixture
+def no_hard_links(before_system_call: Callable[[str, Callable[..., object]], None]) -> None:
+    """A file system whose files have one name each."""
+    before_system_call("link", fail_with(errno.EPERM))
+
+
+@pytest.fixture(params=[True, False], ids=["hard links", "no hard links"])
+def links(request: pytest.FixtureRequest) -> bool:
+    """Whether a file of the file system may have several names."""
+    if not request.param:
+        request.getfixturevalue("no_hard_links")
+    return bool(request.param)
+
+
+@pytest.fixture
+def temporary_files(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path | str], None]:
+    """Set the folder for temporary files."""
+    return lambda folder: monkeypatch.setattr(tempfile, "tempdir", str(folder))
 
 
 @pytest.fixture

@@ -15,8 +15,7 @@ from samples.defined_names import defined_twice, share_of_empty_words
 from samples.python_processes import run_python
 from samples.sources import PACKAGE, SOURCES, contents, parsed
 
-from vsacli import load_robot, load_trajectory
-from vsacli.dynamics.inverse import motor_torques
+from vsacli import load_robot, load_trajectory, motor_torques
 
 REPOSITORY = Path(__file__).parents[1]
 ROW = re.compile(r"^\| `(?P<entry>\w+(?:\.\w+)?)` \| .+ \|$", re.MULTILINE)

@@ -7,11 +7,9 @@ import importlib
 import inspect
 import re
 
-import pytest
 from samples.command_line import REPOSITORY
 
-from vsacli import laws, load_robot
-from vsacli.actuators.motor import Motor
+from vsacli import Limits, Motor, laws, load_robot
 from vsacli.dynamics import limits
 from vsacli.results.store.reader import RANGES, SIZES
 from vsacli.studies.search import fixed_text
@@ -26,10 +24,15 @@ NO_PARTS = {"sequence", "constant", "csv"}
 """Types of positions that a sequence does not contain: itself, what `dwell` does, and recordings."""
 
 
-def test_figures_draw_every_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All limits of a joint with a damper, finite or not."""
-    monkeypatch.setattr(limits.math, "isfinite", lambda _: True)
-    robot = load_robot(REPOSITORY / "robots" / "maccepa_vd_1r.yaml")
+def test_figures_draw_every_limit() -> None:
+    """All limits of joints with a damper, motors with windings, and springs."""
+    bounds = {f"limits.{field.name}": 10 for field in dataclasses.fields(Limits)}
+    of_motors = [field.name for field in dataclasses.fields(Motor) if field.name.startswith("max_")]
+    bounds |= {f"actuator.motor.{name}": 10 for name in ("torque_constant", "resistance", *of_motors)}
+    bounds |= {"actuator.motor.gear_ratio": 1, "actuator.motor.side": "joint"}
+    bounds |= {"actuator.spring.max_deflection": 1, "damper": {"location": "link", "range": [0, 1]}}
+    robot = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")
+    robot = robot.replace({f"joints.*.{path}": value for path, value in bounds.items()})
     checked = {check.variable for joint in robot.joints for check in limits.limit_checks(joint)}
     assert checked == RANGES.keys() | SIZES.keys()
 

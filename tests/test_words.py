@@ -12,7 +12,7 @@ import command_pages
 import pytest
 from samples.sources import PACKAGE, SOURCES, contents
 
-from vsacli.base.flags import Flag
+from vsacli import Flag
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES
 from vsacli.cli.console import Exit

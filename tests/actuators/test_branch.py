@@ -9,30 +9,28 @@ from samples.drives import Stopped
 from samples.marks import exhaustive
 from samples.springs import residuals, stiffness_under
 
-from vsacli.actuators.laws import Cubic, PairSolution
-from vsacli.actuators.pairs import make_pair
-from vsacli.base.arrays import FloatArray
+from vsacli import laws
 
 EPS = float(np.finfo(float).eps)
-K_440 = (Cubic(k=400, k_c=2000), Cubic(k=440, k_c=2000))
+K_440 = (laws.Cubic(k=400, k_c=2000), laws.Cubic(k=440, k_c=2000))
 """A pair whose sides differ by a tenth."""
 
-Springs = tuple[Cubic, Cubic]
+Springs = tuple[laws.Cubic, laws.Cubic]
 
 
-def fold_load(spring: Cubic) -> float:
+def fold_load(spring: laws.Cubic) -> float:
     """Load beyond which two such springs fold at deflections that differ, (8/3) K sqrt(K/(3 Kc))."""
     return float(8 / 3 * spring.k * np.sqrt(spring.k / (3 * spring.k_c)))
 
 
-def solve(springs: Springs, tau_e: float, stiffness: float) -> PairSolution:
-    return make_pair(*springs).solve(np.array([tau_e]), np.array([stiffness]))
+def solve(springs: Springs, tau_e: float, stiffness: float) -> laws.PairSolution:
+    return laws.make_pair(*springs).solve(np.array([tau_e]), np.array([stiffness]))
 
 
 def random_springs(rng: np.random.Generator, decades: float) -> Springs:
     """Constants about those of Table I, spread over that many decades to either side."""
     constants = np.array([[400, 2000], [400, 2000]]) * 10 ** rng.uniform(-decades, decades, (2, 2))
-    first, second = (Cubic(k=float(k), k_c=float(k_c)) for k, k_c in constants)
+    first, second = (laws.Cubic(k=float(k), k_c=float(k_c)) for k, k_c in constants)
     return first, second
 
 
@@ -82,7 +80,7 @@ def test_outermost_of_two_solutions_with_the_same_sign_of_the_determinant():
 
 def test_lower_end_jumps_where_the_outermost_piece_splits():
     tau_e = np.linspace(250, 450, 2001)
-    lower = make_pair(*K_440).solve(tau_e, np.full_like(tau_e, 3000.0)).lower
+    lower = laws.make_pair(*K_440).solve(tau_e, np.full_like(tau_e, 3000.0)).lower
     jump = np.diff(lower).argmax()
     others = np.delete(np.diff(lower), jump)
     assert np.diff(lower)[jump] > 20 * others.max()
@@ -155,26 +153,26 @@ def test_piece_may_end_at_a_stop(tau_e: float, hardening: float):
 # Samples one by one
 
 
-def samples_of(springs: Springs, count: int) -> tuple[FloatArray, FloatArray]:
+def samples_of(springs: Springs, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Loads of any size, zero among them, and stiffness within and below reach."""
     rng = np.random.default_rng(8)
     tau_e = rng.uniform(-20, 20, count) * fold_load(springs[0]) * 10 ** rng.uniform(-6, 0, count)
     tau_e[::50] = 0
-    lower = make_pair(*springs).solve(tau_e, np.ones_like(tau_e)).lower
+    lower = laws.make_pair(*springs).solve(tau_e, np.ones_like(tau_e)).lower
     return tau_e, lower * (1 + rng.uniform(-0.2, 1, count))
 
 
 @pytest.mark.parametrize(
-    "second", [Cubic(k=400, k_c=2000), Cubic(k=440, k_c=2000), Cubic(k=90, k_c=9000)], ids=str
+    "second", [laws.Cubic(k=400, k_c=2000), laws.Cubic(k=440, k_c=2000), laws.Cubic(k=90, k_c=9000)], ids=str
 )
-def test_a_sample_knows_nothing_of_its_neighbors(second: Cubic):
-    pair = make_pair(Cubic(k=400, k_c=2000), second)
-    tau_e, stiffness = samples_of((Cubic(k=400, k_c=2000), second), 600)
+def test_a_sample_knows_nothing_of_its_neighbors(second: laws.Cubic):
+    pair = laws.make_pair(laws.Cubic(k=400, k_c=2000), second)
+    tau_e, stiffness = samples_of((laws.Cubic(k=400, k_c=2000), second), 600)
     whole = pair.solve(tau_e, stiffness)
     order = np.random.default_rng(0).permutation(600)
     shuffled = pair.solve(tau_e[order], stiffness[order])
     parts = [pair.solve(tau_e[cut], stiffness[cut]) for cut in (slice(0, 1), slice(1, 8), slice(8, 600))]
-    for name in PairSolution._fields:
+    for name in laws.PairSolution._fields:
         expected = getattr(whole, name)
         np.testing.assert_array_equal(getattr(shuffled, name), expected[order])
         np.testing.assert_array_equal(np.concatenate([getattr(part, name) for part in parts]), expected)
@@ -182,7 +180,7 @@ def test_a_sample_knows_nothing_of_its_neighbors(second: Cubic):
 
 def test_no_samples_are_no_problem():
     for springs in (K_440, (K_440[0], K_440[0])):
-        assert all(array.shape == (0,) for array in make_pair(*springs).solve(np.empty(0), np.empty(0)))
+        assert all(array.shape == (0,) for array in laws.make_pair(*springs).solve(np.empty(0), np.empty(0)))
 
 
 def test_below_reach_the_deflections_are_those_of_the_end():
@@ -202,7 +200,7 @@ def test_any_load_and_stiffness_is_solved_to_rounding(decades: float):
         springs = random_springs(rng, decades)
         signs, sizes = rng.choice([-1, 1], 100), 10 ** rng.uniform(-6, 2, 100)
         tau_e = signs * sizes * fold_load(springs[0])
-        pair = make_pair(*springs)
+        pair = laws.make_pair(*springs)
         lower = pair.solve(tau_e, np.ones_like(tau_e)).lower
         stiffness = lower * (1 + 10 ** rng.uniform(-6, 3, 100))
         # 1e-12, as documented; constants a hundred times off use up two or three digits of it.
@@ -215,18 +213,20 @@ def test_absurd_springs_and_loads_give_numbers(pairs: int):
     rng = np.random.default_rng(1)
     sizes = np.concatenate([10 ** rng.uniform(-3, 6, 30), [1e-300, 1e-200, 1e-100, 1e-30, 1e-15, 0]])
     for _ in range(pairs):
-        first, second = (Cubic(k=10 ** rng.uniform(-3, 6), k_c=10 ** rng.uniform(-3, 9)) for _ in range(2))
+        first, second = (
+            laws.Cubic(k=10 ** rng.uniform(-3, 6), k_c=10 ** rng.uniform(-3, 9)) for _ in range(2)
+        )
         tau_e = rng.choice([-1, 1], sizes.size) * sizes
         stiffness = (first.k + second.k) * 10 ** rng.uniform(-6, 6, sizes.size)
         for springs in ((first, first), (first, second)):
-            found = make_pair(*springs).solve(tau_e, stiffness)
+            found = laws.make_pair(*springs).solve(tau_e, stiffness)
             assert np.all(np.isfinite([found.lower, found.phi_1, found.phi_2]))
             # Rounding of the smaller stiffness in the sum.
             assert np.all(found.lower >= (springs[0].k + springs[1].k) * (1 - 4 * EPS))
 
 
 def test_unloaded_springs_are_softest_without_deflection():
-    found = make_pair(*K_440).solve(np.array([0.0, -0.0, 1e-300, -1e-300]), np.full(4, 1000.0))
+    found = laws.make_pair(*K_440).solve(np.array([0.0, -0.0, 1e-300, -1e-300]), np.full(4, 1000.0))
     np.testing.assert_array_equal(found.lower, 840)
     assert np.all(found.lower_critical)
     assert np.all(found.phi_1 > 0)

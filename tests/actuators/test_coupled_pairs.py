@@ -11,11 +11,7 @@ from samples.full_model import Drive, springs_of
 from samples.law_energies import SAMPLES
 from samples.marks import needs_compiler, slow_but
 
-from vsacli import inverse_dynamics
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws import Cubic, Exponential, Polynomial, SpringLaw
-from vsacli.actuators.motor import Motor
-from vsacli.base.errors import InvalidRecordError
+from vsacli import Antagonistic, InputError, Motor, inverse_dynamics, laws
 
 MOTOR = Motor(inertia=0.2, damping=0.1)
 RANGE = (290.0, 340.0)
@@ -24,7 +20,7 @@ RANGE = (290.0, 340.0)
 COUPLINGS = ("cubic", "polynomial", "sinh")
 
 
-def pair(coupling: SpringLaw | None, branch: str = "positive") -> Antagonistic:
+def pair(coupling: laws.SpringLaw | None, branch: str = "positive") -> Antagonistic:
     return Antagonistic(
         motor=(MOTOR, MOTOR), spring=(SAMPLES["cubic"].law,) * 2, coupling=coupling, branch=branch
     )
@@ -68,7 +64,7 @@ def test_the_work_of_the_motors_is_what_all_springs_and_the_rest_take() -> None:
     """From rest to rest without damping or gravity, it is all in the springs."""
     law = SAMPLES["sinh"].law
     motor = Motor(inertia=0.2)
-    actuator = Antagonistic(motor=(motor, motor), spring=(Cubic(k=60, k_c=900),) * 2, coupling=law)
+    actuator = Antagonistic(motor=(motor, motor), spring=(laws.Cubic(k=60, k_c=900),) * 2, coupling=law)
     arm = dataclasses.replace(LINK, damping=[0.0], gravity=0.0)
     result = inverse_dynamics(robot_of(arm, [actuator]), motion_of([RANGE]))
     work = result.motor_energy[-1].sum()
@@ -93,11 +89,17 @@ def test_the_compiled_engine_agrees() -> None:
 @pytest.mark.parametrize(
     ("coupling", "message"),
     [
-        (Exponential(c=1, a=2), "coupling: holds from 0 to inf only, but the motors may be any distance"),
+        (
+            laws.Exponential(c=1, a=2),
+            "coupling: holds from 0 to inf only, but the motors may be any distance",
+        ),
         (SAMPLES["table"].law, "coupling: holds from -0.6 to 0.6 only, but the motors may be any distance"),
-        (Polynomial(c1=2, max_deflection=1), "coupling.max_deflection: is not known of a spring between"),
+        (
+            laws.Polynomial(c1=2, max_deflection=1),
+            "coupling.max_deflection: is not known of a spring between",
+        ),
     ],
 )
-def test_a_coupling_has_no_end(coupling: SpringLaw, message: str) -> None:
-    with pytest.raises(InvalidRecordError, match=message):
+def test_a_coupling_has_no_end(coupling: laws.SpringLaw, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         pair(coupling)

@@ -11,11 +11,19 @@ from samples.full_model import Drive
 from samples.mechanisms import DAMPING, DEVICES, INERTIA
 from scipy.integrate import simpson
 
-from vsacli import Gains, InitialError, Result, State, inverse_dynamics, simulate, state_derivative
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.actuators.serial import Serial
-from vsacli.base.errors import InvalidRecordError
+from vsacli import (
+    Gains,
+    InitialError,
+    InputError,
+    Motor,
+    Result,
+    Rigid,
+    Serial,
+    State,
+    inverse_dynamics,
+    simulate,
+    state_derivative,
+)
 
 DEVICE = DEVICES["awas"]
 COUPLING = -0.05
@@ -51,7 +59,7 @@ def test_gear_ratios_reflect_it_with_their_signs() -> None:
 
 @pytest.mark.parametrize("coupling", [0.08, -0.08, np.sqrt(0.3 * 0.02)])
 def test_an_inertia_that_no_rotors_have_is_refused(coupling: float) -> None:
-    with pytest.raises(InvalidRecordError, match=r"coupled_inertia: is .* positive definite"):
+    with pytest.raises(InputError, match=r"coupled_inertia: is .* positive definite"):
         dataclasses.replace(DEVICE.actuator, coupled_inertia=coupling)
 
 

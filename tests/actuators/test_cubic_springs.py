@@ -9,21 +9,21 @@ import pytest
 from samples.springs import residuals
 from scipy.optimize import brentq
 
-from vsacli.actuators.laws.cubic import Cubic, CubicTwins
-from vsacli.actuators.pairs import make_pair
+from vsacli import InputError, laws
+from vsacli.actuators.laws.cubic import CubicTwins
 from vsacli.actuators.pairs.solver import IteratedPair
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
 
 EPS = float(np.finfo(float).eps)
-SPRING = Cubic(k=400, k_c=2000)
+SPRING = laws.Cubic(k=400, k_c=2000)
 FOLD_LOAD = 8 / 3 * 400 * math.sqrt(400 / 6000)
 """275.4 N m: beyond it the springs of Table I fold at deflections that differ."""
 
-cubics = pytest.mark.parametrize("spring", [SPRING, Cubic(k=1e-3, k_c=1e9), Cubic(k=1e6, k_c=1e-3)], ids=str)
+cubics = pytest.mark.parametrize(
+    "spring", [SPRING, laws.Cubic(k=1e-3, k_c=1e9), laws.Cubic(k=1e6, k_c=1e-3)], ids=str
+)
 
 
-def loads_and_demands(count: int, least_margin: float) -> tuple[FloatArray, FloatArray]:
+def loads_and_demands(count: int, least_margin: float) -> tuple[np.ndarray, np.ndarray]:
     """Loads up to 20 times the fold load, and stiffness from that margin on to 30 times the lowest."""
     rng = np.random.default_rng(4)
     tau_e = rng.choice([-1, 1], count) * FOLD_LOAD * 10 ** rng.uniform(-4, math.log10(20), count)
@@ -31,7 +31,7 @@ def loads_and_demands(count: int, least_margin: float) -> tuple[FloatArray, Floa
     return tau_e, lower / (1 - 10 ** rng.uniform(math.log10(least_margin), math.log10(0.97), count))
 
 
-def lowest_stiffness(tau_e: FloatArray) -> FloatArray:
+def lowest_stiffness(tau_e: np.ndarray) -> np.ndarray:
     """End of the corridor of Table I's springs, the half deflection by bracketing instead of the inverse."""
     k, k_c = SPRING.k, SPRING.k_c
 
@@ -48,7 +48,7 @@ def lowest_stiffness(tau_e: FloatArray) -> FloatArray:
 
 
 @cubics
-def test_derivatives_are_those_of_the_torque(spring: Cubic):
+def test_derivatives_are_those_of_the_torque(spring: laws.Cubic):
     phi = np.concatenate([-np.geomspace(1e-6, 10, 50), [0], np.geomspace(1e-6, 10, 50)])
     step = 1e-150  # its square vanishes, so that a complex step has no truncation error
     for function, derivative in [
@@ -63,7 +63,7 @@ def test_derivatives_are_those_of_the_torque(spring: Cubic):
 
 
 @cubics
-def test_deflection_inverts_the_torque(spring: Cubic):
+def test_deflection_inverts_the_torque(spring: laws.Cubic):
     torque = np.concatenate([-np.geomspace(1e-12, 1e9, 43), [0], np.geomspace(1e-12, 1e9, 43)])
     found = spring.deflection(torque)
     expected = [
@@ -90,18 +90,18 @@ def test_deflection_keeps_its_digits_at_the_smallest_torques():
 @pytest.mark.parametrize(("k", "k_c"), [(0, 2000), (-400, 2000), (400, 0), (400, math.inf), (math.nan, 2000)])
 def test_constants_must_be_positive(k: float, k_c: float):
     with pytest.raises(InputError, match="must be positive"):
-        Cubic(k=k, k_c=k_c)
+        laws.Cubic(k=k, k_c=k_c)
 
 
 # Two alike
 
 
 def test_closed_form_is_chosen_for_twins_only():
-    assert isinstance(make_pair(SPRING, Cubic(k=400, k_c=2000)), CubicTwins)
+    assert isinstance(laws.make_pair(SPRING, laws.Cubic(k=400, k_c=2000)), CubicTwins)
     # The limit plays no part in (14).
-    assert isinstance(make_pair(SPRING, Cubic(k=400, k_c=2000, max_deflection=0.3)), CubicTwins)
-    assert isinstance(make_pair(SPRING, Cubic(k=400, k_c=2001)), IteratedPair)
-    assert isinstance(make_pair(SPRING, Cubic(k=401, k_c=2000)), IteratedPair)
+    assert isinstance(laws.make_pair(SPRING, laws.Cubic(k=400, k_c=2000, max_deflection=0.3)), CubicTwins)
+    assert isinstance(laws.make_pair(SPRING, laws.Cubic(k=400, k_c=2001)), IteratedPair)
+    assert isinstance(laws.make_pair(SPRING, laws.Cubic(k=401, k_c=2000)), IteratedPair)
 
 
 def test_closed_form_is_what_iteration_finds():

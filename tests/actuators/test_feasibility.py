@@ -19,36 +19,30 @@ from samples.drives import (
 )
 from samples.robots import vsa_3r
 
-from vsacli import inverse_dynamics
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.laws.tendons import Quadratic
-from vsacli.actuators.motor import Motor
+from vsacli import Antagonistic, Flag, InputError, Joint, Limits, Motor, inverse_dynamics, laws, mechanisms
 from vsacli.actuators.reach import margin, reach_flags
 from vsacli.actuators.transmission import JointVariables
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.base.flags import LIMITS, MIN_MARGIN, Flag
+from vsacli.base.flags import LIMITS, MIN_MARGIN
 from vsacli.dynamics.drive import drive
-from vsacli.robot.joint import Joint, Limits
 
 MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "det_A")
 LOST_AT_A_FOLD = ("dphi", "dtheta", "ddtheta", "tau_motor")
 
 
-def flags_of(joint: Joint, **given: FloatArray | float) -> list[Flag]:
+def flags_of(joint: Joint, **given: np.ndarray | float) -> list[Flag]:
     return [Flag(int(bits)) for bits in drive(joint, command(**given)).flags]
 
 
-def corridor(lower: float, upper: float, *, critical: bool = True, slack: bool = False) -> PairSolution:
+def corridor(
+    lower: float, upper: float, *, critical: bool = True, slack: bool = False
+) -> mechanisms.PairSolution:
     """A corridor both ends of which are critical points, or neither is."""
     ends = np.array([lower]), np.array([upper]), np.array([critical]), np.array([critical])
-    return PairSolution(*ends, np.array([slack]), np.zeros(1), np.zeros(1))
+    return mechanisms.PairSolution(*ends, np.array([slack]), np.zeros(1), np.zeros(1))
 
 
-def reach(stiffness: float, solution: PairSolution) -> Flag:
+def reach(stiffness: float, solution: mechanisms.PairSolution) -> Flag:
     return Flag(int(reach_flags(np.array([stiffness]), solution)[0]))
 
 
@@ -119,7 +113,7 @@ def test_threshold_must_be_a_margin(threshold: float):
 # What is NaN
 
 
-def values_of(driven: JointVariables, name: str) -> FloatArray:
+def values_of(driven: JointVariables, name: str) -> np.ndarray:
     """(samples, ...) of a variable of the motors."""
     return np.moveaxis(getattr(driven, name), -1, 0)
 
@@ -209,10 +203,10 @@ def test_limits_of_a_side_are_its_own(side: int, variable: str, limit: str, bit:
         float(getattr(drive(joint_with(springs(ALIKE, ALIKE)), command(**asked)), variable)[side, 0])
     )
     for factor, expected in [(1.0, Flag(0)), (1 + 1e-6, Flag(0)), (1 - 1e-6, bit)]:
-        motors, laws = [Motor(inertia=3, damping=0.1)] * 2, [ALIKE] * 2
-        parts = laws if limit == "max_deflection" else motors
+        motors, sides = [Motor(inertia=3, damping=0.1)] * 2, [ALIKE] * 2
+        parts = sides if limit == "max_deflection" else motors
         parts[side] = dataclasses.replace(parts[side], **{limit: factor * reached})
-        actuator = Antagonistic(motor=(motors[0], motors[1]), spring=(laws[0], laws[1]))
+        actuator = Antagonistic(motor=(motors[0], motors[1]), spring=(sides[0], sides[1]))
         assert flags_of(joint_with(actuator), **asked) == [expected]
 
 
@@ -224,12 +218,12 @@ def test_running_along_a_limit_is_within_it():
 
 
 def test_limits_do_not_flag_what_does_not_exist():
-    actuator = springs(*[Cubic(k=400, k_c=2000, max_deflection=1e-6)] * 2)
+    actuator = springs(*[laws.Cubic(k=400, k_c=2000, max_deflection=1e-6)] * 2)
     assert flags_of(joint_with(actuator), stiffness=700.0) == [Flag.INFEASIBLE]
 
 
 def test_limits_do_not_move_the_corridor():
-    limited = springs(*[Cubic(k=400, k_c=2000, max_deflection=1e-3)] * 2)
+    limited = springs(*[laws.Cubic(k=400, k_c=2000, max_deflection=1e-3)] * 2)
     for name in ("phi", "tau_motor", "stiffness_min", "stiffness_max"):
         free, held = (drive(joint_with(each), command(tau_e=20.0)) for each in (None, limited))
         if name != "tau_motor":
@@ -239,7 +233,7 @@ def test_limits_do_not_move_the_corridor():
 
 
 def test_the_deflection_limit_of_a_tendon_holds_on_both_sides():
-    actuator = springs(*[Quadratic(k=1000, max_deflection=0.1)] * 2)
+    actuator = springs(*[laws.Quadratic(k=1000, max_deflection=0.1)] * 2)
     found = drive(joint_with(actuator), command(stiffness=1000.0))  # 2 k |phi| on either side
     np.testing.assert_allclose(found.phi[:, 0], [0.25, -0.25], rtol=1e-12)
     checks = [check.motor for check in actuator.limits if check.flag is Flag.DEFLECTION_LIMIT]
@@ -253,7 +247,7 @@ def test_the_deflection_limit_of_a_tendon_holds_on_both_sides():
 
 def test_other_branch_may_reach_less_stiffness_under_heavy_load():
     """Beyond the load at which the inner piece splits off, the two branches end at different folds."""
-    unlike = springs(ALIKE, Cubic(k=440, k_c=2000))
+    unlike = springs(ALIKE, laws.Cubic(k=440, k_c=2000))
     tau_e = np.array([100.0, 400.0])
     lower = lower_by_branch(joint_with(unlike), tau_e)
     # Below that load both end at the only fold; a root finder each.

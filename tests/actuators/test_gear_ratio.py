@@ -11,13 +11,17 @@ import h5py
 import numpy as np
 import pytest
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
-from vsacli.actuators.motor import Motor
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError, InvalidRecordError
-from vsacli.dynamics.forward import State, state_derivative
-from vsacli.results.store.reader import StoredResult
-from vsacli.robot.model import Robot
+from vsacli import (
+    InputError,
+    Motor,
+    Robot,
+    State,
+    inverse_dynamics,
+    load_robot,
+    load_trajectory,
+    open_result,
+    state_derivative,
+)
 
 HEAD = "format: vsacli-robot/1\nname: rig\njoints:\n"
 JOINT = """\
@@ -73,13 +77,13 @@ def rig(motors: list[str], name: str = "rig.yaml") -> Robot:
     return load_robot(name)
 
 
-def columns(path: str) -> dict[str, FloatArray]:
+def columns(path: str) -> dict[str, np.ndarray]:
     with Path(path).open() as file:
         header, *rows = csv.reader(file)
     return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
 
 
-def same(found: FloatArray, expected: FloatArray) -> None:
+def same(found: np.ndarray, expected: np.ndarray) -> None:
     scale = np.nanmax(np.abs(expected), initial=0)
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING * scale)
 
@@ -104,7 +108,7 @@ def test_accelerations_are_those_of_the_motor_on_the_joint_side():
         same(geared, reflected)
 
 
-def exported(vsacli: Callable[..., Any], *options: str) -> dict[str, FloatArray]:
+def exported(vsacli: Callable[..., Any], *options: str) -> dict[str, np.ndarray]:
     """Columns of a result of the geared rig."""
     rig(SHAFT)
     assert vsacli("invdyn", "rig.yaml", "move.yaml", "-o", "result.h5", "--overwrite").code in (0, 3)
@@ -180,7 +184,7 @@ def test_a_robot_with_single_motors_stores_its_ratios_too(vsacli: Callable[..., 
     vsacli("invdyn", "rig.yaml", "move.yaml", "-o", "result.h5")
     assert vsacli("export", "result.h5", "-o", "joint.csv").code == 0
     assert vsacli("export", "result.h5", "-o", "motor.csv", "--side", "motor").code == 0
-    with StoredResult.open("result.h5") as result:
+    with open_result("result.h5") as result:
         np.testing.assert_array_equal(result.gear_ratio, [[20, np.nan]])
     same(20 * columns("motor.csv")["a.tau_motor_shaft_1"], columns("joint.csv")["a.tau_motor_1"])
 
@@ -215,5 +219,5 @@ def test_a_motor_knows_both_sides():
     motor = Motor(inertia=0.01, gear_ratio=-100, side="shaft")
     assert (motor.inertia, motor.at_joint.inertia) == (0.01, pytest.approx(100))
     assert motor.at_joint.max_torque == np.inf
-    with pytest.raises(InvalidRecordError, match="Motor: gear_ratio: must be finite and not zero, not nan"):
+    with pytest.raises(InputError, match="Motor: gear_ratio: must be finite and not zero, not nan"):
         Motor(inertia=0.01, gear_ratio=float("nan"))

@@ -16,12 +16,8 @@ from samples.excited import Excitation, excited
 from samples.marks import slow
 from samples.shipped import shipped_robot, shipped_run
 
-from vsacli import Motor, identify, inverse_dynamics, load_robot, simulate
-from vsacli.actuators.friction import Friction
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError, InvalidRecordError
+from vsacli import Friction, InputError, Motor, Robot, identify, inverse_dynamics, load_robot, simulate
 from vsacli.files.file_kinds import DOCUMENTS
-from vsacli.robot.model import Robot
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.urdf import urdf_model
 from vsacli.robot.parameters import parameters
@@ -74,7 +70,7 @@ def both_ways(robot: Robot, **windings: float) -> tuple[Robot, Robot]:
     return ways[0], ways[1]
 
 
-def same(found: FloatArray, expected: FloatArray) -> None:
+def same(found: np.ndarray, expected: np.ndarray) -> None:
     peak = np.nanmax(np.abs(expected), initial=0)
     np.testing.assert_allclose(found, expected, rtol=0, atol=TOLERANCE * peak)
 
@@ -213,7 +209,7 @@ def test_without_a_side_both_readings_are_shown(kind, motor, message, tmp_path):
 
 
 def test_without_a_side_python_says_the_same_with_both_units():
-    with pytest.raises(InvalidRecordError, match=r"= 1 kg m\^2 \(kg if prismatic\) at the joint, or"):
+    with pytest.raises(InputError, match=r"= 1 kg m\^2 \(kg if prismatic\) at the joint, or"):
         Motor(inertia=1e-4, gear_ratio=100)
 
 

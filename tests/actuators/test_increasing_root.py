@@ -8,16 +8,15 @@ import numpy as np
 import pytest
 from samples.mechanisms import DEVICES
 
+from vsacli import mechanisms
 from vsacli.actuators.mechanisms.ratios.scales import MAX_STEPS, increasing_root
-from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
-from vsacli.base.arrays import FloatArray
 from vsacli.compute.tracing import Kind, trace
 from vsacli.compute.tracing.single_precision import in_single_precision
 
 SAMPLES = 500
 
 
-def solved(mechanism: VariableRatio, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
+def solved(mechanism: mechanisms.VariableRatio, ratio: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The deflections with some g/g', and how many steps each of them takes."""
     low, high = np.zeros(SAMPLES), np.full(SAMPLES, mechanism._limits[1].phi)
     program = trace(
@@ -40,7 +39,7 @@ def solved(mechanism: VariableRatio, ratio: FloatArray) -> tuple[FloatArray, Flo
 def test_steps_end_at_the_rounding_of_single_precision(name: str) -> None:
     """With the tolerances of double precision they took 15 on average, to find the same."""
     mechanism = DEVICES[name].mechanism
-    assert isinstance(mechanism, VariableRatio)
+    assert isinstance(mechanism, mechanisms.VariableRatio)
     short = 10 ** np.random.default_rng(0).uniform(-8, 0, SAMPLES)  # of the fold, in parts of its deflection
     phi = mechanism._limits[1].phi * (1 - short)
     state = mechanism.torque.state(phi)

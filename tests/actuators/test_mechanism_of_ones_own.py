@@ -14,8 +14,7 @@ from samples.own_mechanism import AdjustableArm
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from vsacli import load_robot
-from vsacli.actuators.mechanisms import MECHANISMS
+from vsacli import load_robot, mechanisms
 
 TRAJECTORY = """
 format: vsacli-trajectory/1
@@ -30,7 +29,7 @@ stiffness: {type: polynomial, degree: 7, start: 500, end: 900}
 @pytest.fixture
 def arm(vsacli, tmp_path, monkeypatch):
     """The command line once it is registered, with a robot of one such joint that it has written."""
-    monkeypatch.setitem(MECHANISMS.homes, "adjustable_arm", "samples.own_mechanism:AdjustableArm")
+    monkeypatch.setitem(mechanisms.MECHANISMS.homes, "adjustable_arm", "samples.own_mechanism:AdjustableArm")
     monkeypatch.delitem(sys.modules, "vsacli.cli.new", raising=False)  # offers what is known at its import
     (tmp_path / "move.yaml").write_text(TRAJECTORY)
     made = vsacli("new", "robot", "--joints", "R", "--actuator", "adjustable_arm", "-o", "arm.yaml")

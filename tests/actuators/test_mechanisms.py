@@ -8,9 +8,8 @@ from oracles.mechanism_scan import Level, along, scanned_corridor
 from samples.marks import slow_but
 from samples.mechanisms import DEVICES, Device
 
-from vsacli.actuators.mechanisms import MECHANISMS
+from vsacli import mechanisms
 from vsacli.actuators.reach import classify_stiffness
-from vsacli.base.arrays import FloatArray
 
 DRAWS = 10_000
 
@@ -19,23 +18,25 @@ SCANNED = [name for name in DEVICES if not name.startswith("potential")]
 """Devices whose branch the scan can follow; that of a potential begins wherever its file says."""
 
 
-@pytest.fixture(params=slow_but(MECHANISMS.keys() & SCANNED, SCANNED))
+@pytest.fixture(params=slow_but(mechanisms.MECHANISMS.keys() & SCANNED, SCANNED))
 def device(request: pytest.FixtureRequest) -> Device:
     return DEVICES[request.param]
 
 
-@pytest.fixture(params=slow_but(MECHANISMS, DEVICES))
+@pytest.fixture(params=slow_but(mechanisms.MECHANISMS, DEVICES))
 def any_device(request: pytest.FixtureRequest) -> Device:
     return DEVICES[request.param]
 
 
 def test_every_mechanism_has_a_device_of_its_name() -> None:
-    kinds = {name: MECHANISMS.name_of(type(device.mechanism)) for name, device in DEVICES.items()}
-    assert {name: kinds[name] for name in MECHANISMS} == {name: name for name in MECHANISMS}
+    kinds = {name: mechanisms.MECHANISMS.name_of(type(device.mechanism)) for name, device in DEVICES.items()}
+    assert {name: kinds[name] for name in mechanisms.MECHANISMS} == {
+        name: name for name in mechanisms.MECHANISMS
+    }
     assert all(name.startswith(kind) for name, kind in kinds.items())
 
 
-def states(device: Device, samples: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def states(device: Device, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """phi, theta_2 and q of states on the branch with positive stiffness."""
     rng = np.random.default_rng(7)
     phi, s = (rng.uniform(*ends, samples) for ends in (device.deflections, device.settings))
@@ -44,7 +45,7 @@ def states(device: Device, samples: int) -> tuple[FloatArray, FloatArray, FloatA
     return phi[on_branch], s[on_branch], q[on_branch]
 
 
-def peak(values: FloatArray) -> float:
+def peak(values: np.ndarray) -> float:
     return float(np.abs(values).max())
 
 

@@ -14,16 +14,8 @@ import pytest
 from oracles import potential_scan
 from samples.marks import slow_but
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
-from vsacli.actuators.laws import Cubic
-from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.mechanisms.potentials.potential import BranchStart, Potential, PotentialRange
-from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import Maccepa
-from vsacli.actuators.mechanisms.ratios.ratio import Awas
-from vsacli.actuators.pairs import make_pair
+from vsacli import Flag, InputError, inverse_dynamics, laws, load_robot, load_trajectory, mechanisms
 from vsacli.actuators.reach import reach_flags
-from vsacli.base.errors import InputError, InvalidRecordError
-from vsacli.base.flags import Flag
 
 ROBOT = """
 format: vsacli-robot/1
@@ -41,35 +33,35 @@ joints:
         range: {{phi: 0.8, theta_2: [5, 12]}}}}
 """
 
-AWAS = Potential(
+AWAS = mechanisms.Potential(
     energy="k*(r*theta_2)^2*sin(theta_1 - q)^2",
     constants=(("k", 50000.0), ("r", 0.01)),
-    start=BranchStart(theta_1=0, theta_2=8),
-    range=PotentialRange(phi=(-0.9, 0.9), theta_2=(5, 12)),
+    start=mechanisms.BranchStart(theta_1=0, theta_2=8),
+    range=mechanisms.PotentialRange(phi=(-0.9, 0.9), theta_2=(5, 12)),
 )
-MACCEPA = Potential(
+MACCEPA = mechanisms.Potential(
     energy="k/2*(sqrt(B^2 + C^2 - 2*B*C*cos(phi)) - (C - B) + r*theta_2)^2",
     constants=(("k", 394.0), ("B", 0.036), ("C", 0.135), ("r", 0.015)),
-    start=BranchStart(theta_1=0.05, theta_2=3),
-    range=PotentialRange(phi=(-3.1, 3.1), theta_2=(0, 6)),
+    start=mechanisms.BranchStart(theta_1=0.05, theta_2=3),
+    range=mechanisms.PotentialRange(phi=(-3.1, 3.1), theta_2=(0, 6)),
 )
-TWO_SPRINGS = Potential(
+TWO_SPRINGS = mechanisms.Potential(
     energy="k/2*((theta_1 - q)^2 + (theta_2 - q)^2) + k_c/4*((theta_1 - q)^4 + (theta_2 - q)^4)",
     constants=(("k", 400.0), ("k_c", 2000.0)),
-    start=BranchStart(theta_1=0.2, theta_2=-0.2),
-    range=PotentialRange(phi=(-2, 2), theta_2=(-9, 9)),
+    start=mechanisms.BranchStart(theta_1=0.2, theta_2=-0.2),
+    range=mechanisms.PotentialRange(phi=(-2, 2), theta_2=(-9, 9)),
 )
-BOWED = Potential(
+BOWED = mechanisms.Potential(
     energy="k/2*(r*theta_2)^2*(phi - bow*sin(2*q))^2 + k_c*phi^4/(1 + theta_2/5)",
     constants=(("k", 50000.0), ("k_c", 500.0), ("r", 0.01), ("bow", 0.1)),
-    start=BranchStart(theta_1=0, theta_2=10),
-    range=PotentialRange(phi=(-0.8, 0.8), theta_2=(4, 20)),
+    start=mechanisms.BranchStart(theta_1=0, theta_2=10),
+    range=mechanisms.PotentialRange(phi=(-0.8, 0.8), theta_2=(4, 20)),
 )
-WAVY = Potential(
+WAVY = mechanisms.Potential(
     energy="a*phi^2*(2 + sin(theta_2))*(1 + c*phi^2) + b*phi*sin(3*theta_2)",
     constants=(("a", 5.0), ("b", 0.6), ("c", 1.5)),
-    start=BranchStart(theta_1=0.1, theta_2=0.3),
-    range=PotentialRange(phi=(-1, 1), theta_2=(-3, 3)),
+    start=mechanisms.BranchStart(theta_1=0.1, theta_2=0.3),
+    range=mechanisms.PotentialRange(phi=(-1, 1), theta_2=(-3, 3)),
 )
 """Level curves that wind, and several pieces on most of them."""
 
@@ -96,19 +88,21 @@ class Demand:
         return tau_e, draw(*self.stiffness, self.samples), q
 
 
-def awas(demand: Demand) -> PairSolution:
+def awas(demand: Demand) -> laws.PairSolution:
     tau_e, stiffness, q = demand.arrays
-    return Awas(k=50000, arm=(0.05, 0.12), lead=0.01).solve(tau_e, stiffness, q)
+    return mechanisms.Awas(k=50000, arm=(0.05, 0.12), lead=0.01).solve(tau_e, stiffness, q)
 
 
-def maccepa(demand: Demand) -> PairSolution:
+def maccepa(demand: Demand) -> laws.PairSolution:
     tau_e, stiffness, q = demand.arrays
-    return Maccepa(k=394, b=0.036, c=0.135, r=0.015, pretension=(0, 0.09)).solve(tau_e, stiffness, q)
+    return mechanisms.Maccepa(k=394, b=0.036, c=0.135, r=0.015, pretension=(0, 0.09)).solve(
+        tau_e, stiffness, q
+    )
 
 
-def two_springs(demand: Demand) -> PairSolution:
+def two_springs(demand: Demand) -> laws.PairSolution:
     tau_e, stiffness, q = demand.arrays
-    solution = make_pair(*(Cubic(k=400, k_c=2000),) * 2).solve(tau_e, stiffness)
+    solution = laws.make_pair(*(laws.Cubic(k=400, k_c=2000),) * 2).solve(tau_e, stiffness)
     return solution._replace(phi_2=solution.phi_2 + q)
 
 
@@ -177,7 +171,7 @@ def assert_ends(ends: np.ndarray, crossings: list[potential_scan.Crossings], ext
             assert math.isnan(end)
 
 
-def random_potential(number: int) -> Potential:
+def random_potential(number: int) -> mechanisms.Potential:
     """Level curves that wind and fold, and a start somewhere on them."""
     draw = np.random.default_rng(number).uniform
     constants = tuple((f"c{index}", float(each)) for index, each in enumerate(draw(-1, 1, 8)))
@@ -187,13 +181,13 @@ def random_potential(number: int) -> Potential:
     )
     for _ in range(20):
         try:
-            return Potential(
+            return mechanisms.Potential(
                 energy=energy,
                 constants=constants,
-                start=BranchStart(theta_1=float(draw(-0.6, 0.6)), theta_2=float(draw(-1.5, 1.5))),
-                range=PotentialRange(phi=(-1, 1), theta_2=(-2, 2)),
+                start=mechanisms.BranchStart(theta_1=float(draw(-0.6, 0.6)), theta_2=float(draw(-1.5, 1.5))),
+                range=mechanisms.PotentialRange(phi=(-1, 1), theta_2=(-2, 2)),
             )
-        except InvalidRecordError:
+        except InputError:
             continue
     raise AssertionError("no state of this potential can be the start")
 
@@ -228,7 +222,7 @@ def test_no_corridor_reaches_beyond_its_branch(number: int) -> None:
             )
 
 
-def at_an_end_of_a_range(potential: Potential, torque: float, stiffness: float) -> bool:
+def at_an_end_of_a_range(potential: mechanisms.Potential, torque: float, stiffness: float) -> bool:
     """Whether the branch has this stiffness where phi or theta_2 is at an end of its range."""
     found = potential.solve(np.array([torque]), np.array([stiffness]), np.zeros(1))
     ends = zip((found.phi_1[0], found.phi_2[0]), (potential.range.phi, potential.range.theta_2), strict=True)
@@ -289,11 +283,11 @@ REFUSED = {
     "no second motor": ({"energy": "k*r*phi^2"}, "energy: does not depend on theta_2"),
     "no link": ({"energy": "k*r*theta_1*theta_2"}, "energy: does not depend on q"),
     "a range without width": (
-        {"range": PotentialRange(phi=(0, 0), theta_2=(5, 12))},
+        {"range": mechanisms.PotentialRange(phi=(0, 0), theta_2=(5, 12))},
         "range.phi: must have two finite ends, the lower one first",
     ),
     "a start outside": (
-        {"start": BranchStart(theta_1=0, theta_2=13)},
+        {"start": mechanisms.BranchStart(theta_1=0, theta_2=13)},
         "start.theta_2: must lie within the range of theta_2, 5 to 12, not at 13",
     ),
     "a negative stiffness": (
@@ -322,7 +316,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_is_refused_and_why(case: str) -> None:
     changes, message = REFUSED[case]
-    with pytest.raises(InvalidRecordError) as refused:
+    with pytest.raises(InputError) as refused:
         replace(AWAS, **changes)
     assert message in str(refused.value)
 

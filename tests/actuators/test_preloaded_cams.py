@@ -13,11 +13,9 @@ from oracles import cam_scan
 from samples.marks import slow_but
 from samples.mechanisms import profile
 
-from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
-from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import Maccepa, PreloadedCam
+from vsacli import laws, mechanisms
+from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import PreloadedCam
 from vsacli.actuators.reach import classify_stiffness
-from vsacli.base.arrays import FloatArray
 
 EPS = float(np.finfo(float).eps)
 DRAWS = 10_000
@@ -39,7 +37,7 @@ class Case:
     scan: cam_scan.Cam
     rest: float = 0.0
 
-    def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
+    def solve(self, tau_e: np.ndarray, stiffness: np.ndarray) -> laws.PairSolution:
         return self.cam.solve(tau_e, stiffness, tau_e)
 
     def largest_torques(self) -> tuple[float, float]:
@@ -47,7 +45,7 @@ class Case:
         low, high = (self._peak(np.linspace(0, end, 20_001)) for end in self.scan.domain)
         return low, high
 
-    def _peak(self, phi: FloatArray) -> float:
+    def _peak(self, phi: np.ndarray) -> float:
         torque, _ = self.scan.springs(phi, np.full_like(phi, self.scan.pretension[1]))
         falls = np.diff(np.abs(torque)) < 0
         return float(torque[falls.argmax() if falls.any() else -1])
@@ -59,7 +57,7 @@ def maccepa(k: float, b: float, c: float, pretension: tuple[float, float]) -> Ca
         return growth / (sympy.sqrt((c - b) ** 2 + growth) + abs(c - b))
 
     scan = cam_scan.Cam(lift, (-np.pi, np.pi), k, pretension)
-    return Case(Maccepa(k=k, b=b, c=c, r=0.015, pretension=pretension), scan)
+    return Case(mechanisms.Maccepa(k=k, b=b, c=c, r=0.015, pretension=pretension), scan)
 
 
 def polynomial(
@@ -76,7 +74,7 @@ def polynomial(
     phi = np.linspace(*ends, 61)
     table = profile(phi, 0.01 + lift(phi - rest))
     scan = cam_scan.Cam(lift, (ends[0] - rest, ends[1] - rest), 4e4, pretension)
-    return Case(Cam(k=4e4, r=0.005, pretension=pretension, profile=table), scan, rest)
+    return Case(mechanisms.Cam(k=4e4, r=0.005, pretension=pretension, profile=table), scan, rest)
 
 
 BUILT = 0.036, 0.135
@@ -108,12 +106,12 @@ def case(request: pytest.FixtureRequest) -> Case:
     return CASES[request.param]
 
 
-def torques(case: Case, count: int, rng: np.random.Generator, beyond: float = 1.0) -> FloatArray:
+def torques(case: Case, count: int, rng: np.random.Generator, beyond: float = 1.0) -> np.ndarray:
     """Over decades in either direction, up to the largest that can be carried, or beyond."""
     low, high = case.largest_torques()
     share = np.concatenate((rng.uniform(-1, 1, count - count // 3), 10 ** rng.uniform(-9, 0, count // 3)))
     share[::2] *= -1
-    drawn: FloatArray = beyond * np.where(share > 0, share * high, -share * low)
+    drawn: np.ndarray = beyond * np.where(share > 0, share * high, -share * low)
     return drawn
 
 
@@ -166,14 +164,14 @@ def test_there_and_back(case: Case):
     assert np.all((apart[regular] <= allowed) & (set_apart[regular] <= allowed))
 
 
-def terms(case: Case, found: PairSolution) -> FloatArray:
+def terms(case: Case, found: laws.PairSolution) -> np.ndarray:
     """Size of what the stiffness is the sum of, and of what the deflection's size makes of its rounding."""
     there = case.cam.partials(found.phi_1, found.phi_2)
     l1 = case.cam.lift(found.phi_1 - case.rest).l1
     return there.T_p + case.cam.k * l1 * l1 + np.abs(found.phi_1 * there.T_pp)
 
 
-def on_branch(case: Case, phi: FloatArray, tau_e: FloatArray, stiffness: FloatArray) -> Any:
+def on_branch(case: Case, phi: np.ndarray, tau_e: np.ndarray, stiffness: np.ndarray) -> Any:
     """Whether the stiffness is monotone from the largest pretension on, and positive from rest on."""
     high = np.full_like(phi, case.scan.pretension[1])
     at_rest, start = np.zeros_like(phi), phi

@@ -19,7 +19,7 @@ from samples.marks import needs, needs_compiler, slow, slow_but
 from samples.mechanisms import DEVICES, Device
 from samples.robot_files import write_robot
 
-from vsacli.actuators.mechanisms import MECHANISMS
+from vsacli import mechanisms
 
 TRAJECTORY = """
 format: vsacli-trajectory/1
@@ -38,7 +38,7 @@ FEEDBACK = ("--controller", "feedback-linearization")
 Run = Callable[..., Outcome]
 
 
-@pytest.fixture(params=slow_but(QUICK, MECHANISMS))
+@pytest.fixture(params=slow_but(QUICK, mechanisms.MECHANISMS))
 def device(request: pytest.FixtureRequest, tmp_path: Path) -> Device:
     """A device, with `arm.yaml` and `move.yaml` in the folder."""
     device = DEVICES[request.param]
@@ -65,7 +65,7 @@ def test_the_file_is_what_the_schema_says_and_is_described(
     schema = ok(vsacli("schema", "robot"))
     jsonschema.Draft202012Validator(schema).validate(yaml.safe_load((tmp_path / "arm.yaml").read_text()))
     described = ok(vsacli("info", "arm.yaml", "--json"))["joints"][0]
-    assert described["actuator"]["mechanism"]["type"] == MECHANISMS.name_of(type(device.mechanism))
+    assert described["actuator"]["mechanism"]["type"] == mechanisms.MECHANISMS.name_of(type(device.mechanism))
     lower, upper = described["stiffness_range"]["unloaded"]
     assert lower < min(device.stiffness) < max(device.stiffness) < (upper or np.inf)
 

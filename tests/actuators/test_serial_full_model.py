@@ -9,13 +9,8 @@ from samples.full_model import Drive, springs_of
 from samples.marks import slow, slow_but
 from samples.mechanisms import DEVICES
 
+from vsacli import Antagonistic, Elastic, Motor, Rigid, laws, mechanisms
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.mechanisms import MECHANISMS
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
 
 Case = tuple[Actuator, Drive, tuple[float, float]]
 """An actuator, the same in the full model, and its stiffness at both ends of a motion."""
@@ -31,7 +26,7 @@ def of_device(name: str) -> Case:
 
 OTHERS: dict[str, Case] = {
     "antagonistic": (
-        Antagonistic(motor=(MOTOR, MOTOR), spring=(Cubic(k=400, k_c=2000),) * 2),
+        Antagonistic(motor=(MOTOR, MOTOR), spring=(laws.Cubic(k=400, k_c=2000),) * 2),
         Drive(
             np.diag([0.2, 0.2]),
             [0.1, 0.1],
@@ -48,7 +43,7 @@ OTHERS: dict[str, Case] = {
 }
 
 
-@pytest.mark.parametrize("name", slow_but(MECHANISMS, DEVICES))
+@pytest.mark.parametrize("name", slow_but(mechanisms.MECHANISMS, DEVICES))
 def test_a_pendulum_follows(name: str) -> None:
     actuator, drive, stiffness = of_device(name)
     assert_follows(LINK, [actuator], [drive], [stiffness])

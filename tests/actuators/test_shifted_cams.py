@@ -10,14 +10,7 @@ from samples.full_model import Drive, PlanarArm, springs_of
 from samples.law_energies import SAMPLES
 from samples.springs import SPRINGS, measured
 
-from vsacli import inverse_dynamics, simulate
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws import Cubic, Exponential, Polynomial
-from vsacli.actuators.mechanisms.shifted_cams import ShiftedCams
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.serial import Serial
-from vsacli.base.errors import InvalidRecordError
-from vsacli.base.flags import Flag
+from vsacli import Antagonistic, Flag, InputError, Motor, Serial, inverse_dynamics, laws, mechanisms, simulate
 
 HEAVY = PlanarArm(lengths=[0.4], masses=[6.0], centers=[0.25], inertias=[0.12], damping=[0.2])
 """A pendulum that turns both cams by different angles."""
@@ -26,7 +19,7 @@ MOTORS = (Motor(inertia=0.2, damping=0.1), Motor(inertia=0.02, damping=0.05))
 
 
 def serial(first: str, second: str, branch: str = "positive") -> Serial:
-    cams = ShiftedCams(spring=(SAMPLES[first].law, SAMPLES[second].law), branch=branch)
+    cams = mechanisms.ShiftedCams(spring=(SAMPLES[first].law, SAMPLES[second].law), branch=branch)
     return Serial(motor=MOTORS, mechanism=cams)
 
 
@@ -71,7 +64,7 @@ def test_an_arm_with_a_pair_and_cams_follows() -> None:
 def test_the_solution_is_that_of_the_pair(law: str, branch: str) -> None:
     spring = SPRINGS[law][0][0], SPRINGS[law][1][0]
     pair = Antagonistic(motor=(MOTORS[0],) * 2, spring=spring, branch=branch)
-    cams = Serial(motor=MOTORS, mechanism=ShiftedCams(spring=spring, branch=branch))
+    cams = Serial(motor=MOTORS, mechanism=mechanisms.ShiftedCams(spring=spring, branch=branch))
     rng = np.random.default_rng(3)
     tau_e, stiffness, q = rng.uniform(-4, 4, 200), rng.uniform(20, 200, 200), rng.uniform(-2, 2, 200)
     one, other = (each.solve(tau_e, stiffness, q) for each in (pair, cams))
@@ -110,8 +103,8 @@ def test_a_simulation_ends_where_a_cam_does(ending: tuple[int, ...]) -> None:
     turns, cubic = np.linspace(-0.4, 0.4, 25), SAMPLES["cubic"].law
     short = measured(turns, cubic.torque(turns))
     plant, model = (
-        robot_of(HEAVY, [Serial(motor=MOTORS, mechanism=ShiftedCams(spring=laws))])
-        for laws in (tuple(short if side in ending else cubic for side in range(2)), (cubic, cubic))
+        robot_of(HEAVY, [Serial(motor=MOTORS, mechanism=mechanisms.ShiftedCams(spring=cams))])
+        for cams in (tuple(short if side in ending else cubic for side in range(2)), (cubic, cubic))
     )
     simulation = simulate(plant, motion_of([(290, 1500)]), model=model)
     assert "a spring left the range of its law" in str(simulation.report.ending)
@@ -137,11 +130,14 @@ def test_like_cams_have_no_other_branch() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"spring": (Polynomial(c1=3),) * 2}, "spring: both are linear"),
-        ({"spring": (Exponential(c=1, a=2),) * 2, "branch": "negative"}, "branch: must be positive"),
-        ({"spring": (Cubic(k=1, k_c=2, max_deflection=1),) * 2}, "max_deflection: is not known of a cam"),
+        ({"spring": (laws.Polynomial(c1=3),) * 2}, "spring: both are linear"),
+        ({"spring": (laws.Exponential(c=1, a=2),) * 2, "branch": "negative"}, "branch: must be positive"),
+        (
+            {"spring": (laws.Cubic(k=1, k_c=2, max_deflection=1),) * 2},
+            "max_deflection: is not known of a cam",
+        ),
     ],
 )
 def test_what_no_cams_can_be_is_refused(options: dict, message: str) -> None:
-    with pytest.raises(InvalidRecordError, match=message):
-        ShiftedCams(**options)
+    with pytest.raises(InputError, match=message):
+        mechanisms.ShiftedCams(**options)

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.pairs import make_pair
-from vsacli.base.arrays import FloatArray
+from vsacli import laws
 
 
 @dataclass(frozen=True)
-class Tangent(SpringLaw):
+class Tangent(laws.SpringLaw):
     """tau = k tan(phi), |phi| < pi/2."""
 
     k: float = 1.0
@@ -22,22 +20,22 @@ class Tangent(SpringLaw):
     def domain(self) -> tuple[float, float]:
         return (-np.pi / 2, np.pi / 2)
 
-    def torque(self, phi: FloatArray) -> FloatArray:
+    def torque(self, phi: np.ndarray) -> np.ndarray:
         return self.k * np.tan(phi)
 
-    def stiffness(self, phi: FloatArray) -> FloatArray:
+    def stiffness(self, phi: np.ndarray) -> np.ndarray:
         return self.k / np.cos(phi) ** 2
 
-    def slope(self, phi: FloatArray) -> FloatArray:
+    def slope(self, phi: np.ndarray) -> np.ndarray:
         return 2 * self.k * np.tan(phi) / np.cos(phi) ** 2
 
-    def curvature(self, phi: FloatArray) -> FloatArray:
+    def curvature(self, phi: np.ndarray) -> np.ndarray:
         return 2 * self.k * (1 + 2 * np.sin(phi) ** 2) / np.cos(phi) ** 4
 
-    def energy(self, phi: FloatArray) -> FloatArray:
+    def energy(self, phi: np.ndarray) -> np.ndarray:
         return -self.k * np.log(np.cos(phi))
 
-    def deflection(self, torque: FloatArray) -> FloatArray:
+    def deflection(self, torque: np.ndarray) -> np.ndarray:
         return np.arctan(torque / self.k)
 
 
@@ -46,7 +44,7 @@ def test_the_torques_say_what_the_deflections_are(ratio):
     """sigma = k + tau^2/k makes a quadratic equation of (14), whose roots know no domain."""
     first, second = Tangent(k=100.0), Tangent(k=100.0 * ratio)
     tau_e, stiffness = (grid.ravel() for grid in np.meshgrid(np.linspace(-300, 300, 41), [900.0, 3e3, 1e6]))
-    solution = make_pair(first, second).solve(tau_e, stiffness)
+    solution = laws.make_pair(first, second).solve(tau_e, stiffness)
 
     k_1, k_2 = first.k, second.k
     half, square = tau_e / k_2, 1 / k_1 + 1 / k_2

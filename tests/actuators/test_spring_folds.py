@@ -9,26 +9,25 @@ import pytest
 from samples.springs import SPRINGS, measured, on_side_2, stiffness_under
 from scipy.optimize import brentq
 
-from vsacli.actuators.laws import Cubic, FourBar, Polynomial, SpringLaw
+from vsacli import laws
 from vsacli.actuators.laws.tendons import Mirrored
 from vsacli.actuators.pairs.balance import Balance
 from vsacli.actuators.pairs.critical_points import sample_hardening
 from vsacli.actuators.pairs.folds import FoldMap, map_folds, outermost_fold
-from vsacli.base.arrays import FloatArray
 
 EPS = float(np.finfo(float).eps)
 
-LAWS: dict[str, SpringLaw] = {
+LAWS: dict[str, laws.SpringLaw] = {
     **{f"{name} {number}": side[0] for name, both in SPRINGS.items() for number, side in enumerate(both)},
-    **{f"ratio {ratio}": FourBar(k=1, ratio=ratio) for ratio in (1.0001, 1.03, 1.1, 2, 10, 1000)},
-    "one term": Polynomial(c1=1e-3, c9=9e5),
-    "two humps": Polynomial(c1=1, c3=100, c9=1e4),
-    "linear": Polynomial(c1=7),
+    **{f"ratio {ratio}": laws.FourBar(k=1, ratio=ratio) for ratio in (1.0001, 1.03, 1.1, 2, 10, 1000)},
+    "one term": laws.Polynomial(c1=1e-3, c9=9e5),
+    "two humps": laws.Polynomial(c1=1, c3=100, c9=1e4),
+    "linear": laws.Polynomial(c1=7),
 }
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_hardening_is_monotone_between_its_peaks(law: SpringLaw):
+def test_hardening_is_monotone_between_its_peaks(law: laws.SpringLaw):
     hardening = sample_hardening(law)
     assert hardening is not None
     np.testing.assert_array_equal(hardening.rho, law.hardening(hardening.phi))
@@ -45,7 +44,7 @@ def test_hardening_is_monotone_between_its_peaks(law: SpringLaw):
 
 @pytest.mark.parametrize(("k", "k_c"), [(400, 2000), (1e-3, 1e9), (1e6, 1e-3)])
 def test_hardening_of_a_cubic_spring_peaks_where_its_formula_does(k: float, k_c: float):
-    hardening = sample_hardening(Cubic(k=k, k_c=k_c))
+    hardening = sample_hardening(laws.Cubic(k=k, k_c=k_c))
     assert hardening is not None
     # d/dphi of 6 Kc phi/(K + 3 Kc phi^2) is zero there; a slope below 1e-13 counts as none.
     assert hardening.phi[hardening.peaks] == pytest.approx([math.sqrt(k / (3 * k_c))], rel=1e-12)
@@ -73,7 +72,7 @@ def test_a_tendon_that_pulls_the_other_way_has_no_positive_torque():
     assert sample_hardening(law) is None
 
 
-def springs_of(name: str) -> tuple[SpringLaw, SpringLaw]:
+def springs_of(name: str) -> tuple[laws.SpringLaw, laws.SpringLaw]:
     (first, _), (second, _) = SPRINGS[name][0], on_side_2(SPRINGS[name][1])
     return first, second
 
@@ -92,7 +91,7 @@ def test_nodes_of_the_map_are_folds(name: str):
     np.testing.assert_allclose(rho_1, rho_2, rtol=1e-10)
 
 
-def torques_of(folds: FoldMap) -> FloatArray:
+def torques_of(folds: FoldMap) -> np.ndarray:
     """Torques in every cell up to 100 N m: next to its ends, since two folds are born there, and anywhere."""
     low, high = folds.tau_e[:-1], folds.tau_e[1:]
     cells = np.isfinite(folds.phi_1[:-1] + folds.phi_1[1:]) & (high - low > 1e-9 * np.abs(high))
@@ -123,7 +122,7 @@ def test_the_outermost_fold_is_where_a_scalar_solver_finds_it(name: str):
 def scalar_fold(balance: Balance, tau_e: float, phi_1: float, phi_2: float) -> float:
     """Stiffness at the fold that Brent's method finds next to deflections, along the curve of equal tau_e."""
 
-    def deflections(t: float) -> tuple[FloatArray, FloatArray]:
+    def deflections(t: float) -> tuple[np.ndarray, np.ndarray]:
         return balance.deflections_at(np.array(tau_e), np.array(t))
 
     def slope(t: float) -> float:
@@ -145,7 +144,7 @@ def test_tendons_against_each_other_have_no_fold():
     assert np.all(np.isnan(map_folds(first, second).phi_1))
 
 
-def folds_of(springs: tuple[Cubic, Cubic], tau_e: float) -> int:
+def folds_of(springs: tuple[laws.Cubic, laws.Cubic], tau_e: float) -> int:
     """How often the stiffness turns around over the torque of side 1, by a dense scan."""
     share = np.linspace(0, 1, 20_001)
     torques = zip(springs, (share * tau_e, (1 - share) * tau_e), strict=True)
@@ -154,7 +153,7 @@ def folds_of(springs: tuple[Cubic, Cubic], tau_e: float) -> int:
 
 
 def test_two_folds_are_born_at_the_cusp_where_the_outermost_fold_jumps():
-    springs = Cubic(k=400, k_c=2000), Cubic(k=440, k_c=2000)
+    springs = laws.Cubic(k=400, k_c=2000), laws.Cubic(k=440, k_c=2000)
     folds = map_folds(*springs)
     # Where the outermost fold jumps there are two nodes of one torque.
     jump = np.abs(np.diff(folds.phi_1)) > 1e-3 * np.abs(folds.phi_1[1:])

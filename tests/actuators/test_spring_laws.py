@@ -12,10 +12,8 @@ import pytest
 from oracles.spring_scan import turned
 from samples.springs import SPRINGS, measured
 
-from vsacli.actuators import laws
-from vsacli.actuators.laws import LAWS, Cubic, Exponential, FourBar, Polynomial, Quadratic, Sinh, SpringLaw
+from vsacli import laws
 from vsacli.actuators.laws.four_bar import STRETCH_MARGIN
-from vsacli.base.arrays import FloatArray
 
 EPS = float(np.finfo(float).eps)
 
@@ -34,17 +32,17 @@ def four_bar_torque(k: float, ratio: float) -> Formula:
     return torque
 
 
-FORMULAS: dict[str, tuple[SpringLaw, Formula]] = {
-    "cubic": (Cubic(k=20, k_c=300), lambda phi: 20 * phi + 300 * phi**3),
+FORMULAS: dict[str, tuple[laws.SpringLaw, Formula]] = {
+    "cubic": (laws.Cubic(k=20, k_c=300), lambda phi: 20 * phi + 300 * phi**3),
     "polynomial": (
-        Polynomial(c1=15, c3=100, c5=900, c7=2, c9=5),
+        laws.Polynomial(c1=15, c3=100, c5=900, c7=2, c9=5),
         lambda phi: 15 * phi + 100 * phi**3 + 900 * phi**5 + 2 * phi**7 + 5 * phi**9,
     ),
-    "sinh": (Sinh(k=1.5, a=8), lambda phi: mpmath.mpf(1.5) * mpmath.sinh(8 * phi)),
-    "exponential": (Exponential(c=2, a=7), lambda phi: 2 * mpmath.expm1(7 * phi)),
-    "quadratic": (Quadratic(k=90), lambda phi: 90 * phi**2),
+    "sinh": (laws.Sinh(k=1.5, a=8), lambda phi: mpmath.mpf(1.5) * mpmath.sinh(8 * phi)),
+    "exponential": (laws.Exponential(c=2, a=7), lambda phi: 2 * mpmath.expm1(7 * phi)),
+    "quadratic": (laws.Quadratic(k=90), lambda phi: 90 * phi**2),
     **{
-        f"four_bar {ratio}": (FourBar(k=40, ratio=ratio), four_bar_torque(40, ratio))
+        f"four_bar {ratio}": (laws.FourBar(k=40, ratio=ratio), four_bar_torque(40, ratio))
         for ratio in (1.0001, 1.01, 2.2, 10.0)
     },
 }
@@ -58,16 +56,16 @@ EVERY = {
 every_law = pytest.mark.parametrize("law", EVERY.values(), ids=EVERY)
 
 
-def deflections(law: SpringLaw, reach: float = 1.2) -> FloatArray:
+def deflections(law: laws.SpringLaw, reach: float = 1.2) -> np.ndarray:
     """From tiny ones up to the end of the domain or a reach, on every side where the law holds."""
     low, high = (min(max(end, -reach), reach) for end in law.domain)
     shares = np.concatenate((np.geomspace(1e-9, 0.1, 9), np.linspace(0.2, 1, 9)))
     return np.concatenate((low * shares[::-1], high * shares)) if low else high * shares
 
 
-def conditioning(law: SpringLaw, phi: FloatArray) -> FloatArray:
+def conditioning(law: laws.SpringLaw, phi: np.ndarray) -> np.ndarray:
     """How much the rounding of the deflection itself weighs: next to the stretched linkage a lot."""
-    if isinstance(law, FourBar):
+    if isinstance(law, laws.FourBar):
         return 1 / (1 - (law.ratio * np.sin(phi / 2)) ** 2)
     return np.ones_like(phi)
 
@@ -76,19 +74,19 @@ def conditioning(law: SpringLaw, phi: FloatArray) -> FloatArray:
 
 
 def test_every_law_of_the_file_format_is_tested():
-    assert {type(law) for law in EVERY.values()} == set(LAWS.values())
+    assert {type(law) for law in EVERY.values()} == set(laws.LAWS.values())
 
 
 def test_every_name_that_laws_offers_is_there():
     offered = {name: getattr(laws, name) for name in dir(laws)}
     assert set(laws.__all__) <= set(offered)
-    assert all(law in offered.values() for law in LAWS.values())
+    assert all(law in offered.values() for law in laws.LAWS.values())
     with pytest.raises(AttributeError, match="has no attribute 'Cubik'"):
         laws.Cubik  # noqa: B018  (looked up, not used)
 
 
 @formulas
-def test_derivatives_are_those_of_the_formula(law: SpringLaw, formula: Formula):
+def test_derivatives_are_those_of_the_formula(law: laws.SpringLaw, formula: Formula):
     phi = deflections(law)
     for order, method in enumerate([law.torque, law.stiffness, law.slope, law.curvature]):
         steps = [mpmath.mpf(abs(each)) * mpmath.mpf(10) ** -12 for each in phi.tolist()]
@@ -103,11 +101,11 @@ def test_derivatives_are_those_of_the_formula(law: SpringLaw, formula: Formula):
 
 
 @formulas
-def test_energy_is_the_work_of_the_torque(law: SpringLaw, formula: Formula):
+def test_energy_is_the_work_of_the_torque(law: laws.SpringLaw, formula: Formula):
     for phi in deflections(law)[::4].tolist():
         work = float(mpmath.quad(formula, [0, mpmath.mpf(phi) / 2, mpmath.mpf(phi)]))
         # Exponential: tau/a - c phi cancels for small phi, eps c phi beside c a phi^2/2.
-        rounding = EPS * abs(phi) * 4 if isinstance(law, Exponential) else 0
+        rounding = EPS * abs(phi) * 4 if isinstance(law, laws.Exponential) else 0
         # The quadrature sees the torque rise steeply at the stretched four-bar.
         assert law.energy(np.array([phi]))[0] == pytest.approx(
             work, rel=1e-6 if abs(phi) > 0.1 else 1e-13, abs=rounding
@@ -156,7 +154,7 @@ def test_a_table_has_a_continuous_curvature():
 
 
 @every_law
-def test_a_law_hardens_away_from_zero(law: SpringLaw):
+def test_a_law_hardens_away_from_zero(law: laws.SpringLaw):
     phi = deflections(law)
     assert np.all(np.diff(law.torque(phi)) > 0)
     assert np.all(law.stiffness(phi) > 0)
@@ -165,7 +163,7 @@ def test_a_law_hardens_away_from_zero(law: SpringLaw):
 
 
 @every_law
-def test_derivatives_are_the_four_functions(law: SpringLaw):
+def test_derivatives_are_the_four_functions(law: laws.SpringLaw):
     phi = deflections(law)
     for side, deflection in ((law, phi), (law.as_second(), -phi if law.pulls_only else phi)):
         functions = (side.torque, side.stiffness, side.slope, side.curvature)
@@ -176,7 +174,7 @@ def test_derivatives_are_the_four_functions(law: SpringLaw):
 
 
 @every_law
-def test_deflection_inverts_the_torque(law: SpringLaw):
+def test_deflection_inverts_the_torque(law: laws.SpringLaw):
     phi = deflections(law)
     # The torque's own rounding, over stiffness and deflection: at most the degree of the law, 9.
     np.testing.assert_allclose(law.deflection(law.torque(phi)), phi, rtol=50 * EPS)
@@ -185,7 +183,7 @@ def test_deflection_inverts_the_torque(law: SpringLaw):
 
 
 @every_law
-def test_inverse_does_not_depend_on_the_other_samples_or_the_shape(law: SpringLaw):
+def test_inverse_does_not_depend_on_the_other_samples_or_the_shape(law: laws.SpringLaw):
     torque = law.torque(deflections(law))
     whole = law.deflection(torque)
     np.testing.assert_array_equal(law.deflection(torque.reshape(2, -1)), whole.reshape(2, -1))
@@ -193,7 +191,7 @@ def test_inverse_does_not_depend_on_the_other_samples_or_the_shape(law: SpringLa
 
 
 @every_law
-def test_torque_range_is_that_of_the_domain(law: SpringLaw):
+def test_torque_range_is_that_of_the_domain(law: laws.SpringLaw):
     for end, torque in zip(law.domain, law.torque_range, strict=True):
         if math.isinf(end):
             assert torque == end
@@ -206,7 +204,7 @@ def test_torque_range_is_that_of_the_domain(law: SpringLaw):
 
 
 @every_law
-def test_hardening_is_slope_over_stiffness(law: SpringLaw):
+def test_hardening_is_slope_over_stiffness(law: laws.SpringLaw):
     phi = deflections(law)
     np.testing.assert_allclose(law.hardening(phi), law.slope(phi) / law.stiffness(phi), rtol=4 * EPS)
 
@@ -215,7 +213,7 @@ def test_hardening_is_slope_over_stiffness(law: SpringLaw):
 
 
 def test_four_bar_ends_just_before_the_linkage_is_stretched():
-    law = FourBar(k=40, ratio=2.2)
+    law = laws.FourBar(k=40, ratio=2.2)
     assert 2.2 * math.sin(law.domain[1] / 2) == pytest.approx(1 - STRETCH_MARGIN, abs=4 * EPS)
     assert law.domain[0] == -law.domain[1]
 
@@ -262,7 +260,7 @@ def test_table_that_pushes_and_pulls_is_stiff_at_rest():
 
 
 @every_law
-def test_a_tendon_pulls_the_other_way_on_side_2(law: SpringLaw):
+def test_a_tendon_pulls_the_other_way_on_side_2(law: laws.SpringLaw):
     second = law.as_second()
     if not law.pulls_only:
         assert second is law
@@ -289,7 +287,7 @@ def test_oracle_turns_a_spring_as_well():
 
 
 @every_law
-def test_any_torque_has_a_deflection(law: SpringLaw):
+def test_any_torque_has_a_deflection(law: laws.SpringLaw):
     sizes = np.concatenate(([0.0, 5e-324, 1e-300], 10.0 ** np.arange(-200, 101, 25)))
     torque = np.concatenate((-sizes, sizes))
     found = law.deflection(torque)

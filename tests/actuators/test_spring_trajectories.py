@@ -11,21 +11,23 @@ import pytest
 from samples.drives import springs
 from samples.marks import slow_but
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.four_bar import FourBar
-from vsacli.actuators.laws.polynomial import Polynomial
-from vsacli.actuators.laws.sinh import Sinh
-from vsacli.actuators.laws.tendons import Exponential, Quadratic
-from vsacli.analysis.result import Result
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag, has_flag
+from vsacli import (
+    DenavitHartenberg,
+    Flag,
+    Inertia,
+    Joint,
+    Link,
+    Result,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+    laws,
+    load_robot,
+    load_trajectory,
+)
+from vsacli.base.flags import has_flag
 from vsacli.base.signals import POSITION
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.trajectory import Trajectory
 
 ARM = """\
 format: vsacli-robot/1
@@ -91,21 +93,21 @@ def test_lower_end_jumps_past_the_stiffness_between_two_samples(sinking):
 
 # The singular set
 
-PAIRS: dict[str, tuple[SpringLaw, SpringLaw]] = {
-    "cubic, alike": (Cubic(k=400, k_c=2000), Cubic(k=400, k_c=2000)),
-    "cubic, unlike": (Cubic(k=400, k_c=2000), Cubic(k=440, k_c=2000)),
-    "sinh, alike": (Sinh(k=10, a=9), Sinh(k=10, a=9)),
-    "sinh, unlike": (Sinh(k=10, a=9), Sinh(k=4, a=9)),
-    "sinh of two kinds": (Sinh(k=10, a=9), Sinh(k=14, a=6)),
-    "four-bar": (FourBar(k=200, ratio=2.2), FourBar(k=150, ratio=2)),
-    "polynomial and cubic": (Polynomial(c1=300, c5=9e4), Cubic(k=400, k_c=2000)),
-    "linear and cubic": (Polynomial(c1=300), Cubic(k=400, k_c=2000)),
-    "tendon and cubic": (Quadratic(k=2), Cubic(k=400, k_c=2000)),
+PAIRS: dict[str, tuple[laws.SpringLaw, laws.SpringLaw]] = {
+    "cubic, alike": (laws.Cubic(k=400, k_c=2000), laws.Cubic(k=400, k_c=2000)),
+    "cubic, unlike": (laws.Cubic(k=400, k_c=2000), laws.Cubic(k=440, k_c=2000)),
+    "sinh, alike": (laws.Sinh(k=10, a=9), laws.Sinh(k=10, a=9)),
+    "sinh, unlike": (laws.Sinh(k=10, a=9), laws.Sinh(k=4, a=9)),
+    "sinh of two kinds": (laws.Sinh(k=10, a=9), laws.Sinh(k=14, a=6)),
+    "four-bar": (laws.FourBar(k=200, ratio=2.2), laws.FourBar(k=150, ratio=2)),
+    "polynomial and cubic": (laws.Polynomial(c1=300, c5=9e4), laws.Cubic(k=400, k_c=2000)),
+    "linear and cubic": (laws.Polynomial(c1=300), laws.Cubic(k=400, k_c=2000)),
+    "tendon and cubic": (laws.Quadratic(k=2), laws.Cubic(k=400, k_c=2000)),
 }
-every_pair = pytest.mark.parametrize("laws", PAIRS.values(), ids=PAIRS)
+every_pair = pytest.mark.parametrize("two_laws", PAIRS.values(), ids=PAIRS)
 
 
-def arm(laws: tuple[SpringLaw, SpringLaw]) -> Robot:
+def arm(two_laws: tuple[laws.SpringLaw, laws.SpringLaw]) -> Robot:
     """A light arm that hangs with a constant load: its joint turns about the vertical, a moment holds it."""
     link = Link(mass=1, com=(-0.3, 0, 0), inertia=Inertia(xx=0.01, yy=0.01, zz=0.01))
     joint = Joint(
@@ -114,7 +116,7 @@ def arm(laws: tuple[SpringLaw, SpringLaw]) -> Robot:
         dh=DenavitHartenberg(a=0.5, alpha=0),
         link=link,
         damping=0.1,
-        actuator=springs(*laws),
+        actuator=springs(*two_laws),
     )
     return Robot(name="arm", joints=(joint,))
 
@@ -123,12 +125,12 @@ LOAD = 20.0
 """N m."""
 
 
-def dip(laws: tuple[SpringLaw, SpringLaw], closest: float) -> tuple[Result, FloatArray]:
+def dip(two_laws: tuple[laws.SpringLaw, laws.SpringLaw], closest: float) -> tuple[Result, np.ndarray]:
     """A still arm whose stiffness comes down to within a relative distance of the fold at half time.
 
     Returns the result and the stiffness of the fold.
     """
-    robot = arm(laws)
+    robot = arm(two_laws)
     time = np.linspace(0, 2, 201)
     moment = np.zeros((201, 6))
     moment[:, 5] = -LOAD
@@ -162,9 +164,9 @@ def test_passing_the_singular_set_is_near_singular_and_stays_on_the_branch(pair:
 @pytest.mark.cases(2)
 @pytest.mark.parametrize("pair", slow_but({"cubic, unlike", "four-bar"}, PAIRS))
 def test_touching_the_singular_set_loses_the_motor_torque_there_only(pair: str):
-    laws = PAIRS[pair]
-    result, _ = dip(laws, closest=0.0)
-    passing, _ = dip(laws, closest=1e-6)
+    two_laws = PAIRS[pair]
+    result, _ = dip(two_laws, closest=0.0)
+    passing, _ = dip(two_laws, closest=1e-6)
     singular = has_flag(result.flags[:, 0], Flag.SINGULAR)
     np.testing.assert_array_equal(np.flatnonzero(singular), [100])
     for name in ("dphi", "dtheta", "ddtheta", "tau_motor"):
@@ -185,16 +187,16 @@ def test_touching_the_singular_set_loses_the_motor_torque_there_only(pair: str):
 # A slide
 
 
-SLIDES: dict[str, tuple[SpringLaw, SpringLaw]] = {
-    "tendons": (Exponential(c=20, a=40), Exponential(c=30, a=35)),
-    "tendon and sinh": (Quadratic(k=2e5), Sinh(k=25, a=40)),
-    "four-bar and cubic": (FourBar(k=900, ratio=2.2), Cubic(k=2000, k_c=4e5)),
+SLIDES: dict[str, tuple[laws.SpringLaw, laws.SpringLaw]] = {
+    "tendons": (laws.Exponential(c=20, a=40), laws.Exponential(c=30, a=35)),
+    "tendon and sinh": (laws.Quadratic(k=2e5), laws.Sinh(k=25, a=40)),
+    "four-bar and cubic": (laws.FourBar(k=900, ratio=2.2), laws.Cubic(k=2000, k_c=4e5)),
 }
 
 
-@pytest.mark.parametrize("laws", SLIDES.values(), ids=SLIDES)
-def test_springs_of_a_slide(laws: tuple[SpringLaw, SpringLaw]):
-    joint = dataclasses.replace(arm(laws).joints[0], type="prismatic")
+@pytest.mark.parametrize("two_laws", SLIDES.values(), ids=SLIDES)
+def test_springs_of_a_slide(two_laws: tuple[laws.SpringLaw, laws.SpringLaw]):
+    joint = dataclasses.replace(arm(two_laws).joints[0], type="prismatic")
     robot = Robot(name="lift", joints=(joint,))
     time = np.linspace(0, 1, 101)
     path = RestToRest(signal=POSITION, span=(0.0, 1.0), degree=9, start=(0.0,), end=(0.2,)).at(time)

@@ -18,25 +18,20 @@ from samples.figures import Result, rest_to_rest
 from samples.fixes import written
 from samples.plants import elastic, rigid, with_actuators
 from samples.robots import vsa_3r
+from samples.spoiled import scaled, spoil_drive
 
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.dynamics.drive import drive
+from vsacli import Limits, Robot, Trajectory, fixes, inverse_dynamics, load_robot, load_trajectory
 from vsacli.dynamics.integrated_deflections import integrate_deflections
 from vsacli.results.charts.figures import feasibility
 from vsacli.results.charts.stored import StoredCharts
 from vsacli.results.plots import compare_files, plot_stored
 from vsacli.results.plots import drawn as drawn_sheet
-from vsacli.robot.file import load_robot
-from vsacli.robot.joint import Limits
-from vsacli.robot.model import Robot
-from vsacli.studies.search import fixes
 from vsacli.studies.search.fix_report import NotPossible, StiffnessOffset, StiffnessProfile
-from vsacli.trajectory.file import load_trajectory
-from vsacli.trajectory.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[2]
 ROBOT, TRAJECTORY = ROOT / "robots" / "mixed_3r.yaml", ROOT / "trajectories" / "mixed_3r.yaml"
-KINDS = ("rigid", "elastic", "antagonistic")
+JOINTS = {"rigid": "base", "elastic": "shoulder", "antagonistic": "elbow"}
+KINDS = tuple(JOINTS)
 
 
 @pytest.fixture(scope="module")
@@ -110,13 +105,7 @@ def test_a_limit_of_an_elastic_joint_is_reported(robot: Robot, motion: Trajector
 def test_a_wrong_derivative_of_any_kind_fails(
     robot: Robot, motion: Trajectory, kind: str, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def spoiled(joint, *arguments):
-        driven = drive(joint, *arguments)
-        if joint.actuator_type != kind:
-            return driven
-        return driven._replace(**{name: getattr(driven, name) * (1 + 1e-6)})
-
-    monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
+    spoil_drive(monkeypatch, name, scaled(1 + 1e-6), JOINTS[kind])
     check = inverse_dynamics(robot, motion).report.self_check
     assert not check.passed
     # Of the peak, which no probe need meet; power has the velocity twice, in kinetic energy and in losses.
@@ -126,26 +115,15 @@ def test_a_wrong_derivative_of_any_kind_fails(
 def test_a_wrong_deflection_of_an_elastic_joint_fails(
     robot: Robot, motion: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def spoiled(joint, *arguments):
-        driven = drive(joint, *arguments)
-        factor = 1 + 1e-9 if joint.actuator_type == "elastic" else 1
-        return driven._replace(phi=driven.phi * factor)
-
-    monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
+    spoil_drive(monkeypatch, "phi", scaled(1 + 1e-9), JOINTS["elastic"])
     check = inverse_dynamics(robot, motion).report.self_check
     assert check.spring_residual == pytest.approx(1e-9, rel=1e-3)
     assert not check.passed
 
 
 def test_missing_numbers_fail(robot: Robot, motion: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
-    def spoiled(joint, *arguments):
-        driven = drive(joint, *arguments)
-        if joint.actuator_type != "rigid":
-            return driven
-        none = np.full_like(driven.theta, np.nan)
-        return driven._replace(theta=none, dtheta=none, ddtheta=none)
-
-    monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
+    for name in ("theta", "dtheta", "ddtheta"):
+        spoil_drive(monkeypatch, name, scaled(np.nan), JOINTS["rigid"])
     assert not inverse_dynamics(robot, motion).report.self_check.passed
 
 

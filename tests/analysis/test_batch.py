@@ -12,14 +12,13 @@ from samples.shipped import shipped_run
 from samples.trees import tree_run
 from samples.valid_runs import valid_run
 
-from vsacli import Trajectory, inverse_dynamics
+from vsacli import Robot, Trajectory, inverse_dynamics
 from vsacli.analysis.batch import Batch
 from vsacli.analysis.run import Run
 from vsacli.analysis.variant_groups import PreparedRun, batches, numbers_as_rows
 from vsacli.base.json_records import JsonObject
 from vsacli.base.variables import Block
 from vsacli.documents.record_values import with_numbers
-from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, numbers_of_robot, parameters
 from vsacli.trajectory.times import UniformTimes
 

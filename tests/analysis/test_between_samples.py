@@ -12,22 +12,14 @@ from samples.marks import slow
 from samples.robots import random_robot
 from scipy.optimize import minimize_scalar
 
-from vsacli import inverse_dynamics
-from vsacli.actuators.motor import Motor
+from vsacli import Flag, Limits, Motor, Report, Robot, Trajectory, inverse_dynamics, motor_torques
 from vsacli.actuators.reach import margin
 from vsacli.analysis.between_samples import SAMPLES_ONLY, SCANNED
-from vsacli.analysis.report import Report
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.joint import Limits
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 DURATION = 6.0
 CASES = [("R", 7.0), ("P", 103.0), *(slow(*case) for case in [("P", 7.0), ("R", 40.0), ("R", 103.0)])]
@@ -57,9 +49,9 @@ def swinging(rate: float, joints: int = 1, stiffness: float = 1500.0, swing: flo
     return Trajectory(UniformTimes(DURATION, rate), position, {"stiffness": of_stiffness}, name="swinging")
 
 
-def size(robot: Robot, trajectory: Trajectory, name: str, times: FloatArray) -> FloatArray:
+def size(robot: Robot, trajectory: Trajectory, name: str, times: np.ndarray) -> np.ndarray:
     """Size of a variable of the only joint, of motors that of the larger one; (samples,)."""
-    values: FloatArray = np.abs(getattr(compute_block(robot, trajectory.at(times)), name)[:, 0])
+    values: np.ndarray = np.abs(getattr(motor_torques(robot, trajectory.at(times)), name)[:, 0])
     return values if values.ndim == 1 else values.max(axis=1)
 
 
@@ -168,7 +160,7 @@ def three_joints(rate: float = 103.0) -> tuple[Robot, Trajectory]:
     """Steps all of which are feasible, and stiffnesses below the corridor between them."""
     robot = random_robot("RRR", seed=3)
     trajectory = swinging(rate, joints=3)
-    block = compute_block(robot, trajectory.at(np.linspace(0, DURATION, 5 * int(DURATION * rate) + 1)))
+    block = motor_torques(robot, trajectory.at(np.linspace(0, DURATION, 5 * int(DURATION * rate) + 1)))
     lower = block.stiffness_min
     at_steps, everywhere = lower[::5].max(axis=0), lower.max(axis=0)
     stiffness = np.where(everywhere > at_steps + 1e-3, (at_steps + everywhere) / 2, 2 * everywhere)
@@ -179,12 +171,10 @@ def three_joints(rate: float = 103.0) -> tuple[Robot, Trajectory]:
 @pytest.mark.cases(2)
 @pytest.mark.slow
 @pytest.mark.parametrize("block_samples", [1, 2, 7, 50])
-def test_what_is_found_does_not_depend_on_the_blocks(
-    block_samples: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Of a run that is looked at around its steps, as if it were a long one."""
-    monkeypatch.setattr("vsacli.analysis.between_samples.SCANNED", 0)
-    robot, trajectory = three_joints(rate=21.0)
+def test_what_is_found_does_not_depend_on_the_blocks(block_samples: int) -> None:
+    """Of a run so long that it is looked at around its steps."""
+    robot, trajectory = three_joints()
+    assert trajectory.samples > SCANNED
     whole = inverse_dynamics(robot, trajectory)
     run = Run(robot, trajectory, block_samples=block_samples)
     blocks = list(run)
@@ -202,7 +192,7 @@ def test_every_dip_below_the_corridor_is_found_and_its_nearest_step_marked() -> 
     robot, trajectory = three_joints()
     assert trajectory.samples > SCANNED
     dense = trajectory.at(np.linspace(0, DURATION, 100 * (trajectory.samples - 1) + 1))
-    block = compute_block(robot, dense)
+    block = motor_torques(robot, dense)
     gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
     result = inverse_dynamics(robot, trajectory)
     assert result.report.verdict == "infeasible"

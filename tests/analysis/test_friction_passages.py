@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from samples.fixes import pendulum
 
-from vsacli import Robot, Trajectory, inverse_dynamics
-from vsacli.actuators.friction import Friction
+from vsacli import Friction, Robot, Trajectory, inverse_dynamics, motor_torques
 from vsacli.analysis.run import Run
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.inverse import compute_block
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
@@ -51,12 +49,12 @@ def test_peaks_between_the_steps_are_those_of_a_dense_scan(width: float) -> None
     assert 0 <= steps.time[turns[0]] - first <= 1 / 500  # one step earlier it may be within reach
     # each turn, a hundred times as fine as the friction changes its sign
     peaks = [
-        np.abs(compute_block(robot, trajectory.at(time)).tau_motor).max()
+        np.abs(motor_torques(robot, trajectory.at(time)).tau_motor).max()
         for turn in turns
         for time in [_around(trajectory, steps.time[turn], width)]
     ]
     assert between == pytest.approx(max(peaks), rel=0.02)  # 25 levels, 3 digits
-    assert at_steps == pytest.approx(np.abs(compute_block(robot, steps).tau_motor).max(), rel=1e-2)
+    assert at_steps == pytest.approx(np.abs(motor_torques(robot, steps).tau_motor).max(), rel=1e-2)
 
 
 def _around(trajectory: Trajectory, time: float, width: float) -> np.ndarray:
@@ -69,9 +67,8 @@ def _around(trajectory: Trajectory, time: float, width: float) -> np.ndarray:
 
 def test_nothing_is_told_where_the_steps_show_it() -> None:
     for robot, rate in ((rubbing(0.1), 500.0), (rubbing(3e-3), 20_000.0), (pendulum(), 500.0)):
-        run = Run(robot, swing(rate))
-        list(run)
-        assert not [note for note in run.report().notes if "friction" in note]
+        report = inverse_dynamics(robot, swing(rate)).report
+        assert not [note for note in report.notes if "friction" in note]
 
 
 def test_blocks_do_not_matter() -> None:

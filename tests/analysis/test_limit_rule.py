@@ -20,19 +20,14 @@ from samples.marks import exhaustive, needs_compiler
 from samples.shipped import shipped_robot
 from scipy.optimize import minimize_scalar
 
+from vsacli import Flag, Limits, Report, Robot, Trajectory, motor_torques
 from vsacli.actuators.reach import LimitCheck
-from vsacli.analysis.report import Report
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import LIMITS, Flag, has_flag
+from vsacli.base.flags import LIMITS, has_flag
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.inverse import compute_block
 from vsacli.dynamics.limits import worst_excess
-from vsacli.robot.joint import Limits
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 ROBOTS = ("vsa_3r", "mixed_3r", "rp_2", "measured_1r", "hardening_1r", "coupled_1r", "tendon_1r", "cam_1r")
 
@@ -62,9 +57,9 @@ class Task(NamedTuple):
     joint: int
     name: str
 
-    def size(self, times: FloatArray) -> FloatArray:
+    def size(self, times: np.ndarray) -> np.ndarray:
         """The size of the quantity, of motors the larger one, (times,)."""
-        values: FloatArray = getattr(compute_block(self.robot, self.trajectory.at(times)), self.name)
+        values: np.ndarray = getattr(motor_torques(self.robot, self.trajectory.at(times)), self.name)
         values = np.abs(values[:, self.joint])
         return values if values.ndim == 1 else np.fmax.reduce(values, axis=1)
 
@@ -132,21 +127,21 @@ def random_task(seed: int) -> Task | None:
     names = [name for name in BOUNDED if name != "stiffness" or chosen[index]]
     name = str(rng.choice(names))
     free = Trajectory(times, position, _stiffness(np.where(chosen, 1e4, np.nan), 0.0, span), name="random")
-    dense = compute_block(robot, free.at(np.linspace(*span, 401)))
+    dense = motor_torques(robot, free.at(np.linspace(*span, 401)))
     level = np.where(chosen, rng.uniform(1.2, 2.0, count) * np.fmax.reduce(dense.stiffness_min), np.nan)
     if not np.isfinite(level[chosen]).all() or (level[chosen] <= 0).any():
         return None
     stiffness = _stiffness(level, 0.05, span)
     trajectory = Trajectory(times, position, stiffness, name="random")
     task = Task(robot, trajectory, index, name)
-    flags = compute_block(robot, trajectory.at(np.linspace(*span, 401))).flags
+    flags = motor_torques(robot, trajectory.at(np.linspace(*span, 401))).flags
     sprung = getattr(robot.joints[index].actuator, "spring", None) is not None
     if flags.any() or (name == "phi" and not sprung) or not np.isfinite(task.size(np.array([0.1]))).all():
         return None
     return task
 
 
-def _stiffness(level: FloatArray, swing: float, span: tuple[float, float]) -> dict[str, Sinusoids]:
+def _stiffness(level: np.ndarray, swing: float, span: tuple[float, float]) -> dict[str, Sinusoids]:
     swings = (tuple((swing * level).tolist()),)
     return {
         "stiffness": Sinusoids(

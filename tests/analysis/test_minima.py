@@ -14,7 +14,6 @@ from vsacli.analysis.minima import (
     find_brackets,
     narrow_brackets,
 )
-from vsacli.base.arrays import FloatArray, IndexArray
 
 PLACES = np.linspace(-0.49, 0.49, 23)
 """Where the functions have their minima, between the samples -1, 0, 1."""
@@ -36,7 +35,7 @@ def test_minima_between_three_samples(shape: str) -> None:
     function, least = SHAPES[shape], LEAST.get(shape, -20.0)
     calls = []
 
-    def evaluate(which: IndexArray, times: FloatArray) -> FloatArray:
+    def evaluate(which: np.ndarray, times: np.ndarray) -> np.ndarray:
         calls.append(times.size)
         return function(times - PLACES[which][:, None])
 
@@ -53,7 +52,7 @@ def test_minima_between_three_samples(shape: str) -> None:
 
 
 def test_what_is_known_is_not_computed() -> None:
-    def evaluate(_: IndexArray, __: FloatArray) -> FloatArray:
+    def evaluate(_: np.ndarray, __: np.ndarray) -> np.ndarray:
         raise AssertionError
 
     given = Brackets(np.array([0]), np.array([[0.0, 1.0, 2.0]]), np.array([[1.0005, 1.0, 1.0009]]))

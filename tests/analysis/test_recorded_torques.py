@@ -5,8 +5,7 @@ import pytest
 from samples.noisy_records import COLORS, MOTIONS, record
 from samples.recorded_torques import ARMS, outcomes
 
-from vsacli.control.simulation.simulate import simulate
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli import Trajectory, simulate
 
 RATE = 250
 

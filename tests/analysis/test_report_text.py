@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import pytest
 
+from vsacli import Report
 from vsacli.analysis.joint_report import COUNTED, JointReport
-from vsacli.analysis.report import Report
 from vsacli.analysis.self_check import SelfCheck
 from vsacli.analysis.trouble_text import failing_joints_line, finding_lines
 from vsacli.base.fitted_text import fitted

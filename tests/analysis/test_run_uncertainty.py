@@ -10,21 +10,19 @@ import pytest
 from samples.blurred import Blurred
 from samples.robots import vsa_3r
 
-from vsacli import inverse_dynamics
+from vsacli import Flag, Limits, Report, Trajectory, inverse_dynamics
 from vsacli.actuators.reach import LimitCheck
 from vsacli.analysis.joint_report import JointUncertainty, Spread
-from vsacli.analysis.report import VERDICTS, Report
+from vsacli.analysis.report import VERDICTS
 from vsacli.analysis.run import Run
 from vsacli.analysis.run_uncertainty import judged_variables
 from vsacli.analysis.trouble_text import uncertainty_lines
-from vsacli.base.flags import LIMITS, Flag, has_flag
+from vsacli.base.flags import LIMITS, has_flag
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.base.variables import deviation
-from vsacli.robot.joint import Limits
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 SPAN = (0.0, 2.0)
 AMPLITUDE = 0.3

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import cycle, islice
 from pathlib import Path
@@ -15,23 +15,16 @@ import pytest
 from samples.drives import motion
 from samples.long_chains import random_chain
 from samples.marks import slow, slow_but
+from samples.moves import move
 from samples.robots import random_robot, vsa_3r
+from samples.spoiled import scaled, spoil_drive, spoil_torque
 
-from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
-from vsacli.actuators.transmission import JointVariables
-from vsacli.analysis.report import Report
+from vsacli import Report, Robot, Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.analysis.run_dynamics import RunDynamics
 from vsacli.analysis.self_check import LADDER_BOUND, ROUNDING_GAIN, ladder
-from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.compute.engine import NUMPY, Engine
 from vsacli.compute.engine.engines import Kernel
-from vsacli.dynamics.drive import drive
-from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.variants import Variants
-from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import ConstantProfile, RestToRest
-from vsacli.trajectory.times import UniformTimes
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = {
@@ -112,30 +105,16 @@ def test_motion_far_too_fast_is_infeasible_but_sound(duration: float):
 def test_hardly_feasible_motions_pass(seed: int):
     """Some probes fall next to a fold, which the joint passes in a moment; these seeds were looked for."""
     rng = np.random.default_rng(seed)
-    span = (0.0, round(10 ** rng.uniform(-2, -0.5), 4))
+    duration = round(10 ** rng.uniform(-2, -0.5), 4)
     start, end = rng.uniform(-2, 2, (2, 3)).round(2)
-    trajectory = Trajectory(
-        UniformTimes(span[1], 20 / span[1]),
-        RestToRest(signal=POSITION, span=span, degree=9, start=tuple(start), end=tuple(end)),
-        {
-            "stiffness": RestToRest(
-                signal=STIFFNESS, span=span, degree=5, start=(2000.0,) * 3, end=(9000.0,) * 3
-            )
-        },
-        name="hasty",
-    )
+    stiffness = [2000.0] * 3, [9000.0] * 3
+    trajectory = move(duration, 20 / duration, (start, end), degrees=(9, 5), stiffness=stiffness)
     assert_sound(inverse_dynamics(random_robot("RPR", seed), trajectory).report)
 
 
 @pytest.mark.parametrize("duration", [0.05, 1, 600])
 def test_standing_still_passes(duration: float):
-    span = (0.0, duration)
-    hold = Trajectory(
-        UniformTimes(duration, 20 / duration),
-        ConstantProfile(signal=POSITION, span=span, value=(0.3, 0.2, 0.1)),
-        {"stiffness": ConstantProfile(signal=STIFFNESS, span=span, value=(850.0,) * 3)},
-        name="hold",
-    )
+    hold = move(duration, 20 / duration, ([0.3, 0.2, 0.1],) * 2, stiffness=([850.0] * 3,) * 2)
     assert_sound(inverse_dynamics(vsa_3r(), hold).report)
 
 
@@ -165,6 +144,12 @@ def fast_recording(**options: Any) -> Trajectory:
     return Trajectory.from_samples(time, q, np.full_like(q, 1000.0), fit="interpolate", **options)
 
 
+@pytest.fixture
+def few_times_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compute as few times together as for long chains."""
+    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
+
+
 def ladder_of(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> tuple[float, float]:
     """Return the error of a run nearest to its bound, and that bound."""
     errors, bounds = ladder(RunDynamics(Variants.of_one(robot), [trajectory], engine=engine))
@@ -172,10 +157,10 @@ def ladder_of(robot: Robot, trajectory: Trajectory, engine: Engine = NUMPY) -> t
 
 
 @pytest.mark.slow
-def test_how_many_times_are_computed_together_does_not_matter(monkeypatch):
+def test_how_many_times_are_computed_together_does_not_matter(request):
     """Those of long chains are computed some after the others."""
     whole = ladder_of(*load("7R"))
-    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
+    request.getfixturevalue("few_times_together")
     assert ladder_of(*load("7R")) == whole
 
 
@@ -185,7 +170,7 @@ class Counted:
     def __init__(self) -> None:
         self.calls = 0
 
-    def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
+    def run(self, kernel: Kernel, rows: Sequence[np.ndarray]) -> np.ndarray:
         self.calls += 1
         return np.zeros((kernel.outputs, len(rows[0])))
 
@@ -194,28 +179,23 @@ class Counted:
 def test_blocks_of_long_chains_do_not_grow_in_number(joints: int):
     """A block is as much work as the chain is long, and the shorter; in blocks the check must not grow."""
     robot = random_chain(joints)
-    position, stiffness = (
-        ConstantProfile(signal=each, span=(0.0, 1.0), value=(900.0,) * joints)
-        for each in (POSITION, STIFFNESS)
-    )
-    hold = Trajectory(UniformTimes(1.0, 20.0), position, {"stiffness": stiffness}, name="hold")
+    still = ([900.0] * joints,) * 2
+    hold = move(1.0, 20.0, still, stiffness=still)
     counted = Counted()
     ladder_of(robot, hold, counted)
     assert counted.calls == 2  # 4 and 20 if there were as many times as for short ones
 
 
 @pytest.mark.slow
-def test_memory_of_long_chains_is_that_of_the_times_computed_together(monkeypatch):
+@pytest.mark.usefixtures("few_times_together")
+def test_memory_of_long_chains_is_that_of_the_times_computed_together():
     """All times at all scales, of eight derivatives, would take three times as much."""
     arm = load("7R")[0]
     joints = [
         replace(joint, name=f"joint_{number}") for number, joint in enumerate(islice(cycle(arm.joints), 40))
     ]
     chain = replace(arm, gravity=(0.0, 0.0, 0.0), joints=tuple(joints))
-    motion = RestToRest(signal=POSITION, span=(0.0, 3.0), start=(0.0,) * 40, end=(0.005,) * 40, degree=7)
-    stiffness = ConstantProfile(signal=STIFFNESS, span=(0.0, 3.0), value=(2200.0,) * 40)
-    trajectory = Trajectory(UniformTimes(3.0, 300.0), motion, {"stiffness": stiffness}, name="chain")
-    monkeypatch.setattr("vsacli.analysis.self_check.usual_block", lambda _joints: 200)
+    trajectory = move(3.0, 300.0, ([0.0] * 40, [0.005] * 40), stiffness=([2200.0] * 40,) * 2)
     tracemalloc.start()
     try:
         ladder_of(chain, trajectory)
@@ -258,45 +238,6 @@ def test_stamps_since_1970_pass():
 # Wrong results
 
 
-Defect = Callable[[FloatArray], FloatArray]
-
-
-def spoil_torque(
-    monkeypatch: pytest.MonkeyPatch, order: int, spoil: Callable[[FloatArray], FloatArray]
-) -> None:
-    """Let the recursion return a derivative of tau_e, (samples, joints), with a defect."""
-
-    class Spoiled(LinkTorques):
-        def __call__(self, rows: Sequence[FloatArray]) -> list[FloatArray]:
-            torques, joints = super().__call__(rows), len(self.robot.joints)
-            part = slice(order * joints, (order + 1) * joints)
-            torques[part] = list(spoil(np.stack(torques[part], axis=-1)).T)
-            return torques
-
-    monkeypatch.setattr("vsacli.dynamics.inverse.LinkTorques", Spoiled)
-
-
-def spoil_drive(
-    monkeypatch: pytest.MonkeyPatch,
-    name: str,
-    spoil: Callable[[FloatArray], FloatArray],
-    joint_name: str = "",
-) -> None:
-    """Let the actuation return a variable, (2, samples), with a defect, at one joint or at all."""
-
-    def spoiled(joint, *arguments) -> JointVariables:
-        driven = drive(joint, *arguments)
-        if joint_name not in ("", joint.name):
-            return driven
-        return driven._replace(**{name: spoil(getattr(driven, name))})
-
-    monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
-
-
-def scaled(factor: float) -> Defect:
-    return lambda values: values * factor
-
-
 @arms
 @pytest.mark.parametrize("order", [1, 2], ids=["dtau_e", "ddtau_e"])
 @pytest.mark.parametrize("defect", [slow(1e-2), 1e-6])
@@ -318,7 +259,7 @@ def test_a_single_wrong_joint_fails(joint: int, order: int, monkeypatch):
 def test_torque_wrong_for_a_moment_fails(monkeypatch):
     """A defect of a fiftieth of the values, such as a wrong branch would make."""
 
-    def spoil(torque: FloatArray) -> FloatArray:
+    def spoil(torque: np.ndarray) -> np.ndarray:
         return torque * np.where(torque > np.quantile(torque, 0.98), 1.01, 1)
 
     spoil_torque(monkeypatch, 2, spoil)
@@ -366,7 +307,7 @@ def test_missing_numbers_of_regular_steps_fail(name: str, monkeypatch):
 def test_a_single_missing_deflection_fails(monkeypatch):
     robot, trajectory = load("3R")
 
-    def spoil(phi: FloatArray) -> FloatArray:
+    def spoil(phi: np.ndarray) -> np.ndarray:
         lost = (np.arange(phi.shape[1]) == 2000) & (phi.shape[1] == trajectory.samples)
         return np.where(lost, math.nan, phi)
 

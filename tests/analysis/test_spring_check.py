@@ -2,57 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 from samples.shipped import shipped_run
+from samples.spoiled import spoil_drive
 
 from vsacli import inverse_dynamics
-from vsacli.actuators.transmission import JointVariables
-from vsacli.analysis.self_check import LADDER_BOUND
-from vsacli.base.arrays import FloatArray
-from vsacli.compute.engine import NUMPY, ChosenEngine, Kernel
-from vsacli.dynamics.balances import BalancedDynamics
-from vsacli.dynamics.drive import drive
+from vsacli.analysis.run_dynamics import RunDynamics
+from vsacli.analysis.self_check import RunCheck
+from vsacli.dynamics.variants import Variants
 
 RUN = "vsa_3r", "rest_to_rest"
 
 
-class Faulty:
-    """An engine whose deflections are wrong in a stretch of steps, but not the residuals that it finds."""
-
-    def __init__(self, first: int, count: int) -> None:
-        self._first, self._stop = first, first + count
-
-    def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
-        found = NUMPY.run(kernel, rows)
-        if isinstance(kernel, BalancedDynamics):
-            kernel.results.arrays(found)["phi"][..., self._first : self._stop] += 1e-9
-        return found
-
-
 @pytest.mark.parametrize("first", [0, 1234, 3980])
-def test_a_program_that_is_wrong_in_a_stretch_is_found_apart_from_it(first: int, monkeypatch):
-    """A 199th of the 4001 steps, which are in one block; finite differences do not show it."""
-    choice = ChosenEngine(Faulty(first, 21), "a fault")
-    monkeypatch.setattr("vsacli.analysis.batch.choose", lambda *_, **_keywords: choice)
-    monkeypatch.setattr(
-        "vsacli.analysis.self_check.ladder", lambda _: (np.zeros(1), np.full(1, LADDER_BOUND))
-    )
-    check = inverse_dynamics(*shipped_run(*RUN)).report.self_check
-    assert check.spring_residual > 1e-11
-    assert not check.passed
+def test_a_program_that_is_wrong_in_a_stretch_is_found_apart_from_it(first: int):
+    """A 199th of the 4001 steps, which are in one block, without a trace in the residuals of the program."""
+    robot, trajectory = shipped_run(*RUN)
+    dynamics = RunDynamics(Variants.of_one(robot), [trajectory])
+    check, block = RunCheck(dynamics), dynamics.compute(trajectory.block(0, trajectory.samples))
+    block.phi[first : first + 21] += 1e-9
+    check.add(block)
+    (outcome,) = check.outcomes()
+    assert outcome.spring_residual > 1e-11
+    assert not outcome.passed
 
 
 def test_the_residual_of_every_step_counts(monkeypatch):
     """Also of one that is not among those whose laws are evaluated apart."""
 
-    def spoiled(joint, *arguments) -> JointVariables:
-        driven = drive(joint, *arguments)
-        phi = driven.phi.copy()
-        phi[:, phi.shape[1] // 3 + 1 :: 10**6] += 1e-9
-        return driven._replace(phi=phi)
+    def shift_one_sample(phi: np.ndarray) -> np.ndarray:
+        return phi + 1e-9 * (np.arange(phi.shape[1]) == phi.shape[1] // 3 + 1)
 
-    monkeypatch.setattr("vsacli.dynamics.inverse.drive", spoiled)
+    spoil_drive(monkeypatch, "phi", shift_one_sample)
     assert inverse_dynamics(*shipped_run(*RUN)).report.self_check.spring_residual > 1e-11

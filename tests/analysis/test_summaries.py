@@ -12,19 +12,12 @@ from samples.drives import Stopped, lower_by_branch, motion, springs, with_branc
 from samples.robots import vsa_3r
 from samples.shipped import shipped_robot
 
-from vsacli import inverse_dynamics
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
+from vsacli import Antagonistic, Flag, Limits, Motor, Report, Robot, Trajectory, inverse_dynamics, laws
 from vsacli.actuators.reach import margin
-from vsacli.analysis.report import Report
 from vsacli.analysis.run import Run
-from vsacli.base.flags import LIMITS, Flag
+from vsacli.base.flags import LIMITS
 from vsacli.compute.engine.engines import SAMPLES_PER_PASS
 from vsacli.dynamics.inverse import usual_block
-from vsacli.robot.joint import Limits
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Trajectory
 
 MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "det_A")
 
@@ -32,7 +25,7 @@ MOTOR_VARIABLES = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmissio
 def troubled() -> tuple[Robot, Trajectory]:
     """Joint 1 touches the end of its corridor, 2 breaks limits, 3 leaves the corridor."""
     motor = Motor(inertia=3.05, damping=1e-4, max_torque=25, max_velocity=0.5)
-    spring = Cubic(k=400, k_c=2000, max_deflection=0.08)
+    spring = laws.Cubic(k=400, k_c=2000, max_deflection=0.08)
     shoulder = dataclasses.replace(
         vsa_3r().joints[1],
         actuator=Antagonistic(motor=(motor, motor), spring=(spring, spring)),
@@ -175,7 +168,9 @@ def test_end_of_a_run_that_stopped_early_is_unknown():
 
 def test_report_names_the_other_branch_if_it_does_for_every_step():
     """Springs a hundred times too soft for the elbow, so that its load is beyond where the branches part."""
-    weak = dataclasses.replace(vsa_3r().joints[2], actuator=springs(Cubic(k=4, k_c=20), Cubic(k=4.4, k_c=20)))
+    weak = dataclasses.replace(
+        vsa_3r().joints[2], actuator=springs(laws.Cubic(k=4, k_c=20), laws.Cubic(k=4.4, k_c=20))
+    )
     tau_e = inverse_dynamics(vsa_3r(), motion()).tau_e[:, 2]
     lower = lower_by_branch(weak, tau_e)
     low, high = sorted(lower, key=lambda branch: lower[branch].max())

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from vsacli import InputError
 from vsacli.base.did_you_mean import did_you_mean, nearest
-from vsacli.base.errors import InputError
 from vsacli.base.variables import select_variables
 
 ROBOTS = ["awas_1r", "cam_1r", "vsa_3r", "vsa_cubebot", "vsa_ii"]

@@ -8,15 +8,15 @@ import signal
 import stat
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from samples.system_errors import fail_with
 
+from vsacli import InputError, StorageError
 from vsacli.base import storage
-from vsacli.base.errors import InputError, StorageError
 from vsacli.base.interrupts import ENDING, Interrupted, unwinding_when_ended
 from vsacli.base.outputs import Outputs, Staged
 from vsacli.base.storage import reporting_storage_errors, temporary_folder
@@ -60,25 +60,15 @@ def test_nothing_is_written_if_one_file_exists(project: Path) -> None:
     assert not (project / "further").exists()
 
 
-@pytest.mark.parametrize("links", [True, False])
 @pytest.mark.parametrize("call", ["replace", "link", "rename", "fsync"])
 @pytest.mark.parametrize("which", range(6))
 def test_nothing_is_written_if_any_step_fails(
-    project: Path, monkeypatch: pytest.MonkeyPatch, call: str, which: int, links: bool
+    project: Path, before_system_call: Any, call: str, which: int, links: bool
 ) -> None:
     """Whichever of the system's calls reports an error: all files are the old ones, or all the new."""
-    before, count = contents(project), iter(range(1000))
-    genuine = getattr(os, call)
-
-    def failing(*arguments: object, **options: object) -> object:
-        if next(count) == which:
-            raise OSError(errno.EIO, "Input/output error")
-        return genuine(*arguments, **options)
-
-    if not links:
-        monkeypatch.setattr(os, "link", no_links)
+    before, numbers = contents(project), iter(range(1000))
     if links or call != "link":
-        monkeypatch.setattr(os, call, failing)
+        before_system_call(call, fail_with(errno.EIO, lambda *_: next(numbers) == which))
     message = ""
     try:
         write(project, overwrite=True)
@@ -90,10 +80,6 @@ def test_nothing_is_written_if_any_step_fails(
         assert not (project / "further").exists()
     else:
         assert contents(project) == {"a": "new a", "b": "new b", "c": "new c", "further/below/d": "new d"}
-
-
-def no_links(*_: object, **__: object) -> None:
-    raise PermissionError(errno.EPERM, "Operation not permitted")
 
 
 def test_an_exception_of_the_caller_leaves_nothing(project: Path) -> None:
@@ -113,13 +99,9 @@ def test_an_exception_of_the_caller_leaves_nothing(project: Path) -> None:
 
 
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o664, 0o755])
-@pytest.mark.parametrize("links", [True, False])
-def test_a_file_that_is_replaced_keeps_its_mode(
-    project: Path, monkeypatch: pytest.MonkeyPatch, mode: int, links: bool
-) -> None:
+@pytest.mark.usefixtures("links")
+def test_a_file_that_is_replaced_keeps_its_mode(project: Path, mode: int) -> None:
     (project / "a").chmod(mode)
-    if not links:
-        monkeypatch.setattr(os, "link", no_links)
     write(project, overwrite=True)
     assert (project / "a").read_text() == "new a"
     assert stat.S_IMODE((project / "a").stat().st_mode) == mode
@@ -194,7 +176,7 @@ def test_a_folder_where_a_file_stands_is_refused(project: Path) -> None:
 
 @pytest.mark.parametrize("overwrite", [False, True])
 def test_content_is_on_the_disk_before_the_file_has_its_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overwrite: bool
+    tmp_path: Path, before_system_call: Any, overwrite: bool
 ) -> None:
     target, synced = tmp_path / "r.txt", []
 
@@ -202,7 +184,7 @@ def test_content_is_on_the_disk_before_the_file_has_its_name(
         status = os.fstat(descriptor)
         synced.append(("folder" if stat.S_ISDIR(status.st_mode) else status.st_size, target.exists()))
 
-    monkeypatch.setattr(os, "fsync", sync)
+    before_system_call("fsync", sync)
     with Outputs(overwrite=overwrite) as outputs:
         outputs.file(target).write_text("content")
     assert synced == [(len("content"), False), ("folder", True)]
@@ -251,10 +233,8 @@ def test_what_fails_elsewhere_is_not_the_fault_of_temporary_files(tmp_path: Path
         fail(tmp_path / "r.h5")
 
 
-def test_temporary_folders_of_killed_processes_are_removed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+def test_temporary_folders_of_killed_processes_are_removed(tmp_path: Path, temporary_files: Any) -> None:
+    temporary_files(tmp_path)
     script = (
         "import os; from vsacli.base.storage import temporary_folder;"
         "context = temporary_folder(); print(context.__enter__()); os.kill(os.getpid(), 9)"
@@ -271,17 +251,9 @@ def test_temporary_folders_of_killed_processes_are_removed(
 
 
 @pytest.mark.usefixtures("own_signals")
-def test_a_signal_while_files_get_their_names_comes_too_late(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_signal_while_files_get_their_names_comes_too_late(tmp_path: Path, before_system_call: Any) -> None:
     """It would say that nothing was written; one before them is in time."""
-    genuine = os.link
-
-    def ending(*arguments: Any) -> None:
-        signal.raise_signal(signal.SIGTERM)
-        genuine(*arguments)
-
-    monkeypatch.setattr(os, "link", ending)
+    before_system_call("link", lambda *_: signal.raise_signal(signal.SIGTERM))
     with unwinding_when_ended():
         with pytest.raises(Interrupted):
             write_until_ended(tmp_path / "a")

@@ -13,16 +13,11 @@ from samples.springs import SPRINGS
 from subjects import motion, seven_joints
 from timing import medians
 
+from vsacli import Antagonistic, Joint, Motor, link_torques, mechanisms
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.mechanisms import MECHANISMS
-from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.engine.engines import SAMPLES_PER_PASS
 from vsacli.dynamics.drive import drive
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.joint import Joint
 
 JOINTS = 7
 SHARES = {"light": 0.1, "heavy": 0.99}
@@ -51,7 +46,7 @@ def actuators() -> dict[str, Actuator]:
     for name, ((one, _), (other, _)) in SPRINGS.items():
         found[f"{name}, equal"] = Antagonistic(motor=motors, spring=(one, one))
         found[f"{name}, unequal"] = Antagonistic(motor=motors, spring=(one, other))
-    return found | {name: DEVICES[name].actuator for name in MECHANISMS}
+    return found | {name: DEVICES[name].actuator for name in mechanisms.MECHANISMS}
 
 
 def compare(samples: int, repeats: int) -> Iterator[Actuation]:
@@ -90,13 +85,13 @@ def _command(actuator: Actuator, samples: int, share: float) -> Command:
     return Command(still, still, still, tau_e, still, still, by_name(levels[level], still, still))
 
 
-def _swinging(time: FloatArray, swings: int) -> FloatArray:
+def _swinging(time: np.ndarray, swings: int) -> np.ndarray:
     """Between 0 and 1."""
-    swung: FloatArray = (1 - np.cos(2 * np.pi * swings * time)) / 2
+    swung: np.ndarray = (1 - np.cos(2 * np.pi * swings * time)) / 2
     return swung
 
 
-def _largest_load(actuator: Actuator, stiffness: FloatArray) -> FloatArray:
+def _largest_load(actuator: Actuator, stiffness: np.ndarray) -> np.ndarray:
     """About the largest |tau_e| up to which the stiffness allows any, in either direction."""
     low, high = np.zeros_like(stiffness), 10 * stiffness
     for _ in range(30):  # bisection
@@ -109,7 +104,7 @@ def _largest_load(actuator: Actuator, stiffness: FloatArray) -> FloatArray:
     return shares[np.logical_and.accumulate(allowed).sum(axis=0) - 1] * low
 
 
-def _fits(actuator: Actuator, stiffness: FloatArray, load: FloatArray) -> BoolArray:
+def _fits(actuator: Actuator, stiffness: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Whether a load in either direction allows the stiffness."""
     fits = np.ones(stiffness.shape, dtype=bool)
     for sign in (-1, 1):

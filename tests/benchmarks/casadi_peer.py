@@ -14,9 +14,7 @@ from pathlib import Path
 import casadi
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.joint import Joint
-from vsacli.robot.model import Robot
+from vsacli import Joint, Robot
 
 ORDERS = 5
 FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
@@ -63,7 +61,7 @@ class CasadiPeer:
         self._joints = len(robot.joints)
         self.operations = function.n_instructions()
 
-    def __call__(self, motion: list[FloatArray]) -> tuple[float, FloatArray]:
+    def __call__(self, motion: list[np.ndarray]) -> tuple[float, np.ndarray]:
         """Processor seconds in the C loop, and the torques with two derivatives, (samples, 3 joints)."""
         rows = np.ascontiguousarray(np.concatenate(motion, axis=1))
         torques = np.empty((len(rows), 3 * self._joints))

@@ -17,14 +17,13 @@ from single_calls import SCALAR_FLAGS
 from subjects import chain, motion, seven_joints
 from timing import Seconds, cpu_seconds, medians
 
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot
 from vsacli.compute.engine.compiled_engine import CompiledEngine, kernel_code
 from vsacli.compute.engine.compiler import FLAGS, system_compiler
 from vsacli.compute.engine.engines import Engine, Kernel, passes
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.robot.model import Robot
 
 LINKS, WHOLE = "link torques", "whole inverse dynamics"
 JOINTS = (1, 2, 3, 5, 7, 10, 20, 50, 100, 200)
@@ -54,7 +53,7 @@ def batches(samples: int, repeats: int) -> Seconds:
         return {name: seconds / samples for name, seconds in medians(ways, repeats).items()}
 
 
-def _in_blocks(engine: Engine, kernel: Kernel, rows: Sequence[FloatArray]) -> Callable[[], object]:
+def _in_blocks(engine: Engine, kernel: Kernel, rows: Sequence[np.ndarray]) -> Callable[[], object]:
     """As a run takes them."""
 
     def way() -> None:

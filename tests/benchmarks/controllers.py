@@ -15,11 +15,10 @@ from samples.cortex_m7.instructions import taken
 from samples.shipped import shipped_robot
 from single_calls import single_calls
 
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot
 from vsacli.control.codegen.cost import worst_cost
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
-from vsacli.robot.model import Robot
 
 NAMES = ("vsa_3r", "lwr_7r_vsa", "measured_1r")
 PRECISIONS = ("double", "float")
@@ -70,7 +69,7 @@ def _measured() -> Iterator[Controller]:
             yield Controller(name, precision, operations, flash, stack, usual, most, calls.median * 1e-6)
 
 
-def _on_cortex_m7(robot: Robot, precision: str, command: FloatArray) -> tuple[int, int, FloatArray]:
+def _on_cortex_m7(robot: Robot, precision: str, command: np.ndarray) -> tuple[int, int, np.ndarray]:
     """Bytes of code and of stack, and instructions of calls."""
     prefix = prefix_of(robot)
     with tempfile.TemporaryDirectory() as name:

@@ -16,11 +16,12 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # the samples of the tests
 
+import numpy as np
 from samples.shipped import shipped_run
 from subjects import chain
 from timing import cpu_seconds, medians
 
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot
 from vsacli.compute.engine.compiled_engine import CompiledEngine, kernel_code
 from vsacli.compute.engine.compiler import system_compiler
 from vsacli.compute.engine.engines import (
@@ -34,7 +35,6 @@ from vsacli.compute.engine.engines import (
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.energy import IntervalEnergy
 from vsacli.dynamics.inverse import InverseDynamics, block_of
-from vsacli.robot.model import Robot
 from vsacli.trajectory.times import UniformTimes
 
 RUNS = {
@@ -57,7 +57,7 @@ JOINTS = (20, 50, 100)
 class Noted(NumPyEngine):
     """NumPy, with a note of the kernel and the rows that it was given."""
 
-    def run(self, kernel: Kernel, rows: list[FloatArray]) -> FloatArray:
+    def run(self, kernel: Kernel, rows: list[np.ndarray]) -> np.ndarray:
         self.kernel, self.rows = kernel, [row.copy() for row in rows]
         return super().run(kernel, rows)
 

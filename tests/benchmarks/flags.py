@@ -20,8 +20,7 @@ from markdown import table
 from samples.engines import demands
 from subjects import ROBOTS
 
-from vsacli import load_robot
-from vsacli.base.flags import Flag
+from vsacli import Flag, load_robot
 from vsacli.compute.engine import choose
 from vsacli.dynamics.inverse import InverseDynamics, compute_block
 

@@ -12,11 +12,10 @@ from typing import Any
 import casadi
 import numpy as np
 
+from vsacli import Joint
 from vsacli.actuators.laws.cubic import Cubic
 from vsacli.actuators.laws.tendons import Exponential
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Range
 
 OPTIONS = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-7}}
@@ -38,9 +37,9 @@ class Program:
     joint: Joint
     command: Command
     admissible: Range
-    basis: FloatArray
-    weights: FloatArray
-    start: FloatArray
+    basis: np.ndarray
+    weights: np.ndarray
+    start: np.ndarray
 
     def solved(self) -> float:
         """Build and solve the program; the root mean square of the motor torques."""

@@ -12,13 +12,12 @@ import jax
 import numpy as np
 from jax import numpy as jnp
 
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Robot
+from vsacli import Robot
 
 jax.config.update("jax_enable_x64", True)
 
 
-def mapped_torques(robot: Robot) -> Callable[[FloatArray, FloatArray], FloatArray]:
+def mapped_torques(robot: Robot) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     """Torques, (variants, samples, joints), of masses, (variants, joints), along (3, samples, joints)."""
     over_samples = jax.vmap(lambda masses, motion: _torques(robot, masses, *motion), (None, 1))
     compiled = jax.jit(jax.vmap(over_samples, (0, None)))

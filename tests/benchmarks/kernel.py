@@ -13,8 +13,7 @@ from pinocchio_peer import link_torques as pinocchio_torques
 from subjects import motion, seven_joints
 from timing import cpu_seconds, medians
 
-from vsacli.base.arrays import FloatArray
-from vsacli.dynamics.elastic_torques import link_torques
+from vsacli import link_torques
 
 DURATION = 3.0
 OURS = "vsacli, NumPy"
@@ -62,7 +61,7 @@ def compare(samples: int, python_samples: int, repeats: int) -> list[Kernel]:
     ]
 
 
-def _differences(found: Iterable[FloatArray], expected: Iterable[FloatArray]) -> tuple[float, ...]:
+def _differences(found: Iterable[np.ndarray], expected: Iterable[np.ndarray]) -> tuple[float, ...]:
     return tuple(
         float(np.abs(theirs - ours).max() / np.abs(ours).max())
         for theirs, ours in zip(found, expected, strict=True)

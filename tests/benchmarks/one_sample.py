@@ -19,7 +19,6 @@ from vsacli import (
     motor_torques,
     state_derivative,
 )
-from vsacli.base.arrays import FloatArray
 from vsacli.compute.engine.number_engine import RECORDED_FROM
 
 PEER = "link torques, casadi.Function"
@@ -58,7 +57,7 @@ def compare(repeats: int) -> tuple[Seconds, float, float]:
     return taken, recording, first
 
 
-def agree(derivatives: list[FloatArray], flat: FloatArray, peer: Callable, robot: object) -> None:
+def agree(derivatives: list[np.ndarray], flat: np.ndarray, peer: Callable, robot: object) -> None:
     """Both compute the same torques."""
     ours = np.concatenate(link_torques(robot, *derivatives))
     np.testing.assert_allclose(np.array(peer(flat)).ravel(), ours, rtol=1e-9, atol=1e-9 * np.abs(ours).max())

@@ -16,14 +16,11 @@ from ipopt_peer import Program
 from subjects import ROBOTS, TRAJECTORIES
 from timing import Seconds, cpu_seconds, medians
 
-from vsacli import load_robot, load_trajectory, optimize
+from vsacli import Robot, Trajectory, load_robot, load_trajectory, optimize
 from vsacli.base.arrays import evenly
-from vsacli.dynamics.losses import trapezoidal
-from vsacli.robot.model import Robot
 from vsacli.studies.search.acceptance import Acceptance, checked_range
 from vsacli.studies.search.loads import joint_loads, periods, rests
 from vsacli.studies.search.splines import SplineSpace
-from vsacli.trajectory.trajectory import Trajectory
 
 VSACLI, PEER = "`vsacli optimize`", "CasADi + IPOPT"
 MARGIN = 0.01

@@ -6,11 +6,10 @@ import numpy as np
 import pinocchio
 from oracles.pinocchio import build
 
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Robot
+from vsacli import Robot
 
 
-def link_torques(robot: Robot, motion: list[FloatArray], step: float) -> tuple[FloatArray, ...]:
+def link_torques(robot: Robot, motion: list[np.ndarray], step: float) -> tuple[np.ndarray, ...]:
     """tau_e, and its first two derivatives by central differences over samples `step` seconds apart."""
     model = build(robot)
     data = model.createData()

@@ -12,10 +12,9 @@ from stages import trajectory_of
 from subjects import chain, seven_joints
 from timing import Seconds, cpu_seconds, medians
 
-from vsacli import inverse_dynamics, sensitivity
+from vsacli import Trajectory, inverse_dynamics, sensitivity
 from vsacli.robot.parameters import parameters
 from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.trajectory import Trajectory
 
 SAMPLES = 4_000
 LONG_CHAIN = 20

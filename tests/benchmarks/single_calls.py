@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from subjects import motion, seven_joints
 
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot
 from vsacli.control.codegen.project import generate, prefix_of
-from vsacli.robot.model import Robot
 
 CALLS = 1_000_000
 SCALAR_FLAGS = ("-std=c99", "-O2", "-march=native")
@@ -53,7 +52,7 @@ def calls_of_seven_joints() -> Calls:
     return single_calls(seven_joints(), commands, "double", CALLS)
 
 
-def single_calls(robot: Robot, commands: FloatArray, precision: str, calls: int) -> Calls:
+def single_calls(robot: Robot, commands: np.ndarray, precision: str, calls: int) -> Calls:
     """Time each of many calls.
 
     Args:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from subjects import motion, seven_joints
 from timing import Seconds, cpu_seconds, medians
 
+from vsacli import link_torques
 from vsacli.compute.engine import choose
-from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques
 
 SIZES = (1e-105, 1e-160, 1e-200, 1e-310)
 """Of the derivatives: their products of three, of two, and they themselves are subnormal, or were."""

@@ -10,17 +10,15 @@ from typing import NamedTuple
 from subjects import SEVEN_JOINTS, seven_joints
 from timing import cpu_seconds, medians
 
-from vsacli import load_trajectory
+from vsacli import Robot, Trajectory, link_torques, load_trajectory
 from vsacli.analysis.run import Run
 from vsacli.base.outputs import Outputs
 from vsacli.base.variables import Block
 from vsacli.compute.engine import choose
-from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics, compute_block, usual_block
 from vsacli.results.store.writer import ResultWriter
-from vsacli.robot.model import Robot
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 VARIABLES = ("tau_motor", "flags")
 

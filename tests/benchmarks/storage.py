@@ -17,9 +17,7 @@ from stages import trajectory_of
 from subjects import PAPER, seven_joints
 from timing import cpu_seconds, medians
 
-from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
-from vsacli.analysis.result import Result
-from vsacli.base.arrays import AnyArray
+from vsacli import Result, Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.results.store.new_file import chunk_rows
 
 SAMPLES = 20_000
@@ -69,7 +67,7 @@ def _subjects() -> Iterator[tuple[str, Result]]:
     yield "3R arm, recorded", inverse_dynamics(arm, Trajectory.from_samples(time, q, stiffness))
 
 
-def _stored(arrays: Mapping[str, AnyArray], repeats: int) -> Iterator[tuple[str, Stored]]:
+def _stored(arrays: Mapping[str, np.ndarray], repeats: int) -> Iterator[tuple[str, Stored]]:
     with tempfile.TemporaryDirectory() as folder:
         paths = {way: Path(folder, f"{number}.h5") for number, way in enumerate(WAYS)}
         writing = medians(
@@ -87,7 +85,7 @@ def _stored(arrays: Mapping[str, AnyArray], repeats: int) -> Iterator[tuple[str,
             yield way, Stored(*(each / len(arrays["time"]) for each in taken))
 
 
-def _write(path: Path, arrays: Mapping[str, AnyArray], options: Mapping[str, Any]) -> None:
+def _write(path: Path, arrays: Mapping[str, np.ndarray], options: Mapping[str, Any]) -> None:
     with h5py.File(path, "w") as file:
         for name, values in arrays.items():
             kind = {"dtype": values.dtype, **(options if values.dtype.kind == "f" else {})}

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vsacli import load_robot
-from vsacli.base.arrays import FloatArray, over_time
-from vsacli.robot.model import Robot
+from vsacli import Robot, load_robot
+from vsacli.base.arrays import over_time
 
 ROOT = Path(__file__).resolve().parents[2]
 ROBOTS, TRAJECTORIES = ROOT / "robots", ROOT / "trajectories"
@@ -31,7 +30,7 @@ def chain(joints: int) -> Robot:
     return replace(arm, name=f"{joints} joints", joints=repeated)
 
 
-def motion(joints: int, samples: int) -> list[FloatArray]:
+def motion(joints: int, samples: int) -> list[np.ndarray]:
     """q and its four derivatives, each (samples, joints), laid out as a trajectory does: sines."""
     time = np.linspace(0, 3, samples)
     speed = 1 + np.arange(joints)[:, None] % 7 / 3

@@ -12,16 +12,14 @@ from jax_peer import mapped_torques
 from samples.shipped import shipped_run
 from timing import cpu_seconds, medians
 
-from vsacli import Trajectory
+from vsacli import Motion, Robot, Trajectory
 from vsacli.analysis.batch import Batch
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
 from vsacli.compute.engine import Engine, choose
 from vsacli.documents.record_values import with_numbers
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.variants import Variants
-from vsacli.robot.model import Robot
 from vsacli.robot.parameters import parameters
 from vsacli.trajectory.times import UniformTimes
 from vsacli.trajectory.trajectory import Motion
@@ -73,7 +71,7 @@ def compare(repeats: int) -> list[VariantTime]:
     ]
 
 
-def _inputs(variants: Variants, moving: Motion) -> list[FloatArray]:
+def _inputs(variants: Variants, moving: Motion) -> list[np.ndarray]:
     """Rows of the motion, the same for each variant, and of the masses."""
     rows = [np.tile(row, VARIANTS) for name in POSITION.names for row in getattr(moving, name).T]
     numbers = variants.inputs(np.repeat(np.arange(VARIANTS), SAMPLES))
@@ -97,13 +95,13 @@ def _single(variants: Variants, trajectory: Trajectory) -> None:
         assert run.findings().self_check.passed
 
 
-def _recursion(variants: Variants, inputs: list[FloatArray], engine: str) -> Callable[[], object]:
+def _recursion(variants: Variants, inputs: list[np.ndarray], engine: str) -> Callable[[], object]:
     kernel = variants.kernel(LinkTorques(variants.base))
     chosen: Engine = choose(engine, kernel, VARIANTS * SAMPLES, 1).engine
     return lambda: chosen.run(kernel, inputs)
 
 
-def _mapped(robot: Robot, inputs: list[FloatArray]) -> Callable[[], object]:
+def _mapped(robot: Robot, inputs: list[np.ndarray]) -> Callable[[], object]:
     """The torques with two derivatives by CasADi, whose masses are an argument."""
     masses = casadi.SX.sym("masses", len(robot.joints))
     chosen = parameters(robot, ["joints.*.link.mass"])

@@ -19,7 +19,6 @@ from growth import chain_documents
 from subjects import PAPER, ROBOTS, SEVEN_JOINTS, TRAJECTORIES
 
 from vsacli import load_robot, load_trajectory
-from vsacli.base.arrays import FloatArray
 
 EXPORTED = 1_200_000
 """Samples of the table that is written as CSV."""
@@ -126,7 +125,7 @@ def _hurried(folder: Path) -> tuple[Path, Path]:
     return SEVEN_MIXED[0], path
 
 
-def _save(path: Path, columns: Mapping[str, FloatArray]) -> None:
+def _save(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     table = np.column_stack(list(columns.values()))
     np.savetxt(path, table, "%.9g", ",", header=",".join(columns), comments="")
 

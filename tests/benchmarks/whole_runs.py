@@ -14,11 +14,10 @@ from stages import VARIABLES, trajectory_of
 from subjects import motion, seven_joints
 from timing import medians
 
+from vsacli import Robot, Trajectory
 from vsacli.analysis.run import Run
 from vsacli.base.outputs import Outputs
 from vsacli.results.store.writer import ResultWriter
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Trajectory
 
 SELECTIONS = {"all variables": None, f"`--variables {','.join(VARIABLES)}`": VARIABLES}
 

@@ -11,9 +11,9 @@ from samples.command_line import REPOSITORY, ROBOT, Outcome, contents, edited
 from samples.generated_code import STRICT, compile_c
 from samples.marks import needs_compiler
 
+from vsacli import Robot
 from vsacli.cli.console import Exit
 from vsacli.control.codegen.project import prefix_of
-from vsacli.robot.model import Robot
 
 Run = Callable[..., Outcome]
 
@@ -116,10 +116,7 @@ def test_a_wrong_robot_writes_nothing(vsacli: Run, tmp_path: Path) -> None:
 def test_what_is_left_out_is_said(vsacli: Run) -> None:
     outcome = vsacli("codegen", REPOSITORY / "robots" / "mixed_3r.yaml", "-o", "arm")
     assert outcome.code == Exit.OK
-    assert (
-        "no feedback_linearization: feedback linearization needs springs at all joints or at none"
-        in outcome.err
-    )
+    assert "no feedback_linearization" in outcome.err
 
 
 @pytest.mark.parametrize(

@@ -48,22 +48,16 @@ def test_result_file_and_json_hold_the_drift(vsacli, motion, tmp_path):
         assert json.loads(file["report/json"].asstr()[()])["deflections"] == deflections
 
 
-def test_existing_file_is_refused_before_the_integration(vsacli, motion, tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        "vsacli.dynamics.integrated_deflections.integrate_deflections",
-        lambda *_: pytest.fail("has begun to integrate"),
-    )
+@pytest.mark.usefixtures("no_computing")
+def test_existing_file_is_refused_before_the_integration(vsacli, motion, tmp_path):
     (tmp_path / "out.h5").write_text("mine")
     done = vsacli("invdyn", ROBOT, motion, "--deflection-solver", "ode", "-o", "out.h5")
     assert done.code == 4
     assert "out.h5: exists already" in done.err
 
 
-def test_bad_threshold_is_refused_before_the_integration(vsacli, motion, monkeypatch):
-    monkeypatch.setattr(
-        "vsacli.dynamics.integrated_deflections.integrate_deflections",
-        lambda *_: pytest.fail("has begun to integrate"),
-    )
+@pytest.mark.usefixtures("no_computing")
+def test_bad_threshold_is_refused_before_the_integration(vsacli, motion):
     done = vsacli("check-feasibility", ROBOT, motion, "--deflection-solver", "ode", "--min-margin", "2")
     assert done.code == 2
     assert "expected a share from 0 % to 100 %" in done.err

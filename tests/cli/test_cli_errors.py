@@ -78,10 +78,10 @@ def test_usage_error(vsacli, tmp_path, arguments, message):
     ("output", "message"),
     [
         ("absent/r.h5", "there is no folder"),
-        (".", "is a folder; give the name of a file"),
+        (".", "is a folder"),
         ("move.yaml/r.h5", "there is no folder|Not a directory"),
-        ("/dev/null", "is not a regular file and cannot be replaced"),
-        (f"{'r' * 300}.h5", "the file name is too long"),
+        ("/dev/null", "is not a regular file"),
+        (f"{'r' * 300}.h5", "name is too long"),
     ],
     ids=["no folder", "a folder", "below a file", "a device", "long name"],
 )
@@ -105,7 +105,7 @@ def test_folder_without_permission(vsacli, tmp_path, motion, feasible_result, co
     }
     done = vsacli(command, *arguments[command])
     assert done.code == 4
-    assert "no permission to write into this folder" in done.err
+    assert "no permission" in done.err
 
 
 @pytest.mark.parametrize("command", ["invdyn", "export", slow("plot")])
@@ -315,11 +315,11 @@ def test_a_csv_name_for_an_hdf5_file_is_refused(vsacli, tmp_path, command):
         ImportError(f"fast.so: cannot open shared object file: {os.strerror(errno.EMFILE)}"),
     ],
 )
-def test_too_many_open_files_are_no_bug(vsacli, monkeypatch, error):
-    def command(**_: object) -> None:
+def test_too_many_open_files_are_no_bug(vsacli, command_is, error):
+    def fail() -> None:
         raise error
 
-    monkeypatch.setattr(group, "main", command)
+    command_is(fail)
     outcome = vsacli("schema")
     advice = "too many files are open; `ulimit -n 256` allows more"
     assert (outcome.code, outcome.err) == (4, f"the command cannot go on: {advice}\n")

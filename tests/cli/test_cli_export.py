@@ -63,7 +63,7 @@ def test_undefined_samples_are_refused_and_nothing_written(vsacli, tmp_path, inf
     for output in ([], ["-o", "t.csv"]):
         done = vsacli("export", infeasible_result, *output)
         assert (done.code, done.out) == (3, "")
-        assert "base.tau_motor has no value at" in done.err
+        assert "base.tau_motor has no" in done.err
         assert "--allow-nan" in done.err
     assert contents(tmp_path) == {}
 
@@ -119,7 +119,7 @@ def test_variable_that_is_not_stored_is_named(vsacli, motion):
     vsacli("invdyn", ROBOT, motion, "-o", "r.h5", "--variables", "flags")
     done = vsacli("export", "r.h5")
     assert (done.code, done.out) == (2, "")
-    assert done.err.startswith("r.h5: holds no tau_motor; run invdyn again")
+    assert done.err.startswith("r.h5: holds no tau_motor")
 
 
 def test_unknown_variable_is_named(vsacli, feasible_result):

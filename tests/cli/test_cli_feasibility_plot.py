@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,27 +10,12 @@ from matplotlib.figure import Figure
 from samples.command_line import ROBOT, SEVEN_JOINTS, contents, seven_joint_motion
 from samples.figures import rest_to_rest
 
-from vsacli.dynamics.integrated_deflections import IntegratedDeflections, integrate_deflections
-from vsacli.dynamics.inverse import DeflectionStop
 from vsacli.results.charts.figures import FEASIBILITY_VARIABLES, feasibility
 from vsacli.results.charts.stored import StoredCharts
 from vsacli.results.plots import drawn as drawn_sheet
 
 PNG = b"\x89PNG\r\n\x1a\n"
 FIGURE = "figures/vsa_3r-soft-feasibility.png"
-
-
-@pytest.fixture
-def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
-    """The figures that commands draw."""
-    drawn: list[Figure] = []
-
-    def drawing(sheet) -> Figure:
-        drawn.append(drawn_sheet(sheet))
-        return drawn[-1]
-
-    monkeypatch.setattr("vsacli.results.plots.figures.drawn", drawing)
-    return drawn
 
 
 def labels(figure: Figure) -> list[str]:
@@ -49,9 +33,9 @@ def shaded(axes, label: str = "infeasible") -> list[tuple[float, float]]:
 
 
 @pytest.mark.slow
-def test_figure_is_all_that_is_written(vsacli, too_soft, tmp_path, monkeypatch):
+def test_figure_is_all_that_is_written(vsacli, too_soft, tmp_path, temporary_files):
     (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    temporary_files(tmp_path / "temporary")
     done = vsacli("check-feasibility", ROBOT, too_soft, "--plot", "figures")
     assert (done.code, done.err) == (3, f"wrote {FIGURE}\n")
     assert contents(tmp_path).keys() == {"soft.yaml", FIGURE}
@@ -69,9 +53,9 @@ def test_report_is_the_same_with_a_figure(vsacli, too_soft, options):
 
 
 @pytest.mark.slow
-def test_bad_stretches_are_those_of_the_report(vsacli, too_soft, figures):
+def test_bad_stretches_are_those_of_the_report(vsacli, too_soft, drawn_figures):
     done = vsacli("check-feasibility", ROBOT, too_soft, "--plot", "figures", "--json")
-    (figure,) = figures
+    (figure,) = drawn_figures.values()
     joints = json.loads(done.out)["joints"]
     assert titles(figure) == [joint["name"] for joint in joints]
     for axes, joint in zip(figure.axes, joints, strict=True):
@@ -83,21 +67,19 @@ def test_bad_stretches_are_those_of_the_report(vsacli, too_soft, figures):
 
 
 @pytest.mark.slow
-def test_ways_that_end_are_shaded(vsacli, motion, figures, monkeypatch):
-    def short(robot, trajectory) -> IntegratedDeflections:
-        """As if the shoulder could be followed for 1 s only."""
-        return replace(
-            integrate_deflections(robot, trajectory, 1e-8),
-            stops=(None, DeflectionStop(1.0, "it is told to"), None),
-        )
-
-    monkeypatch.setattr("vsacli.dynamics.integrated_deflections.integrate_deflections", short)
-    vsacli("check-feasibility", ROBOT, motion, "--plot", "figures", "--deflection-solver", "ode")
-    assert [shaded(axes) for axes in figures[0].axes] == [[], [(pytest.approx(0.995), 4.0)], []]
+def test_ways_that_end_are_shaded(vsacli, too_soft, drawn_figures):
+    followed = ("--deflection-solver", "ode", "--set", "rate=25", "--json")
+    done = vsacli("check-feasibility", ROBOT, too_soft, "--plot", "figures", *followed)
+    ends = [joint["stopped"]["time"] for joint in json.loads(done.out)["deflections"]["joints"]]
+    (figure,) = drawn_figures.values()
+    for axes, end in zip(figure.axes, ends, strict=True):
+        ((start, last),) = shaded(axes)
+        assert start - 0.02 < end <= start + 0.02  # half a step
+        assert last == 4
 
 
-def test_existing_figure_is_refused_before_computing(vsacli, too_soft, tmp_path, monkeypatch):
-    monkeypatch.setattr("vsacli.analysis.run.Run.__iter__", lambda _: pytest.fail("has begun to compute"))
+@pytest.mark.usefixtures("no_computing")
+def test_existing_figure_is_refused_before_computing(vsacli, too_soft, tmp_path):
     figure = tmp_path / FIGURE
     figure.parent.mkdir()
     figure.write_text("mine")
@@ -123,10 +105,11 @@ def test_folder_that_is_a_file_is_refused(vsacli, too_soft, tmp_path):
 
 
 @pytest.mark.slow
-def test_seven_joints_have_a_panel_each(vsacli, tmp_path, figures):
+def test_seven_joints_have_a_panel_each(vsacli, tmp_path, drawn_figures):
     motion = seven_joint_motion(tmp_path / "reach.yaml", rate=100)
     assert vsacli("check-feasibility", SEVEN_JOINTS, motion, "--plot", ".").code == 0
-    assert len(titles(figures[0])) == 7
+    (figure,) = drawn_figures.values()
+    assert len(titles(figure)) == 7
     assert (tmp_path / "lwr_7r_vsa-reach-feasibility.png").exists()
 
 

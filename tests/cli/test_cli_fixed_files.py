@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from samples.command_line import REPOSITORY
 
-from vsacli import load_robot, load_trajectory
+from vsacli import load_robot, load_trajectory, motor_torques
 from vsacli.base.flags import LIMITS
-from vsacli.dynamics.inverse import compute_block
 
 ROBOT = REPOSITORY / "robots" / "vsa_3r.yaml"
 FAST = """\
@@ -199,7 +198,7 @@ def test_each_cause_is_one_sentence_and_other_joints_are_fixed(tmp_path, vsacli)
     assert heading.startswith("fixes; with any of them every sample of all joints but shoulder has a margin")
     assert fixes
     trajectory = load_trajectory("fixed.yaml", load_robot(ROBOT))
-    block = compute_block(load_robot(ROBOT), trajectory.block(0, trajectory.samples))
+    block = motor_torques(load_robot(ROBOT), trajectory.block(0, trajectory.samples))
     room = (block.stiffness - block.stiffness_min) / block.stiffness
     assert room[:, [0, 2]].min() >= 0.01 - 1e-9
 
@@ -236,7 +235,7 @@ def test_transitions_that_are_too_short_are_lengthened_alone(tmp_path, vsacli):
     def kept(length):
         (tmp_path / "tried.yaml").write_text(CHANGING.replace("transition: 0.05", f"transition: {length}"))
         trajectory = load_trajectory(tmp_path / "tried.yaml", arm)
-        block = compute_block(arm, trajectory.at(np.linspace(0, 2, 2001)))
+        block = motor_torques(arm, trajectory.at(np.linspace(0, 2, 2001)))
         return not np.any(block.flags & int(LIMITS))
 
     assert kept(found)

@@ -9,13 +9,10 @@ import pytest
 from samples.command_line import REPOSITORY, contents
 from samples.urdf import joint, link, random_serial, robot, serial, write
 
-from vsacli import load_robot
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
+from vsacli import Antagonistic, Elastic, Placeholders, Rigid, import_urdf, load_robot
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.actuators.rigid import Rigid
 from vsacli.cli.import_urdf import import_urdf as command
-from vsacli.robot.urdf import Placeholders, converted_robot_text, import_urdf
+from vsacli.robot.urdf import converted_robot_text
 
 DESK_ARM = REPOSITORY / "robots" / "desk_arm.urdf"
 
@@ -177,7 +174,7 @@ def test_overwriting(vsacli, tmp_path):
         (["--hold", "left_finger=0", "--hold", "left_finger=1"], "'left_finger' is held twice"),
         (
             ["--hold", "left_finger=1 deg"],
-            "'1 deg' is an angle; expected a number in m",
+            "'1 deg' is an angle",
         ),
         (["--tip", "flang"], "--tip: there is no link 'flang'; did you mean 'flange'?"),
     ],

@@ -23,7 +23,6 @@ from samples.disturbed import allow_interrupts
 from samples.marks import slow
 
 from vsacli.base.interrupts import Interrupted
-from vsacli.cli.main import vsacli as group
 
 PATIENCE = 60
 """Seconds until a run that should have started writing counts as broken."""
@@ -190,17 +189,14 @@ with unwinding_when_ended():
     assert (done.stdout, done.stderr) == ("ended from outside by SIGTERM\n", "")
 
 
-def test_a_signal_in_the_making_of_a_class_is_no_bug(vsacli, monkeypatch) -> None:
+def test_a_signal_in_the_making_of_a_class_is_no_bug(vsacli, command_is) -> None:
     """Where a class is made, Python 3.11 passes an exception on as the cause of another one."""
 
     class Begins:
         def __set_name__(self, _owner: type, _name: str) -> None:
             raise Interrupted(signal.SIGTERM)
 
-    def command(**_: object) -> None:
-        type("Made", (), {"attribute": Begins()})
-
-    monkeypatch.setattr(group, "main", command)
+    command_is(lambda: type("Made", (), {"attribute": Begins()}))
     outcome = vsacli("schema")
     assert (outcome.code, outcome.err) == (143, "ended from outside by SIGTERM\n")
 

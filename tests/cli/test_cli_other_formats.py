@@ -10,8 +10,7 @@ import pytest
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, Outcome
 from samples.urdf import serial
 
-from vsacli import load_robot
-from vsacli.base.errors import InputError
+from vsacli import InputError, load_robot
 
 Command = Callable[..., Outcome]
 

@@ -9,8 +9,7 @@ import pytest
 from samples.command_line import REPOSITORY
 from samples.urdf import write
 
-from vsacli import load_robot
-from vsacli.base.errors import InputError
+from vsacli import InputError, load_robot
 from vsacli.robot.model import OF_PLACEHOLDERS
 
 KEY = "placeholder: true\n"

@@ -75,8 +75,8 @@ def test_overwrite_replaces_figures_and_verbose_describes_the_result(vsacli, tmp
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "is empty; expected a result file, as invdyn or simulate writes it"),
-        (b"time,q1\n", "is not an HDF5 file; expected a result file, as invdyn or simulate writes it"),
+        (b"", "is empty"),
+        (b"time,q1\n", "is not an HDF5 file"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "is damaged or truncated"),
     ],
     ids=["empty", "table", "truncated"],

@@ -112,9 +112,9 @@ def test_what_is_not_drawn_is_refused(vsacli, own_folder, arguments, message):
     assert contents(own_folder) == before
 
 
-def test_an_existing_figure_is_refused_before_anything_is_fitted(vsacli, log, monkeypatch):
+@pytest.mark.usefixtures("no_computing")
+def test_an_existing_figure_is_refused_before_anything_is_fitted(vsacli, log):
     (log.parent / "log-recording.png").write_bytes(b"precious")
-    monkeypatch.setattr("vsacli.trajectory.recorded.samples.fit_samples", None)
     done = vsacli("plot", log.name)
     assert done.code == 4
     assert done.err.startswith("log-recording.png: exists already;")

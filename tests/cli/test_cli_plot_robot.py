@@ -38,7 +38,7 @@ def test_of_rigid_joints_only_the_arm_is_drawn_and_a_note_says_so(vsacli, tmp_pa
     [
         (["--from", "1"], "--from cannot be used with a robot; leave it out"),
         (["--joints", "elbow"], "--joints cannot be used with a robot; leave it out"),
-        (["--robot", ROBOT], "--robot is only for recordings; leave it out"),
+        (["--robot", ROBOT], "--robot is only for"),
         ([SEVEN_JOINTS], "robots are drawn one at a time"),
     ],
 )

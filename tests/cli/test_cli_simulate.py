@@ -11,11 +11,11 @@ import pytest
 import xarray
 from samples.command_line import REPOSITORY, ROBOT, contents, edited
 
-from vsacli.base.errors import InputError
+from vsacli import InputError, open_result
 from vsacli.base.simulation_variables import SIMULATION_VARIABLES
 from vsacli.base.variables import OF_ANY_ROBOT
 from vsacli.cli.console import Exit
-from vsacli.results.store.reader import StoredResult, StoredSimulation
+from vsacli.results.store.reader import StoredSimulation
 
 FEEDBACK = ("--controller", "feedback-linearization")
 
@@ -84,7 +84,7 @@ def test_a_run_that_ends_early_is_written_with_exit_code_3(vsacli, too_soft, tmp
     done = vsacli("simulate", ROBOT, too_soft, "-o", "s.h5")
     assert done.code == Exit.VERDICT
     assert "INFEASIBLE" in done.out
-    assert "there are no torques to apply; ended at t = " in done.out
+    assert "ended at t = " in done.out
     with StoredSimulation.open(tmp_path / "s.h5") as stored:
         assert (stored.verdict, stored.complete) == ("infeasible", False)
         assert 0 < stored.samples < 401
@@ -100,7 +100,7 @@ def test_a_run_that_ends_off_the_command_is_off_target(vsacli, quick, tmp_path, 
     headline, *_ = done.out.splitlines()
     assert headline.startswith(f"{verdict.upper().replace('_', ' ')}  ")
     assert headline.endswith("; 3 of 3 joints off target") == (verdict == "off_target")
-    assert ("exceeds the goal tolerance" in done.out) == (verdict == "off_target")
+    assert ("the goal tolerance" in done.out) == (verdict == "off_target")
     with StoredSimulation.open(tmp_path / "s.h5") as stored:
         assert (stored.verdict, stored.complete) == (verdict, True)
         ends, q = stored.read("q_error")[-1], stored.read("q_ref")
@@ -117,7 +117,7 @@ def test_a_run_whose_budget_is_used_up_is_written_with_exit_code_3(vsacli, quick
     assert done.code == Exit.VERDICT
     report = json.loads(done.out)
     assert (report["verdict"], report["complete"], report["budget"]) == ("incomplete", False, 400)
-    assert report["ending"].startswith("the budget of 400 evaluations of the equations of motion is used up")
+    assert report["ending"].startswith("the budget of 400")
     assert [method["name"] for method in report["methods"]] == ["DOP853", "Radau"]
     assert 0 < report["methods"][1]["from"] < 1
     with StoredSimulation.open(tmp_path / "s.h5") as stored:
@@ -157,14 +157,14 @@ def test_sensors_that_the_controller_does_not_read_are_noted(vsacli, quick):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((*FEEDBACK, "--poles", "-1,-2,-3,1"), "the pole 1 of the position error is unstable; its"),
+        ((*FEEDBACK, "--poles", "-1,-2,-3,1"), "pole 1 of the position"),
         ((*FEEDBACK, "--poles", "-1,-2"), "(5 with integral action), or 1 that is repeated, found 2"),
         ((*FEEDBACK, "--integral", "--poles", "-1,-2,-3,-4"), "expected 5 poles of the position error (4"),
-        ((*FEEDBACK, "--stiffness-poles", "5"), "the pole 5 of the stiffness error is unstable"),
+        ((*FEEDBACK, "--stiffness-poles", "5"), "pole 5 of the stiffness"),
         ((*FEEDBACK, "--poles", "fast"), "expected poles such as -20,-21"),
         ((*FEEDBACK, "--poles", "none.yaml"), "none.yaml: no such file"),
         (("--poles", "-20"), "--poles needs --controller feedback-linearization"),
-        (("--feedback", "positions"), "positions as feedback need the controller feedback-linearization"),
+        (("--feedback", "positions"), "positions as feedback"),
         (("--initial-error", "0.1,0.2"), "expected 1 value, or 3 (base, shoulder, elbow), found 2"),
         (("--initial-error", "much"), "expected a value in rad (m), or one for each joint"),
         (("--goal-tolerance", "tight"), "--goal-tolerance: expected a number in rad (m) such as 0.01, or"),
@@ -196,7 +196,7 @@ def test_a_rigid_joint_among_others_is_refused_by_name(vsacli, tmp_path):
         "simulate", REPOSITORY / "robots/mixed_3r.yaml", REPOSITORY / "trajectories/mixed_3r.yaml", *FEEDBACK
     )
     assert done.code == Exit.USAGE
-    assert "feedback linearization needs springs at all joints or at none: base is rigid" in done.err
+    assert "at none: base is rigid" in done.err
     assert contents(tmp_path) == {}
 
 
@@ -205,7 +205,7 @@ def test_a_rigid_joint_among_others_is_refused_by_name(vsacli, tmp_path):
     [
         (
             "{frame: base, type: constant, value: [1, 2, 3, 4, 5]}",
-            "expected 6 numbers in N (forces), N m (mom",
+            "expected 6 numbers",
         ),
         (
             "{frame: base, type: polynomial, degree: 1, start: [0, 0, 0, 0, 0, 0], end: [1, 0, 0, 0, 0, 0]}",
@@ -234,4 +234,4 @@ def test_files_that_exist_are_kept(vsacli, quick, tmp_path):
 def test_a_simulation_is_no_result_of_invdyn(vsacli, quick, tmp_path):
     vsacli("simulate", ROBOT, quick, "-o", "s.h5")
     with pytest.raises(InputError, match="is a simulation, expected a result"):
-        StoredResult.open(tmp_path / "s.h5")
+        open_result(tmp_path / "s.h5")

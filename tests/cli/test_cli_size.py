@@ -125,7 +125,7 @@ def test_limits_of_the_robots_own_motors(vsacli, tmp_path):
             "the gears of all joints were given already",
         ),
         (["--catalog", "absent.csv"], "absent.csv: no such file"),
-        (["--catalog", str(ARM)], "is a robot, but --catalog must be a motor catalog (CSV)"),
+        (["--catalog", str(ARM)], "is a robot, but"),
     ],
 )
 @pytest.mark.usefixtures("motors")

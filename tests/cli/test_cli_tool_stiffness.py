@@ -13,17 +13,17 @@ from samples.studies import column
 from samples.torso import ACTUATOR, SWING, torso_text
 
 from vsacli import (
+    Report,
     Wrench,
     forward_kinematics,
     inverse_dynamics,
     jacobian,
+    link_torques,
     load_robot,
     load_trajectory,
     open_result,
     tip_compliance,
 )
-from vsacli.analysis.report import Report
-from vsacli.dynamics.elastic_torques import link_torques
 from vsacli.results.charts.tool_charts import LARGEST_ELLIPSE, tool_path
 
 TOOLS = ("left_hand", "right_hand", "lamp")

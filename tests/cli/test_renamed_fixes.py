@@ -20,7 +20,7 @@ from vsacli.studies.identification import identification_report
     [
         (("--suggest",), "--suggest is now --fixes"),
         (("--remedy", 2), "--remedy is now --write-fix"),
-        (("--write-fixed", "fixed.yaml"), "--write-fixed is now --write-fix N -o FILE"),
+        (("--write-fixed", "fixed.yaml"), "--write-fixed is now"),
     ],
 )
 def test_old_options(vsacli, own_folder, old, new):

@@ -103,7 +103,7 @@ _COMPUTE = "to compute a result: vsacli invdyn arm.yaml TRAJECTORY"
         ("invdyn plan.zip move.yaml", "is a ZIP archive, but ROBOT must be a robot file (YAML)"),
         ("plot photo.csv", f"is a PNG image, but {_DRAWN}"),
         ("info photo.csv", "is a PNG image; expected text"),
-        ("invdyn robots move.yaml", "robots: is a folder; give the name of a file in it"),
+        ("invdyn robots move.yaml", "robots: is a folder"),
         (
             "sensitivity arm.yaml move.yaml --tolerances arm.yaml",
             "is a robot, but --tolerances must be a tolerances file (YAML, e.g. joints.*.link.mass: {",

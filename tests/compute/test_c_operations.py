@@ -14,7 +14,6 @@ from samples.generated_code import compile_c, compiled
 from samples.marks import COMPILERS, needs_compiler, slow
 from samples.traced_functions import CONTROL_FLOW, ELEMENTWISE, operands
 
-from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.engine.compiler import Library
 from vsacli.compute.engine.engines import kernel_program
 from vsacli.compute.engine.lanes import batch_source
@@ -58,12 +57,12 @@ class Everything:
         return values
 
 
-def subnormal(row: FloatArray) -> BoolArray:
+def subnormal(row: np.ndarray) -> np.ndarray:
     """Where lanes are not to be judged: these are zero to them, but not to all functions of math.h."""
     return (row != 0) & (np.abs(row) < LEAST)
 
 
-def wrong(found: FloatArray, x: FloatArray, y: FloatArray, least: float = 0) -> list[str]:
+def wrong(found: np.ndarray, x: np.ndarray, y: np.ndarray, least: float = 0) -> list[str]:
     """Operations whose results are not NumPy's, with where; what is below the least counts as zero."""
     names = [*ELEMENTWISE, *["nested"] * Everything.outputs]
     with np.errstate(all="ignore"):
@@ -75,7 +74,7 @@ def wrong(found: FloatArray, x: FloatArray, y: FloatArray, least: float = 0) -> 
         ]
 
 
-def close(found: FloatArray, expected: FloatArray, units: int, least: float) -> BoolArray:
+def close(found: np.ndarray, expected: np.ndarray, units: int, least: float) -> np.ndarray:
     alike = (found == expected) | (np.isnan(found) & np.isnan(expected))
     return alike | (np.abs(found - expected) <= np.maximum(units * np.spacing(np.abs(expected)), least))
 

@@ -14,22 +14,22 @@ import pytest
 from samples.engines import demands, random_wrench
 from samples.generated_code import compile_c
 from samples.long_chains import mixed_chain, random_chain
-from samples.marks import needs_compiler
+from samples.marks import needs_compiler, slow
 from samples.shipped import shipped_robot
 from samples.trees import hand
 
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot
 from vsacli.compute.control_flow import Keyed, call, repeat
-from vsacli.compute.engine import NUMPY, choose, engines
+from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.compiler import FLAGS, Library
 from vsacli.compute.engine.engines import Kernel, TracedEngine, kernel_program
 from vsacli.compute.engine.lanes import batch_source
 from vsacli.compute.tracing import Kind, Program, is_of_calls, trace
+from vsacli.compute.tracing.calls import MOST_OUTLINED
 from vsacli.compute.tracing.row_functions import CallingRowFunction
 from vsacli.dynamics.balances import BalancedDynamics
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.robot.model import Robot
 
 EXACT = ("-O0", "-ffp-contract=off")
 """Quickly compiled; products and sums are not contracted, which depends on what lies in one function."""
@@ -110,18 +110,16 @@ def test_what_passes_through_is_not_copied():
     assert program.outputs == program.inputs
 
 
-def test_operations_between_calls_go_into_bodies_of_bounded_size(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("vsacli.compute.tracing.calls.MOST_OUTLINED", 10)
-
+def test_operations_between_calls_go_into_bodies_of_bounded_size():
     def powers(rows: Sequence[Any]) -> list[Any]:
         x, y = rows
-        for _ in range(50):
+        for _ in range(600):
             x, y = x * y, x + y
         return [x, call(x, scaled, Pair(x, y), 3.0).first]
 
     program = recorded(powers)
     assert {symbol.operation for symbol in program.operations} == {"call", "item"}
-    assert max(len(body.operations) for body in bodies(program)) == 10
+    assert max(len(body.operations) for body in bodies(program)) == MOST_OUTLINED
 
 
 def test_functions_are_told_apart_by_their_keys():
@@ -151,7 +149,7 @@ def library(kernel: Kernel, folder: Path, *, calling: bool) -> Library:
     return Library(folder / f"{name}.so", kernel.outputs)
 
 
-def on_a_large_stack(function: Callable[[], FloatArray]) -> FloatArray:
+def on_a_large_stack(function: Callable[[], np.ndarray]) -> np.ndarray:
     """Each value that is written out in one piece has a place there if nothing is optimized."""
     usual = threading.stack_size(2**29)
     try:
@@ -161,7 +159,7 @@ def on_a_large_stack(function: Callable[[], FloatArray]) -> FloatArray:
         threading.stack_size(usual)
 
 
-def rows_of(kernel: InverseDynamics, samples: int) -> list[FloatArray]:
+def rows_of(kernel: InverseDynamics, samples: int) -> list[np.ndarray]:
     frame = kernel.frame
     motion = demands(kernel.robot, samples, wrench=None if frame is None else random_wrench(samples, frame))
     return kernel.arguments.pack(
@@ -189,11 +187,14 @@ def test_code_of_calls_computes_the_same_bit_for_bit(joints: int, frame: str | N
     np.testing.assert_array_equal(np.signbit(found), np.signbit(expected))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "kernel",
-    [LinkTorques(mixed_chain(7)), InverseDynamics(shipped_robot("lwr_7r_vsa"))],
-    ids=["links", "whole"],
+    [
+        LinkTorques(mixed_chain(3, seed=3)),
+        slow(LinkTorques(mixed_chain(7))),
+        slow(InverseDynamics(shipped_robot("lwr_7r_vsa"))),
+    ],
+    ids=["three", "links", "whole"],
 )
 def test_rows_go_through_calls_as_through_the_text_bit_for_bit(kernel: LinkTorques | InverseDynamics):
     """On some rows longer and on some shorter than those that the workspace was made for."""
@@ -207,9 +208,9 @@ def test_rows_go_through_calls_as_through_the_text_bit_for_bit(kernel: LinkTorqu
         np.testing.assert_array_equal(found, NUMPY.run(kernel, rows))
 
 
-def test_long_chains_are_traced_by_calls_for_rows(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(engines, "MOST_UNROLLED", 500)
-    kernel = LinkTorques(mixed_chain(3, seed=3))
+@pytest.mark.slow
+def test_long_chains_are_traced_by_calls_for_rows():
+    kernel = LinkTorques(mixed_chain(12, seed=3))
     rows = rows_of(InverseDynamics(kernel.robot), 5)[: kernel.inputs]
     assert is_of_calls(kernel_program(kernel))
     np.testing.assert_array_equal(TracedEngine().run(kernel, rows), NUMPY.run(kernel, rows))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray
 from vsacli.compute.control_flow import Values, repeat, where_needed
 
 
-def halve(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+def halve(state: Values, constants: Values) -> tuple[Values, np.ndarray]:
     """Count how often a number is halved until it is below a bound."""
     (number, count), (bound,) = state, constants
     return (number / 2, count + 1), number / 2 < bound
@@ -23,7 +22,7 @@ def test_each_sample_takes_its_own_number_of_steps():
 
 
 def test_a_sample_that_is_done_stays_as_it_is_while_others_go_on():
-    def count_up(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+    def count_up(state: Values, constants: Values) -> tuple[Values, np.ndarray]:
         (count,), (target,) = state, constants
         return (count + 1,), count + 1 == target
 

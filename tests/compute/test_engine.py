@@ -10,26 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples.drives import ALIKE, joint_with, motion, springs
-from samples.engines import assert_agree, demands, kinds_of_steps, random_wrench
+from samples.engines import assert_agree, demands, kinds_of_steps, program, random_wrench
 from samples.marks import needs_compiler, slow, slow_but
 from samples.robots import MotionArrays, random_motion, random_robot, vsa_3r
 
-from vsacli import load_robot
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.four_bar import FourBar
-from vsacli.actuators.laws.polynomial import Polynomial
-from vsacli.actuators.laws.sinh import Sinh
-from vsacli.actuators.laws.tendons import Exponential, Quadratic
+from vsacli import Antagonistic, Flag, Robot, laws, link_torques, load_robot
 from vsacli.analysis.run import Run
-from vsacli.base.flags import Flag
-from vsacli.compute.engine import choose, compiler
+from vsacli.compute.engine import choose
 from vsacli.compute.engine.engines import Engine
 from vsacli.dynamics.deflection_rows import IntegratedRows
-from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
 from vsacli.dynamics.inverse import InverseDynamics, block_of, compute_block
-from vsacli.robot.model import Robot
 
 pytestmark = needs_compiler
 
@@ -44,31 +34,23 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("programs")
+
+
 @pytest.fixture
-def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
+def quickly(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compile without optimization, for code that is run on a few samples only."""
-    flags = tuple("-O0" if flag == "-O2" else flag for flag in compiler.FLAGS)
-    monkeypatch.setattr(compiler, "FLAGS", flags)
-    compiler._examined.cache_clear()
+    monkeypatch.setenv("CC", str(program(programs, "quickcc", 'exec cc "$@" -O0')))
 
 
 def compiled(robot: Robot, threads: int = 1, frame: str | None = None) -> Engine:
     return choose("c", InverseDynamics(robot, frame), 1, threads).engine
 
 
-@pytest.mark.usefixtures("quickly")
-@pytest.mark.parametrize("samples", [1, 7, 64, 3000])
-def test_rows_of_results_begin_at_whole_vectors_in_different_sets_of_a_cache(samples):
-    kernel = LinkTorques(vsa_3r())
-    rows = choose("c", kernel, 1, 1).engine.run(kernel, list(np.ones((kernel.inputs, samples))))
-    distances = np.diff([row.ctypes.data for row in rows])
-    assert not rows.ctypes.data % 64
-    assert set(distances % 128) == {64}  # lines of a cache: 64 bytes, an odd number of them apart
-    assert (distances >= rows[0].nbytes).all()  # none lies in another
-
-
-def one_joint(*laws: SpringLaw) -> Robot:
-    return Robot(name="one-joint", joints=(joint_with(springs(*laws)),))
+def one_joint(*two_laws: laws.SpringLaw) -> Robot:
+    return Robot(name="one-joint", joints=(joint_with(springs(*two_laws)),))
 
 
 @pytest.mark.slow
@@ -95,13 +77,13 @@ def test_seven_joints_agree():
 
 PAIRS = {
     "cubic": (ALIKE, ALIKE),
-    "cubics": (ALIKE, Cubic(k=440, k_c=2000)),
-    "polynomial": (Polynomial(c1=400, c3=900, c5=9000), Polynomial(c1=400, c3=900, c5=9000)),
-    "sinh": (Sinh(k=5, a=7), Sinh(k=6, a=7)),
-    "sinhs": (Sinh(k=5, a=7), Sinh(k=6, a=8)),
-    "exponential": (Exponential(c=5, a=7), Exponential(c=5, a=7)),
-    "quadratic": (Quadratic(k=800), Quadratic(k=800)),
-    "four_bar": (FourBar(k=400, ratio=1.5), FourBar(k=400, ratio=1.5)),
+    "cubics": (ALIKE, laws.Cubic(k=440, k_c=2000)),
+    "polynomial": (laws.Polynomial(c1=400, c3=900, c5=9000), laws.Polynomial(c1=400, c3=900, c5=9000)),
+    "sinh": (laws.Sinh(k=5, a=7), laws.Sinh(k=6, a=7)),
+    "sinhs": (laws.Sinh(k=5, a=7), laws.Sinh(k=6, a=8)),
+    "exponential": (laws.Exponential(c=5, a=7), laws.Exponential(c=5, a=7)),
+    "quadratic": (laws.Quadratic(k=800), laws.Quadratic(k=800)),
+    "four_bar": (laws.FourBar(k=400, ratio=1.5), laws.FourBar(k=400, ratio=1.5)),
 }
 
 
@@ -185,12 +167,10 @@ def joined(robot: Robot, motion: MotionArrays, starts: list[int]) -> np.ndarray:
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names processors of that kind")
 @pytest.mark.parametrize("processor", ["x86-64", slow("haswell")])
-def test_shorter_vectors_agree(processor: str, monkeypatch: pytest.MonkeyPatch):
+def test_shorter_vectors_agree(processor: str, programs: Path, monkeypatch: pytest.MonkeyPatch):
     """2 lanes without, 4 with functions of math.h for vectors; any number of samples is left over."""
-    flags = tuple(f"-march={processor}" if flag == compiler.NATIVE else flag for flag in compiler.FLAGS)
-    monkeypatch.setattr(compiler, "FLAGS", flags)
-    compiler._examined.cache_clear()
-    robot = one_joint(ALIKE, Cubic(k=440, k_c=2000))
+    monkeypatch.setenv("CC", str(program(programs, f"cc-{processor}", f'exec cc "$@" -march={processor}')))
+    robot = one_joint(ALIKE, laws.Cubic(k=440, k_c=2000))
     for samples in (SAMPLES, SAMPLES + 1, 3):
         motion = demands(robot, samples)
         assert_agree(compute_block(robot, motion, engine=compiled(robot)), compute_block(robot, motion))

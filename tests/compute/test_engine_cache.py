@@ -7,13 +7,16 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from samples.command_line import ROBOT
 from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
+from samples.system_errors import fail_with
 
+from vsacli import link_torques
 from vsacli.base.storage import staging_name
 from vsacli.compute.engine import cache, choose
 from vsacli.compute.engine.cache import (
@@ -24,7 +27,7 @@ from vsacli.compute.engine.cache import (
     open_cache,
 )
 from vsacli.compute.engine.libraries import _loaded
-from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques
 
 KERNEL = LinkTorques(vsa_3r())
 MOTION = random_motion(vsa_3r(), 50, seed=1)
@@ -114,29 +117,28 @@ def test_a_folder_that_only_one_of_group_and_others_may_write_to(folder: Path, m
         open_cache()
 
 
-def test_folder_of_somebody_else_is_not_trusted(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(os, "getuid", lambda: -1)
+def test_folder_of_somebody_else_is_not_trusted(folder: Path):
+    folder.parent.mkdir()
+    if os.getuid():
+        folder.symlink_to("/usr")
+    else:
+        folder.mkdir()
+        os.chown(folder, 1, -1)
     with pytest.raises(CacheError, match=f"the cache folder {folder} belongs to somebody else"):
         open_cache()
 
 
 def test_without_a_home_there_is_no_cache(monkeypatch: pytest.MonkeyPatch):
-    def homeless() -> Path:
-        raise RuntimeError("Could not determine home directory.")
-
     monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setattr(Path, "home", homeless)
+    monkeypatch.setenv("HOME", "~")
     with pytest.raises(CacheError, match="Could not determine home directory"):
         open_cache()
 
 
 @pytest.mark.slow
 @needs_compiler
-def test_full_disk_is_told_and_leaves_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(cache.shutil, "copyfile", full)
+def test_full_disk_is_told_and_leaves_nothing(folder: Path, before_system_call: Any):
+    before_system_call("rename", fail_with(errno.ENOSPC))
     told = f"the cache folder {folder} cannot be written: No space left on device; compiled code is not kept"
     assert warnings() == (told,)
     assert not list(folder.iterdir())
@@ -185,15 +187,9 @@ def test_what_was_not_used_for_the_longest_time_makes_room(small: Path):
     assert [path.name for path in small.iterdir()] == ["large"]
 
 
-def test_a_library_that_is_removed_meanwhile_is_none(small: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_library_that_is_removed_meanwhile_is_none(small: Path, before_system_call: Any):
     stored(small, "a", bytes(1000))
-    genuine = cache._checksum
-
-    def removing(path: Path) -> str:
-        Cache(small).clear()
-        return genuine(path)
-
-    monkeypatch.setattr(cache, "_checksum", removing)
+    before_system_call("utime", lambda *_: Cache(small).clear())
     assert Cache(small).find("a") is None
 
 

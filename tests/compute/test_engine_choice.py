@@ -2,36 +2,37 @@
 
 from __future__ import annotations
 
-import ctypes
 import dataclasses
+import hashlib
 import os
 import re
 import shutil
-import stat
 import sys
-import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from samples.command_line import ROBOT
+from samples.engines import program
 from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 from samples.shipped import shipped_robot
 
-from vsacli.base.errors import InputError
-from vsacli.compute.engine import NUMPY, choice, choose, compiler, libraries
-from vsacli.compute.engine.cache import open_cache
+from vsacli import InputError, Robot, link_torques
+from vsacli.compute.engine import NUMPY, choice, choose, compiler
+from vsacli.compute.engine.cache import CHECKSUM, LIBRARY, open_cache
 from vsacli.compute.engine.choice import LOOK_FROM, in_usual_blocks, settle
 from vsacli.compute.engine.compiled_engine import CompiledEngine, kernel_code
+from vsacli.compute.engine.compiler import CompilerError, system_compiler
 from vsacli.compute.engine.engines import kernel_program
-from vsacli.compute.engine.libraries import Code, _loaded
+from vsacli.compute.engine.libraries import Code, _loaded, load
+from vsacli.compute.engine.trial import Trial
 from vsacli.compute.tracing import is_of_calls
 from vsacli.dynamics.balances import BalancedDynamics
-from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
+from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.energy import IntervalEnergy
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.robot.model import Robot
 
 KERNEL = LinkTorques(vsa_3r())
 
@@ -42,13 +43,6 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.delenv("CC", raising=False)
     _loaded.clear()
     return tmp_path / "cache"
-
-
-def program(folder: Path, name: str, text: str) -> Path:
-    path = folder / name
-    path.write_text(f"#!/bin/sh\n{text}\n")
-    path.chmod(path.stat().st_mode | stat.S_IXUSR)
-    return path
 
 
 def test_unknown_engine_is_refused_with_the_nearest_one():
@@ -76,9 +70,12 @@ def test_auto_compiles_for_many_samples_and_remembers_it_for_fewer():
 
 @pytest.mark.slow
 @needs_compiler
-def test_threads_are_as_many_as_processors_unless_given(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(choice, "processors", lambda: 7)
-    assert choose("c", KERNEL, 1).reason.endswith("in 7 threads")
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system divides no processors")
+def test_threads_are_as_many_as_processors_unless_given():
+    usable = os.sched_getaffinity(0)
+    for processors in ({min(usable)}, usable):
+        os.sched_setaffinity(0, processors)
+        assert f"in {len(processors)} thread" in choose("c", KERNEL, 1).reason
 
 
 @pytest.mark.parametrize(
@@ -283,8 +280,8 @@ def test_compiler_that_is_not_taken(command: str, reason: str, monkeypatch: pyte
 
 @needs_compiler
 @pytest.mark.parametrize("folder", ["/nonexistent", "/dev/full"])
-def test_without_a_folder_for_temporary_files(folder: str, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(tempfile, "tempdir", folder)
+def test_without_a_folder_for_temporary_files(folder: str, temporary_files: Any):
+    temporary_files(folder)
     reason = "folder for temporary files: cannot be used: "
     assert reason in choose("auto", KERNEL, 10_000_000).reason
     with pytest.raises(InputError, match=reason):
@@ -293,36 +290,37 @@ def test_without_a_folder_for_temporary_files(folder: str, monkeypatch: pytest.M
 
 @pytest.mark.slow
 @needs_compiler
-def test_a_cache_from_which_nothing_may_be_run(monkeypatch: pytest.MonkeyPatch, own_cache: Path):
+def test_a_cached_library_that_cannot_be_loaded_is_compiled_anew(own_cache: Path):
+    """As from a folder from which nothing may be run."""
     choose("c", KERNEL, 1)
-    genuine = ctypes.CDLL
-
-    def forbidding(path: str) -> ctypes.CDLL:
-        if path.startswith(str(own_cache)):
-            raise OSError("failed to map segment from shared object")
-        return genuine(path)
-
-    monkeypatch.setattr(ctypes, "CDLL", forbidding)
+    (library,) = own_cache.rglob(LIBRARY)
+    library.unlink()  # this process has loaded it: another file takes its place
+    library.write_bytes(b"no program")
+    library.with_name(CHECKSUM).write_text(hashlib.sha256(b"no program").hexdigest())
     _loaded.clear()
     said: list[str] = []
     assert choose("c", KERNEL, 1, tell=said.append).reason.startswith("C code computes, compiled now")
     (sentence,) = said
-    assert sentence.endswith("failed to map segment from shared object; it is compiled anew")
+    assert "cannot be loaded: " in sentence
+    assert sentence.endswith("; it is compiled anew")
 
 
-@pytest.mark.slow
 @needs_compiler
-def test_what_takes_long_is_announced_and_what_takes_too_long_refused(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(libraries, "LONG_SECONDS", 0.1)
-    said: list[str] = []
-    choose("c", KERNEL, 1, tell=said.append)
-    assert re.fullmatch(r"compiling takes about \d+ s, this once \(at most 120 s\)", said[0])
-    _loaded.clear()
-    monkeypatch.setattr(libraries, "TIMEOUT", 0.1)
-    monkeypatch.setenv("CC", "cc -DANOTHER")  # whose code is not in the cache
-    assert "would not repay" in choose("auto", KERNEL, 10_000_000).reason
-    with pytest.raises(InputError, match=r"compiling \d+ operations would take about \d+ s, more than 0.1 s"):
-        choose("c", KERNEL, 1)
+def test_what_takes_long_is_announced_and_what_takes_too_long_refused():
+    def compile_functions(*operations: int) -> list[str]:
+        said: list[str] = []
+        text = f"void one(double *result) {{ *result = 1; }} // {operations}"
+        trial = Trial("one", [(8,)], np.ones((1, 1)))
+        code = Code(text, sum(operations), operations)
+        load(code, lambda path: path.name, system_compiler(), said.append, lambda: trial)
+        return said
+
+    assert compile_functions(1000) == []
+    (sentence,) = compile_functions(20_000)
+    assert re.fullmatch(r"compiling takes about \d+ s, this once \(at most 120 s\)", sentence)
+    refused = r"compiling 200000 operations would take about \d+ s, more than 120 s"
+    with pytest.raises(CompilerError, match=refused):
+        compile_functions(100_000, 100_000)
 
 
 @needs_compiler

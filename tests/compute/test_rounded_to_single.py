@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vsacli.base.arrays import FloatArray
 from vsacli.compute.control_flow import look_up, repeat, subroutine, where_needed
 from vsacli.compute.rounding import OfRounding, single
 from vsacli.compute.tracing import Kind, trace
@@ -16,7 +15,7 @@ from vsacli.compute.tracing.single_precision import in_single_precision
 X = np.array([0.3, -2.5, 0.75, 1e6, 7.0])
 
 
-def found(function: Any, *rows: FloatArray) -> list[Any]:
+def found(function: Any, *rows: np.ndarray) -> list[Any]:
     """The results of a function of rows of samples."""
     program = trace(lambda given: list(function(*given)), [Kind.REAL] * len(rows), short=True)
     return in_single_precision(program, rows)

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from samples.shipped import shipped_robot
 
+from vsacli import Robot
+from vsacli.compute.aligned_rows import LINE, address, aligned_rows
 from vsacli.compute.control_flow import where_needed
 from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.choice import TRACE_FROM
@@ -16,7 +18,6 @@ from vsacli.compute.rows import RowKernel, RowLayout
 from vsacli.compute.tracing.row_functions import RowFunction
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.robot.model import Robot
 
 CLOSED = ("vsa_3r", "lwr_7r_vsa", "rp_2", "mixed_3r", "tendon_1r", "qbmove_arm_gazebo")
 """Robots whose springs need no iteration."""

@@ -13,11 +13,11 @@ import pytest
 from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 
+from vsacli import Robot, link_torques
 from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.engines import Engine, TracedEngine
 from vsacli.compute.subnormals import subnormals_as_zero
-from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
-from vsacli.robot.model import Robot
+from vsacli.dynamics.elastic_torques import LinkTorques
 
 LEAST = np.finfo(np.float64).tiny
 on_x86 = pytest.mark.skipif(

@@ -11,8 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from samples.programs import carry_out, traced
 
-from vsacli.base.arrays import FloatArray
-
 Expression = Callable[[Any, Any], Any]
 
 VALUES = [0.0, -0.0, 1.0, -1.0, 2.5, -0.3, 1e200, 1e-200, np.inf, -np.inf, np.nan]
@@ -21,7 +19,7 @@ BINARY = (np.add, np.subtract, np.multiply, np.divide, np.maximum, np.minimum, n
 COMPARISONS = (np.less, np.less_equal, np.greater, np.greater_equal, np.equal, np.not_equal)
 
 
-def rows() -> tuple[FloatArray, FloatArray]:
+def rows() -> tuple[np.ndarray, np.ndarray]:
     x, y = (grid.ravel() for grid in np.meshgrid(VALUES, VALUES))
     return x, y
 

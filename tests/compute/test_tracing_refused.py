@@ -11,26 +11,22 @@ from samples.drives import joint_with, springs, with_joint
 from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
 
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.law import Pair, SpringLaw
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli import InputError, Robot, laws
 from vsacli.compute.engine import choose
 from vsacli.control.codegen.project import generate
 from vsacli.dynamics.inverse import InverseDynamics, compute_block
-from vsacli.robot.model import Robot
 
 
 @dataclasses.dataclass(frozen=True)
-class Masked(Cubic):
+class Masked(laws.Cubic):
     """A cubic spring, written with a mask, which NumPy takes and recording does not."""
 
-    def torque(self, phi: FloatArray) -> FloatArray:
+    def torque(self, phi: np.ndarray) -> np.ndarray:
         result = self.k * phi
         result[phi != 0] += self.k_c * phi[phi != 0] ** 3
         return result
 
-    def closed_pair(self, _other: SpringLaw) -> Pair | None:
+    def closed_pair(self, _other: laws.SpringLaw) -> laws.Pair | None:
         return None
 
 

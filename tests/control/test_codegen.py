@@ -6,6 +6,7 @@ import hashlib
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -20,15 +21,10 @@ from samples.robots import random_robot
 from samples.shipped import shipped_robot, shipped_run
 from samples.springs import SPRINGS
 
-from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
+from vsacli import Flag, InputError, Robot, __version__, motor_torques
 from vsacli.base.variables import VARIABLES
-from vsacli.base.version import __version__
-from vsacli.control.codegen import interface
 from vsacli.control.codegen.project import Project, generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Robot
 
 ROBOTS: dict[str, Robot] = {
     "one joint": random_robot("R", seed=1),
@@ -117,7 +113,7 @@ def test_a_potential_in_single_precision_is_feasible_along_its_trajectory(tmp_pa
     """Tolerances of the continuation lay below single precision: 908 of 1001 samples were infeasible."""
     robot, trajectory = shipped_run("sliding_anchor_1r", "sliding_anchor_1r")
     motion = trajectory.at(np.linspace(0, trajectory.duration, 101))
-    expected = compute_block(robot, motion)
+    expected = motor_torques(robot, motion)
     function = inverse_dynamics_function(robot)
     command = {
         name: motion.variables()[name] for _, given in function.arguments for name in given.layout.shapes
@@ -332,7 +328,7 @@ def test_accuracy_in_single_precision(name: str, tmp_path: Path) -> None:
     function, command = inverse_dynamics_function(robot), commands(robot, 200, seed=9)
     command = {key: values.astype(np.float32).astype(float) for key, values in command.items()}
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "float")(function, command)
-    block = compute_block(robot, motion_of(command))
+    block = motor_torques(robot, motion_of(command))
     with np.errstate(invalid="ignore"):
         margin = (block.stiffness - block.stiffness_min) / block.stiffness - 0.1 + 1e-3
     for key, values in found.items():
@@ -363,10 +359,9 @@ def test_files_of_two_robots_do_not_go_together(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_function_of_too_many_operations_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_function_of_too_many_operations_is_left_out(most_operations: Callable[..., None]) -> None:
     """The limit is not reached by any arm; the recursion of this one takes 4300, feedback 6300."""
-    monkeypatch.setattr(interface, "MOST_WRITTEN_OUT", 5800)
-    monkeypatch.setattr(interface, "MOST_OF_CALLS", 5000)
+    most_operations(5800, 5000)
     made = generate(shipped_robot("lwr_7r_vsa"))
     assert made.omitted == ["no feedback_linearization: a step takes more than 5000 operations"]
     assert "feedback_linearization" not in made.files["lwr_7r_vsa.h"]
@@ -374,9 +369,8 @@ def test_a_function_of_too_many_operations_is_left_out(monkeypatch: pytest.Monke
     assert "There is no feedback\\_linearization: a step takes more than 5000 operations.\n" in readme
 
 
-def test_a_robot_of_too_many_operations_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(interface, "MOST_WRITTEN_OUT", 1000)
-    monkeypatch.setattr(interface, "MOST_OF_CALLS", 100)
+def test_a_robot_of_too_many_operations_is_refused(most_operations: Callable[..., None]) -> None:
+    most_operations(1000, 100)
     match = "no C code can be made of lwr-7r-vsa: link_torques: a step takes more than 100 operations"
     with pytest.raises(InputError, match=match):
         generate(shipped_robot("lwr_7r_vsa"))

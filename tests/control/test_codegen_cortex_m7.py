@@ -14,9 +14,9 @@ from samples.generated_code import STRICT, compile_c, write_files
 from samples.marks import needs
 from samples.shipped import shipped_robot
 
+from vsacli import Robot
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.scalar import PRECISIONS
-from vsacli.robot.model import Robot
 
 pytestmark = [
     pytest.mark.slow,

@@ -11,18 +11,17 @@ from samples.generated_code import Compiled, compile_c, write_files
 from samples.marks import needs_compiler
 from samples.mechanisms import DEVICES
 
-from vsacli import inverse_dynamics
+from vsacli import Antagonistic, Damper, Motor, inverse_dynamics, laws
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.damper import Damper
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function
 
 MOTOR = Motor(inertia=0.2, damping=0.1)
 ACTUATORS: dict[str, tuple[Actuator, tuple[float, float]]] = {
-    "antagonistic": (Antagonistic(motor=(MOTOR, MOTOR), spring=(Cubic(k=400, k_c=2000),) * 2), (900, 1200)),
+    "antagonistic": (
+        Antagonistic(motor=(MOTOR, MOTOR), spring=(laws.Cubic(k=400, k_c=2000),) * 2),
+        (900, 1200),
+    ),
     "awas": (DEVICES["awas"].actuator, DEVICES["awas"].stiffness),
 }
 

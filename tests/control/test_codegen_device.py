@@ -13,7 +13,6 @@ from samples.host_gpu import contiguous, exported, load_gpu_module
 from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
 
-from vsacli.base.arrays import FloatArray
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
@@ -37,7 +36,7 @@ def cupy_with_device() -> Any:
     return cupy
 
 
-def assert_close(found: Any, expected: FloatArray, name: str) -> None:
+def assert_close(found: Any, expected: np.ndarray, name: str) -> None:
     """Arrays (..., samples) are those (samples, ...), to rounding."""
     values = np.moveaxis(np.asarray(found.get()), -1, 0)
     np.testing.assert_array_equal(np.isnan(values), np.isnan(expected), err_msg=name)

@@ -28,8 +28,7 @@ from samples.plants import all_rigid
 from samples.shipped import shipped_robot
 from samples.trees import random_tree
 
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli import InputError, Robot
 from vsacli.base.wrench import WrenchFrame
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
@@ -37,7 +36,6 @@ from vsacli.control.codegen.plant_functions import state_derivative_function
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import Arrays, ReferenceResults
-from vsacli.robot.model import Robot
 
 pytestmark = [needs_compiler, needs("g++", "g++")]
 
@@ -140,7 +138,7 @@ def command() -> tuple[Arrays, Arrays, Any]:
     return arrays, *by_c(host_project(SMALL), "inverse_dynamics", [("command", arrays)])
 
 
-LAYOUTS: dict[str, Callable[[FloatArray], FloatArray]] = {
+LAYOUTS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "fast": lambda array: np.ascontiguousarray(np.moveaxis(array, 0, -1)),
     "rows of samples": lambda array: np.moveaxis(array, 0, -1),
     "every third number": lambda array: np.moveaxis(array.repeat(3, axis=-1)[..., ::3], 0, -1),

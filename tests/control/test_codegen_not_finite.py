@@ -14,17 +14,14 @@ from samples.plants import all_rigid
 from samples.shipped import shipped_robot
 from samples.springs import SPRINGS
 
-from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
+from vsacli import Flag, InputError, Robot, motor_torques
 from vsacli.compute.engine import choose
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import ReferenceResults
-from vsacli.dynamics.inverse import InverseDynamics, compute_block
-from vsacli.robot.model import Robot
+from vsacli.dynamics.inverse import InverseDynamics
 
 pytestmark = needs_compiler
 
@@ -56,7 +53,7 @@ def functions(robot: Robot) -> Iterator[Function]:
         return
 
 
-def changed(clean: FloatArray, values: FloatArray) -> FloatArray:
+def changed(clean: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Inputs (values x entries, entries), each the clean ones but for one entry; from (values, entries)."""
     count = len(clean)
     rows = np.tile(clean, (len(values), count, 1))
@@ -64,7 +61,7 @@ def changed(clean: FloatArray, values: FloatArray) -> FloatArray:
     return rows.reshape(-1, count)
 
 
-def arguments(function: Function, rows: FloatArray) -> list[dict[str, FloatArray]]:
+def arguments(function: Function, rows: np.ndarray) -> list[dict[str, np.ndarray]]:
     """The arguments that rows (calls, entries) of all entries stand for."""
     ends = np.cumsum([structure.layout.size for _, structure in function.arguments])
     parts = np.split(rows, ends[:-1], axis=1)
@@ -74,7 +71,7 @@ def arguments(function: Function, rows: FloatArray) -> list[dict[str, FloatArray
     ]
 
 
-def entries(function: Function, robot: Robot) -> FloatArray:
+def entries(function: Function, robot: Robot) -> np.ndarray:
     """All entries of a call that goes well."""
     given = ReferenceResults(robot).inputs(function)
     return np.concatenate(
@@ -86,7 +83,7 @@ def entries(function: Function, robot: Robot) -> FloatArray:
     )
 
 
-def numbers(found: dict[str, FloatArray]) -> FloatArray:
+def numbers(found: dict[str, np.ndarray]) -> np.ndarray:
     """All results but the bits, (calls, joints, columns)."""
     return np.concatenate(
         [
@@ -98,7 +95,7 @@ def numbers(found: dict[str, FloatArray]) -> FloatArray:
     )
 
 
-def called(code: Compiled, function: Function, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+def called(code: Compiled, function: Function, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers (calls, joints, columns) and bits (calls, joints); the function returns the latter together."""
     with np.errstate(over="ignore"):  # 1e300 becomes infinite in single precision
         found, returned = code(function, *arguments(function, rows))
@@ -106,7 +103,7 @@ def called(code: Compiled, function: Function, rows: FloatArray) -> tuple[FloatA
     return numbers(found), found["flags"]
 
 
-def same(a: FloatArray, b: FloatArray) -> FloatArray:
+def same(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (a == b) | (np.isnan(a) & np.isnan(b))
 
 
@@ -123,14 +120,14 @@ def test_nothing_leaves_unnoticed_and_nothing_is_invented(name: str, tmp_path: P
             check_injected(code, function, clean, depends)
 
 
-def dependent(code: Compiled, function: Function, clean: FloatArray) -> BoolArray:
+def dependent(code: Compiled, function: Function, clean: np.ndarray) -> np.ndarray:
     """Which results each entry has an influence on, (entries, joints, columns)."""
     expected, _ = called(code, function, clean[None])
     others, _ = called(code, function, changed(clean, np.outer(FACTORS, clean)))
     return ~same(others, expected).reshape(len(FACTORS), len(clean), *expected.shape[1:]).all(axis=0)
 
 
-def check_injected(code: Compiled, function: Function, clean: FloatArray, depends: BoolArray) -> None:
+def check_injected(code: Compiled, function: Function, clean: np.ndarray, depends: np.ndarray) -> None:
     expected, bits = called(code, function, clean[None])
     assert not np.any(bits & STOPS), "a call that goes well"
     for bad in BAD:
@@ -154,9 +151,9 @@ def test_all_that_computes_agrees_on_what_is_not_finite(name: str, tmp_path: Pat
     (command,) = arguments(function, rows)
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "double")(function, command)
     with np.errstate(all="ignore"):
-        by_numpy = compute_block(robot, motion_of(command))
+        by_numpy = motor_torques(robot, motion_of(command))
     compiled = choose("c", InverseDynamics(robot), len(rows)).engine
-    by_c = compute_block(robot, motion_of(command), engine=compiled)
+    by_c = motor_torques(robot, motion_of(command), engine=compiled)
     for name_of, values in found.items():
         for block in (by_numpy, by_c):
             expected = expected_of(block, name_of)

@@ -13,20 +13,13 @@ from samples.generated_code import STRICT, compile_c, compiled_robot, write_file
 from samples.marks import needs_compiler, slow, slow_but
 from samples.shipped import shipped_robot
 
-from vsacli import State, state_derivative
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.friction import Friction
-from vsacli.actuators.motor import Motor
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli import Elastic, Friction, InputError, Motor, Robot, State, motor_torques, state_derivative
 from vsacli.base.variables import Block
 from vsacli.control.codegen.parameters import PARAMETERS, check_parameters, with_parameters
 from vsacli.control.codegen.plant_functions import state_derivative_function
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import CASES, ReferenceResults
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, parameters
 
 SAMPLES = 30
@@ -66,12 +59,12 @@ def possible(robot: Robot) -> list[Parameter]:
     return chosen
 
 
-def argument(chosen: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, FloatArray]:
+def argument(chosen: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, np.ndarray]:
     """The structure of the parameters over all samples."""
     return {"_".join(each.by_index): np.full(SAMPLES, values[str(each)]) for each in chosen}
 
 
-def close(found: Mapping[str, FloatArray], block: Block) -> None:
+def close(found: Mapping[str, np.ndarray], block: Block) -> None:
     """Sums are added up in another order where numbers are not folded, which costs some roundings."""
     for name, values in found.items():
         expected = expected_of(block, name)
@@ -98,7 +91,7 @@ def test_results_are_those_of_a_robot_with_these_numbers(name: str, tmp_path: Pa
     others = {path: value * rng.uniform(1, 1.03) for path, value in nominal.items()}
     for values in (nominal, others):
         found, _ = code(function, command, argument(chosen, values))
-        close(found, compute_block(robot.replace(values), motion_of(command)))
+        close(found, motor_torques(robot.replace(values), motion_of(command)))
 
 
 @pytest.mark.cases(2)

@@ -21,7 +21,11 @@ from samples.trees import random_tree
 from scipy.integrate import solve_ivp
 
 from vsacli import (
+    Flag,
     Gains,
+    InitialError,
+    Rigid,
+    Robot,
     State,
     Wrench,
     inverse_dynamics,
@@ -30,17 +34,12 @@ from vsacli import (
     simulate,
     state_derivative,
 )
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
 from vsacli.base.wrench import WRENCH_NAMES, WrenchFrame
 from vsacli.control.codegen import interface
 from vsacli.control.codegen.parameters import with_parameters
 from vsacli.control.codegen.plant_functions import state_derivative_function, step_function
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.self_test import ReferenceResults
-from vsacli.control.simulation import InitialError
-from vsacli.robot.model import Robot
 from vsacli.robot.parameters import parameters
 
 pytestmark = needs_compiler
@@ -51,7 +50,7 @@ RATES = ("dq", "ddq", "dtheta", "ddtheta")
 ROUNDING = 1e-13
 """Of the peak: rounding of 1e-16 times the condition of M, up to 1e3 here; 1e-15 is seen."""
 
-Arrays = dict[str, FloatArray]
+Arrays = dict[str, np.ndarray]
 
 
 def peak_error(found: Arrays, expected: Arrays) -> float:
@@ -64,7 +63,7 @@ def peak_error(found: Arrays, expected: Arrays) -> float:
     return max(errors)
 
 
-def clipped(robot: Robot, torque: FloatArray) -> FloatArray:
+def clipped(robot: Robot, torque: np.ndarray) -> np.ndarray:
     """Torques, (..., joints, 2), none beyond the largest of its motor."""
     largest = np.zeros((len(robot.joints), 2))
     for of_joint, joint in zip(largest, robot.joints, strict=True):
@@ -154,7 +153,7 @@ class PlantInC(NamedTuple):
     acting: Any
 
     @classmethod
-    def of(cls, robot: Robot, folder: Path, torque: FloatArray) -> PlantInC:
+    def of(cls, robot: Robot, folder: Path, torque: np.ndarray) -> PlantInC:
         """Compile both functions; dampers stand at the least of their range."""
         folder.mkdir(exist_ok=True)
         derivative = state_derivative_function(robot)
@@ -189,7 +188,7 @@ RUNS = {
 """Robots with smooth laws, and trajectories at whose start they stand."""
 
 
-def pushed(name: str) -> tuple[Robot, Arrays, FloatArray]:
+def pushed(name: str) -> tuple[Robot, Arrays, np.ndarray]:
     """A robot in the equilibrium at the start of its trajectory, its joints pushed, and its torques."""
     robot, trajectory = shipped_run(name, RUNS[name])
     first = inverse_dynamics(robot, trajectory)
@@ -199,16 +198,16 @@ def pushed(name: str) -> tuple[Robot, Arrays, FloatArray]:
     return robot, start, np.nan_to_num(first.tau_motor[0])
 
 
-def vector_of(record: Any) -> FloatArray:
+def vector_of(record: Any) -> np.ndarray:
     return np.concatenate([np.ravel(record[name]) for name in PARTS])
 
 
-def exact_end(robot: Robot, start: Arrays, torque: FloatArray, duration: float) -> FloatArray:
+def exact_end(robot: Robot, start: Arrays, torque: np.ndarray, duration: float) -> np.ndarray:
     """The state at the end by DOP853 of SciPy and the equations in NumPy."""
     shapes = {name: start[name].shape for name in PARTS}
     ends = np.cumsum([np.prod(shape) for shape in shapes.values()])[:-1]
 
-    def derivative(_time: float, vector: FloatArray) -> FloatArray:
+    def derivative(_time: float, vector: np.ndarray) -> np.ndarray:
         parts = zip(shapes.items(), np.split(vector, ends), strict=True)
         state = State(**{name: part.reshape(shape) for (name, shape), part in parts})
         return np.nan_to_num(
@@ -220,7 +219,7 @@ def exact_end(robot: Robot, start: Arrays, torque: FloatArray, duration: float) 
     return np.asarray(run.y[:, -1])
 
 
-def fastest_rate(robot: Robot, start: Arrays, torque: FloatArray) -> float:
+def fastest_rate(robot: Robot, start: Arrays, torque: np.ndarray) -> float:
     """Largest |eigenvalue| of the equations of motion about a state, 1/s."""
     begin = np.concatenate([start[name].ravel() for name in PARTS])
     shifts = 1e-6 * np.vstack([np.eye(begin.size), -np.eye(begin.size)])
@@ -302,7 +301,7 @@ def energy(robot: Robot, record: Any) -> float:
     return float(kinetic + (inertia * record["dtheta"] ** 2).sum() / 2 + springs + height_energy(robot, q))
 
 
-def height_energy(robot: Robot, q: FloatArray) -> float:
+def height_energy(robot: Robot, q: np.ndarray) -> float:
     """The potential of gravity, J, as the integral of the torques that hold the links, from q = 0."""
     nodes, weights = np.polynomial.legendre.leggauss(40)
     path = (nodes[:, None] + 1) / 2 * q
@@ -328,11 +327,11 @@ def test_a_plant_of_ones_own(tmp_path: Path) -> None:
     inertia = np.array([[3.20] * 2, [3.05] * 2, [1.98] * 2])
     torque = np.random.default_rng(4).uniform(-50, 50, (3, 2))
 
-    def torques(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+    def torques(q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
         none = np.zeros((len(ddq), 3))
         return link_torques(robot, none + q, none + dq, ddq, none, none)[0]
 
-    def derivative(x: FloatArray) -> FloatArray:
+    def derivative(x: np.ndarray) -> np.ndarray:
         q, dq, theta, dtheta = x[:3], x[3:6], x[6:12].reshape(3, 2), x[12:].reshape(3, 2)
         bias, *columns = torques(q, dq, np.vstack([np.zeros(3), np.eye(3)]))
         phi = theta - q[:, None]
@@ -342,7 +341,7 @@ def test_a_plant_of_ones_own(tmp_path: Path) -> None:
             [dq, ddq, dtheta.ravel(), ((torque - 1e-4 * dtheta - spring) / inertia).ravel()]
         )
 
-    def step(x: FloatArray, h: float) -> FloatArray:
+    def step(x: np.ndarray, h: float) -> np.ndarray:
         one = derivative(x)
         two = derivative(x + h / 2 * one)
         three = derivative(x + h / 2 * two)
@@ -373,7 +372,7 @@ def test_the_closed_loop_is_that_of_a_simulation(tmp_path: Path) -> None:
     command, acting = np.zeros((), module.Command), np.zeros((), module.Input)
     state, still = np.zeros((), module.State), np.zeros((), module.Integral)
 
-    def derivative(time: float, vector: FloatArray) -> FloatArray:
+    def derivative(time: float, vector: np.ndarray) -> np.ndarray:
         for name, part in zip(PARTS, np.split(vector, [3, 6, 12]), strict=True):
             state[name] = part.reshape(state[name].shape)
         reference = trajectory.at(np.array([time]))
@@ -472,13 +471,13 @@ def test_the_documents_count_operations() -> None:
 
 
 @pytest.mark.slow
-def test_a_long_arm_of_calls_steps_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_arm_of_calls_steps_as_well(tmp_path: Path, most_operations: Callable[..., None]) -> None:
     robot = random_chain(6)
     derivative = state_derivative_function(robot)
     inputs = ReferenceResults(robot).inputs(derivative)
     found = []
     for folder, most in (("written_out", interface.MOST_WRITTEN_OUT), ("calls", 500)):
-        monkeypatch.setattr(interface, "MOST_WRITTEN_OUT", most)
+        most_operations(most)
         derivative = state_derivative_function(robot)
         step = step_function(robot, derivative)
         code = compiled_robot(tmp_path / folder, robot, [derivative, step], "double")

@@ -18,15 +18,13 @@ from samples.mechanisms import DEVICES
 from samples.shipped import shipped_robot
 from samples.valid_runs import valid_run
 
-from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
+from vsacli import Flag, InputError, Robot
 from vsacli.control.codegen import project
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.project import generate, prefix_of
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
 from vsacli.control.codegen.self_test import Arrays, ReferenceResults
-from vsacli.robot.model import Robot
 
 DIFFERENCE = 82
 """Seed of a valid run with a potential of 1e9 N m/rad that takes sin(theta_1 - q): 3e-8 rad of some 0.3."""

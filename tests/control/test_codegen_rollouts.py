@@ -17,7 +17,6 @@ from samples.marks import needs, needs_compiler, slow_but
 from samples.shipped import shipped_robot, shipped_run
 
 from vsacli import Gains, State, inverse_dynamics, state_derivative
-from vsacli.base.arrays import FloatArray
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.self_test import Arrays
 
@@ -136,7 +135,7 @@ def gains_of(name: str, integral: bool) -> Arrays:
     return {part: getattr(gains, part).repeat(joints, 0) for part in members}
 
 
-def stiffness_in_numpy(name: str, state: Any) -> FloatArray:
+def stiffness_in_numpy(name: str, state: Any) -> np.ndarray:
     """Stiffness of the joints, (samples, joints)."""
     from vsacli.dynamics.forward import Plant
 
@@ -272,7 +271,7 @@ def fastest_vibration(name: str, state: Arrays, acting: Arrays, sample: int) -> 
     at = np.concatenate([values[sample].ravel() for values in state.values()])
     ends = np.cumsum([values[sample].size for values in state.values()])[:-1]
 
-    def rates(entries: FloatArray) -> FloatArray:
+    def rates(entries: np.ndarray) -> np.ndarray:
         parts = [
             part.reshape(values[sample].shape)
             for part, values in zip(np.split(entries, ends), state.values(), strict=True)

@@ -14,18 +14,12 @@ from samples.robots import random_robot
 from samples.shipped import shipped_robot
 from samples.springs import SPRINGS
 
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
+from vsacli import FeedbackLinearization, Flag, Gains, Integral, Robot, State, link_torques, motor_torques
 from vsacli.base.signals import POSITION
 from vsacli.base.variables import Block
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.gains import Gains, Integral
-from vsacli.control.linearization import FeedbackLinearization
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.dynamics.forward import State
-from vsacli.dynamics.inverse import TORQUES, compute_block
-from vsacli.robot.model import Robot
+from vsacli.dynamics.inverse import TORQUES
 
 pytestmark = needs_compiler
 
@@ -44,7 +38,7 @@ def lossy() -> Robot:
     return shipped_robot("puma_560").replace(changes)
 
 
-def margins(block: Block) -> FloatArray:
+def margins(block: Block) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         room = np.minimum(block.stiffness - block.stiffness_min, block.stiffness_max - block.stiffness)
     return np.abs(room) / block.stiffness
@@ -57,7 +51,7 @@ def check_inverse_dynamics(robot: Robot, folder: Path, rtol_of_upper: float = 0.
     """
     function, command = inverse_dynamics_function(robot), commands(robot, SAMPLES, seed=2)
     found, returned = compiled_robot(folder / "c", robot, [function], "double")(function, command)
-    block = compute_block(robot, motion_of(command))
+    block = motor_torques(robot, motion_of(command))
     np.testing.assert_array_equal(found.pop("flags"), block.flags)
     np.testing.assert_array_equal(returned, np.bitwise_or.reduce(block.flags, axis=1))
     for name, values in found.items():
@@ -116,7 +110,7 @@ def test_inverse_dynamics_of_what_is_no_number(tmp_path: Path) -> None:
     command["stiffness"][6:, 2] = np.nan, np.inf
     found, returned = compiled_robot(tmp_path / "c", robot, [function], "double")(function, command)
     with np.errstate(all="ignore"):
-        block = compute_block(robot, motion_of(command))
+        block = motor_torques(robot, motion_of(command))
     np.testing.assert_array_equal(found["flags"], block.flags)
     np.testing.assert_array_equal(np.isnan(found["tau_motor"]), np.isnan(block.tau_motor))
     bad = [0, 1, 2, 5, 6]
@@ -136,7 +130,7 @@ def test_link_torques(types: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(found[name], expected, rtol=0, atol=CLOSE * np.abs(expected).max())
 
 
-def loop_inputs(robot: Robot, order: int) -> tuple[State, dict[str, FloatArray], Gains, Integral]:
+def loop_inputs(robot: Robot, order: int) -> tuple[State, dict[str, np.ndarray], Gains, Integral]:
     """Random states, references and integrals, and gains with integral action."""
     rng = np.random.default_rng(6)
     state, joints = random_state(robot, 40, seed=5), len(robot.joints)
@@ -147,7 +141,7 @@ def loop_inputs(robot: Robot, order: int) -> tuple[State, dict[str, FloatArray],
 
 def run_feedback(
     robot: Robot, folder: Path, order: int
-) -> tuple[dict[str, FloatArray], list[int], FloatArray]:
+) -> tuple[dict[str, np.ndarray], list[int], np.ndarray]:
     """What C and the tool make of the same inputs."""
     state, command, gains, integral = loop_inputs(robot, order)
     found, returned = call(robot, folder, state, command, gains, integral)
@@ -160,10 +154,10 @@ def call(
     robot: Robot,
     folder: Path,
     state: State,
-    command: dict[str, FloatArray],
+    command: dict[str, np.ndarray],
     gains: Gains,
     integral: Integral,
-) -> tuple[dict[str, FloatArray], list[int]]:
+) -> tuple[dict[str, np.ndarray], list[int]]:
     function, shape = feedback_linearization_function(robot), state.q.shape
     of_gains = {
         name: np.broadcast_to(values, (*shape, *values.shape[1:]))

@@ -17,18 +17,23 @@ from samples.robots import random_robot
 from samples.shipped import shipped_robot
 from samples.two_hands import two_hands
 
-from vsacli import InputError, load_robot
-from vsacli.base.arrays import FloatArray
+from vsacli import (
+    FeedbackLinearization,
+    Gains,
+    InputError,
+    Integral,
+    Motion,
+    Wrench,
+    link_torques,
+    load_robot,
+    motor_torques,
+)
 from vsacli.base.signals import POSITION
-from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES, Wrench, WrenchFrame, wrench_components
+from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES, WrenchFrame, wrench_components
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.project import generate
 from vsacli.control.codegen.robot_functions import inverse_dynamics_function, link_torques_function
-from vsacli.control.gains import Gains, Integral
-from vsacli.control.linearization import FeedbackLinearization
-from vsacli.dynamics.elastic_torques import TORQUES, link_torques
-from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.trajectory import Motion
+from vsacli.dynamics.elastic_torques import TORQUES
 
 pytestmark = needs_compiler
 
@@ -41,11 +46,11 @@ def drawn_wrench(frame: WrenchFrame) -> Wrench:
     return Wrench(*drawn, frame=frame)
 
 
-def arrays_of(wrench: Wrench) -> dict[str, FloatArray]:
+def arrays_of(wrench: Wrench) -> dict[str, np.ndarray]:
     return {name: getattr(wrench, name) for name in WRENCH_NAMES}
 
 
-def assert_close(found: FloatArray, expected: FloatArray, share: float = CLOSE) -> None:
+def assert_close(found: np.ndarray, expected: np.ndarray, share: float = CLOSE) -> None:
     np.testing.assert_array_equal(np.isnan(found), np.isnan(expected))
     there = np.isfinite(expected)
     np.testing.assert_allclose(
@@ -69,7 +74,7 @@ def test_inverse_dynamics_under_a_wrench(tmp_path: Path) -> None:
     robot, wrench = shipped_robot("vsa_3r"), drawn_wrench("base")
     command = {**commands(robot, SAMPLES, seed=2), "stiffness": np.full((SAMPLES, 3), 1200.0)}
     motion = motion_of(command)
-    block = compute_block(robot, Motion.of(motion.time, motion.of_joints, wrench))
+    block = motor_torques(robot, Motion.of(motion.time, motion.of_joints, wrench))
     function = inverse_dynamics_function(robot, "base")
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "double")(
         function, command, arrays_of(wrench)
@@ -119,7 +124,7 @@ def test_functions_under_wrenches_by_tool(tmp_path: Path) -> None:
     }
     command = {**commands(robot, SAMPLES, seed=2), "stiffness": np.full((SAMPLES, 3), 1200.0)}
     motion = motion_of(command)
-    block = compute_block(robot, Motion.of(motion.time, motion.of_joints, wrench))
+    block = motor_torques(robot, Motion.of(motion.time, motion.of_joints, wrench))
     functions = [make(robot, frame) for make in (link_torques_function, inverse_dynamics_function)]
     call = compiled_robot(tmp_path / "c", robot, functions, "double")
     of_links, _ = call(functions[0], {name: command[name] for name in POSITION.names}, by_tool)

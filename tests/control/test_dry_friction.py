@@ -12,24 +12,32 @@ from samples.simulated import error_course, short_motion
 from samples.single_joint import LINK_INERTIA, single_joint, step_of
 from scipy.integrate import solve_ivp
 
-from vsacli import inverse_dynamics
+from vsacli import (
+    Elastic,
+    FeedbackLinearization,
+    Friction,
+    Gains,
+    InitialError,
+    Integral,
+    Motor,
+    Rigid,
+    Robot,
+    State,
+    Tolerances,
+    inverse_dynamics,
+    perturbed,
+    simulate,
+    state_derivative,
+)
 from vsacli.actuators.drivetrain import Rotors
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.friction import Friction, FrictionLaws
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.arrays import FloatArray
-from vsacli.control.gains import Gains, Integral
-from vsacli.control.linearization import FeedbackLinearization
-from vsacli.control.simulation import InitialError, Tolerances, perturbed, simulate
+from vsacli.actuators.friction import FrictionLaws
 from vsacli.control.simulation.closed_loop import ClosedLoop, Phase
 from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.integrator import Integrator
 from vsacli.control.simulation.loop_equations import LoopEquations
 from vsacli.control.simulation.stick_slip import StickSlip
 from vsacli.control.simulation.tabulated import TabulatedReference
-from vsacli.dynamics.forward import Plant, State, state_derivative
-from vsacli.robot.model import Robot
+from vsacli.dynamics.forward import Plant
 
 SHARP = Friction(coulomb=(3.0, 2.0), offset=0.5)
 GAINS = Gains.from_poles([-20.0] * 4, [-20.0] * 2)
@@ -50,7 +58,7 @@ class Push:
     def __init__(self, force: Callable[[float], float], motors: int = 1) -> None:
         self._force, self._motors = force, motors
 
-    def torque(self, time: float, _phase: Phase, _slip: FloatArray | None = None) -> FloatArray:
+    def torque(self, time: float, _phase: Phase, _slip: np.ndarray | None = None) -> np.ndarray:
         return np.full(self._motors, self._force(time))
 
     def error_rates(self, _time: float, phase: Phase) -> Integral:
@@ -58,8 +66,8 @@ class Push:
 
 
 def pushed(
-    robot: Robot, force: Callable[[float], float], times: FloatArray, dq: float = 0.0, q: float = 0.0
-) -> tuple[FloatArray, FloatArray]:
+    robot: Robot, force: Callable[[float], float], times: np.ndarray, dq: float = 0.0, q: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Position and velocity of the joint of a robot whose only motor exerts a force."""
     loop = ClosedLoop(robot, Push(force), TabulatedReference(step_of(0.0, duration=float(times[-1]))))
     laws = loop.plant.drivetrain.friction
@@ -111,14 +119,14 @@ def test_the_sharp_law_is_the_limit_of_smooth_ones():
     """An elastic joint that is pulled to and fro; smooth friction creeps where sharp friction holds."""
     times = np.linspace(0, 2, 201)
 
-    def run(width: float) -> FloatArray:
+    def run(width: float) -> np.ndarray:
         friction = Friction(coulomb=(1.5, 1.5), width=width)
         motor = Motor(inertia=ROTOR, damping=0.2, friction=friction)
         robot = single_joint(Elastic(motor=motor, stiffness=60.0))
         if width == 0:
             return pushed(robot, lambda time: 4 * float(np.sin(4 * time)), times)[0]
 
-        def rates(time: float, y: FloatArray) -> list[float]:  # by another text
+        def rates(time: float, y: np.ndarray) -> list[float]:  # by another text
             q, dq, theta, dtheta = y
             spring = 60.0 * (theta - q)
             friction = 1.5 * np.tanh(dtheta / width)

@@ -13,18 +13,14 @@ from samples.robots import random_robot, vsa_3r
 from samples.simulated import mixed_3r, short_motion
 from scipy.interpolate import make_interp_spline
 
-from vsacli import inverse_dynamics
+from vsacli import Gains, InitialError, Robot, inverse_dynamics, simulate
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.base.arrays import FloatArray
-from vsacli.control.gains import Gains
-from vsacli.control.simulation import InitialError, simulate
 from vsacli.control.simulation.history import History
-from vsacli.robot.model import Robot
 
 GAINS = Gains.from_poles([-20.0] * 4, [-20.0] * 2)
 
 
-def balance(robot: Robot, past: History) -> FloatArray:
+def balance(robot: Robot, past: History) -> np.ndarray:
     """Energy of links, rotors and springs less its start, and all that was lost until then, (samples,)."""
     still = np.zeros_like(past.q)
     chain = chain_of(robot, (past.q, past.dq, still, still, still))

@@ -14,20 +14,25 @@ from samples.plants import all_rigid, elastic, random_state, rigid, with_actuato
 from samples.robots import random_robot, vsa_3r
 from samples.signals import by_name
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.tendons import Quadratic
-from vsacli.actuators.motor import Motor
-from vsacli.base.errors import InputError
-from vsacli.base.wrench import Wrench
-from vsacli.control.gains import Gains, Integral
-from vsacli.control.linearization import FeedbackLinearization, feedback_linearization
+from vsacli import (
+    Antagonistic,
+    FeedbackLinearization,
+    Gains,
+    InputError,
+    Integral,
+    Motion,
+    Motor,
+    Pose,
+    Robot,
+    State,
+    Wrench,
+    feedback_linearization,
+    laws,
+    link_torques,
+    motor_torques,
+    state_derivative,
+)
 from vsacli.control.poles import gains_from_text, load_gains, parse_poles
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.dynamics.forward import State, state_derivative
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.joint import Pose
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Motion
 
 GAINS = Gains.from_poles([-9, -10, -11 + 4j, -11 - 4j], [-12, -15])
 
@@ -56,7 +61,7 @@ def at(record, index):
 def test_on_the_reference_it_gives_the_computed_torques():
     robot, trajectory = vsa_3r(), motion(rate=20)
     command = trajectory.block(0, trajectory.samples)
-    computed = compute_block(robot, command)
+    computed = motor_torques(robot, command)
     state = State(computed.q, computed.dq, computed.theta, computed.dtheta)
     torque = feedback_linearization(robot, state, command, GAINS)
     # phi carries 1e-16/margin, here 1e-14, and the gains, up to 1e4, magnify what that does to d3q
@@ -166,7 +171,7 @@ def test_equal_quadratic_pairs_at_constant_stiffness_are_an_elastic_joint():
         random_robot("RP", seed=7), {0: elastic(800, 3.0, 0.4), 1: elastic(800, 3.0, 0.4)}
     )
     motor = Motor(inertia=1.5, damping=0.2)
-    pair = Antagonistic(motor=(motor, motor), spring=(Quadratic(k=1500), Quadratic(k=1500)))
+    pair = Antagonistic(motor=(motor, motor), spring=(laws.Quadratic(k=1500), laws.Quadratic(k=1500)))
     double = with_actuators(single, {0: pair, 1: pair})
     state = random_state(single, 4, seed=4)
     reference = dataclasses.replace(

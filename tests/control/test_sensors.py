@@ -12,13 +12,8 @@ from samples.plants import elastic, rigid, with_actuators
 from samples.robots import vsa_3r
 from samples.simulated import short_motion
 
-from vsacli import FeedbackLinearization, State
-from vsacli.base.errors import InputError
-from vsacli.control.gains import Gains
-from vsacli.control.simulation import Sensors, simulate
+from vsacli import FeedbackLinearization, Gains, InputError, Limits, Sensors, State, load_trajectory, simulate
 from vsacli.files.examples import examples
-from vsacli.robot.joint import Limits
-from vsacli.trajectory.file import load_trajectory
 
 GAINS = Gains.from_poles([-12] * 4, [-12] * 2)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tracemalloc
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,17 +12,8 @@ from samples.marks import slow_but
 from samples.robots import vsa_3r
 from samples.simulated import short_motion
 
-from vsacli.base.errors import InputError
-from vsacli.control.gains import Gains
-from vsacli.control.simulation import (
-    InitialError,
-    Sensors,
-    SimulationRun,
-    history,
-    perturbed,
-    sensors,
-    simulate,
-)
+from vsacli import Gains, InitialError, InputError, Sensors, perturbed, simulate
+from vsacli.control.simulation import SimulationRun, history, sensors
 
 GAINS = Gains.from_poles([-20] * 4, [-20] * 2)
 FAST = Gains.from_poles([-200] * 4, [-200] * 2)
@@ -38,12 +30,22 @@ CASES = {
 }
 
 
+@pytest.fixture
+def divide(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Set the samples of a block; their noise is drawn for some fewer at a time."""
+
+    def into(samples: int) -> None:
+        for module, name, size in ((history, "BLOCK", samples), (sensors, "DRAWN", samples - 2)):
+            monkeypatch.setattr(module, name, size)
+
+    return into
+
+
 @pytest.mark.parametrize("case", slow_but({"feedforward", "budget for nothing"}, CASES))
-def test_results_do_not_depend_on_the_division_into_blocks(monkeypatch, case):
+def test_results_do_not_depend_on_the_division_into_blocks(divide, case):
     conditions = CASES[case]
     whole = simulate(vsa_3r(), short_motion(3), engine="numpy", **conditions)
-    monkeypatch.setattr(history, "BLOCK", 7)
-    monkeypatch.setattr(sensors, "DRAWN", 5)
+    divide(7)
     run = SimulationRun(vsa_3r(), short_motion(3), engine="numpy", **conditions)
     blocks = list(run)
     assert len(blocks) == len(whole.history.time) == 1 or len(blocks) >= 5
@@ -53,8 +55,8 @@ def test_results_do_not_depend_on_the_division_into_blocks(monkeypatch, case):
         np.testing.assert_array_equal(divided, values, err_msg=name)
 
 
-def test_an_early_end_is_in_the_last_block_alone(monkeypatch):
-    monkeypatch.setattr(history, "BLOCK", 7)
+def test_an_early_end_is_in_the_last_block_alone(divide):
+    divide(7)
     stiff = short_motion(3, stiffness=(1100, 200))  # below what the load allows, from a time on
     run = SimulationRun(vsa_3r(), stiff, engine="numpy")
     *others, last = list(run)
@@ -64,8 +66,8 @@ def test_an_early_end_is_in_the_last_block_alone(monkeypatch):
 
 
 @pytest.mark.slow
-def test_memory_does_not_grow_with_the_duration(monkeypatch):
-    monkeypatch.setattr(history, "BLOCK", 512)
+def test_memory_does_not_grow_with_the_duration(divide):
+    divide(512)
 
     def peak(duration: float) -> int:
         motion = short_motion(3, duration=duration, rate=4000)

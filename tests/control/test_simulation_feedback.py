@@ -14,11 +14,7 @@ from samples.plants import all_rigid
 from samples.robots import random_robot, vsa_3r
 from samples.simulated import error_course, linearized_run, mixed_3r, short_motion
 
-from vsacli.control.gains import Gains
-from vsacli.control.linearization import FeedbackLinearization
-from vsacli.control.simulation import InitialError, simulate
-from vsacli.robot.file import load_robot
-from vsacli.robot.joint import Pose
+from vsacli import FeedbackLinearization, Gains, InitialError, Pose, load_robot, simulate
 
 POSITION_POLES = [-18, -20, -15 + 8j, -15 - 8j]
 STIFFNESS_POLES = [-14, -22]

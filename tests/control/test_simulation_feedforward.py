@@ -11,13 +11,10 @@ from samples.robots import random_robot, vsa_3r
 from samples.simulated import mixed_3r, short_motion
 from scipy.integrate import solve_ivp
 
-from vsacli.control.simulation import InitialError, perturbed, simulate
+from vsacli import InitialError, Trajectory, load_robot, load_trajectory, perturbed, simulate
 from vsacli.control.simulation.tabulated import Table
 from vsacli.dynamics.forward import Plant
-from vsacli.robot.file import load_robot
-from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 REPRODUCED = 2e-9
 """rad, and relative stiffness: 1.4e-10 was seen with every backend and the kernels of five processors, of

@@ -12,9 +12,7 @@ from samples.robots import vsa_3r
 from samples.simulated import short_motion
 from samples.single_joint import LINK_INERTIA, rigid_joint, step_of
 
-from vsacli.base.errors import InputError
-from vsacli.control.gains import Gains
-from vsacli.control.simulation import GoalTolerance, InitialError, simulate
+from vsacli import Gains, GoalTolerance, InitialError, InputError, simulate
 from vsacli.control.simulation.simulation_report import SimulationReport
 from vsacli.control.simulation.simulation_summary import Summary
 

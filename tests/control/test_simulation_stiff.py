@@ -12,18 +12,11 @@ from samples.robots import vsa_3r
 from samples.simulated import short_motion
 from samples.single_joint import LINK_INERTIA, rigid_joint, single_joint, step_of
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.tendons import Quadratic
-from vsacli.actuators.motor import Motor
-from vsacli.base.errors import InputError
+from vsacli import Antagonistic, Elastic, Gains, InitialError, InputError, Motor, Trajectory, laws, simulate
 from vsacli.base.units import time_text
-from vsacli.control.gains import Gains
-from vsacli.control.simulation import InitialError, simulate
 from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.stiff import difference_jacobian
 from vsacli.trajectory.times import RecordedTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 MOTOR_INERTIA = 2.0
 GAINS = Gains.from_poles([-20] * 4, [-20] * 2)
@@ -114,7 +107,7 @@ def test_runs_end_at_the_same_boundary_with_both_methods(monkeypatch, what):
     robot, trajectory = vsa_3r(), motion((850.0,) * 3, (805.0,) * 3, duration=1.0)
     if what == "slack":
         motor = Motor(inertia=3.0, damping=1e-4)
-        actuator = Antagonistic(motor=(motor, motor), spring=(Quadratic(k=2000), Quadratic(k=2000)))
+        actuator = Antagonistic(motor=(motor, motor), spring=(laws.Quadratic(k=2000), laws.Quadratic(k=2000)))
         joints = tuple(dataclasses.replace(joint, actuator=actuator) for joint in robot.joints)
         robot, trajectory = dataclasses.replace(robot, joints=joints), motion((530.0,) * 3)
         conditions = {"initial_error": InitialError(0.02, 50)}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.documents.edited import edited, texts_at
 
 TEXT = """\

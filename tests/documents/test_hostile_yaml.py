@@ -8,10 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from samples.hostile import YAML, damaged, fuzz
 
-from vsacli.base.errors import InputError
+from vsacli import InputError, load_robot, load_trajectory
 from vsacli.documents.source import HDF5_SIGNATURE, MAX_DOCUMENT_BYTES, check_input_file
-from vsacli.robot.file import load_robot
-from vsacli.trajectory.file import load_trajectory
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 

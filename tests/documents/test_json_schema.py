@@ -17,7 +17,7 @@ from jsonschema import Draft202012Validator
 from samples.command_line import REPOSITORY
 from samples.studies import DRAWN, GRID, HEAD
 
-from vsacli.base.errors import InputError
+from vsacli import InputError, load_robot
 from vsacli.base.units import ANGLE, MASS, POSITION
 from vsacli.documents import fields
 from vsacli.documents.expression import ExpressionError
@@ -26,7 +26,6 @@ from vsacli.documents.json_schema import json_schema
 from vsacli.documents.number import evaluate
 from vsacli.documents.tree import Node, Scope
 from vsacli.files.file_kinds import DOCUMENTS, FileKind
-from vsacli.robot.file import load_robot
 
 ROBOTS = sorted((REPOSITORY / "robots").glob("*.yaml"))
 TRAJECTORIES = sorted((REPOSITORY / "trajectories").glob("*.yaml"))

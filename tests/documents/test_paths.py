@@ -10,14 +10,10 @@ from typing import Any
 import pytest
 from samples.command_line import REPOSITORY
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.base.errors import InputError
+from vsacli import Antagonistic, InputError, Robot, laws, load_robot
 from vsacli.base.signals import POSITION
 from vsacli.documents.paths import find, replace
-from vsacli.robot.file import load_robot
-from vsacli.robot.model import Robot
-from vsacli.trajectory.curves.closed_form import Use
+from vsacli.trajectory.curves.types import Use
 from vsacli.trajectory.curves.via_points import Via
 
 ROBOT = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")
@@ -68,7 +64,7 @@ def springs(robot: Robot, joint: int = 2) -> tuple[Any, Any]:
     return actuator.spring
 
 
-def with_springs(first: Cubic, second: Cubic) -> Robot:
+def with_springs(first: laws.Cubic, second: laws.Cubic) -> Robot:
     *others, elbow = ROBOT.joints
     elbow = dataclasses.replace(elbow, actuator=dataclasses.replace(elbow.actuator, spring=(first, second)))
     return dataclasses.replace(ROBOT, joints=(*others, elbow))
@@ -87,12 +83,12 @@ def test_one_side() -> None:
     assert (first, second.k) == (springs(ROBOT)[0], 500)
 
 
-DIFFERENT = (Cubic(k=400, k_c=2000), Cubic(k=300, k_c=2000))
-LIMITED = (Cubic(k=400, k_c=2000), Cubic(k=400, k_c=2000, max_deflection=0.5))
+DIFFERENT = (laws.Cubic(k=400, k_c=2000), laws.Cubic(k=300, k_c=2000))
+LIMITED = (laws.Cubic(k=400, k_c=2000), laws.Cubic(k=400, k_c=2000, max_deflection=0.5))
 
 
 @pytest.mark.parametrize("sides", [DIFFERENT, LIMITED], ids=["constant", "limit"])
-def test_sides_that_differ_change_only_if_it_is_said_which(sides: tuple[Cubic, Cubic]) -> None:
+def test_sides_that_differ_change_only_if_it_is_said_which(sides: tuple[laws.Cubic, laws.Cubic]) -> None:
     robot = with_springs(*sides)
     both = replace(robot, "joints.elbow.actuator.spring.*.k", 500)
     assert [spring.k for spring in springs(both)] == [500, 500]
@@ -143,7 +139,7 @@ def test_units_follow_the_joint_and_the_gear() -> None:
 
 def test_a_variant_is_replaced_as_a_whole() -> None:
     changed = replace(ROBOT, "joints.elbow.actuator.spring", {"type": "cubic", "k": 100, "k_c": 200})
-    assert springs(changed) == (Cubic(k=100, k_c=200),) * 2
+    assert springs(changed) == (laws.Cubic(k=100, k_c=200),) * 2
 
 
 MOVE = Via.record(Use(POSITION))(degree=9, points=((0.0, 0.0), (1.0, 1.0), (2.0, 0.0)), times=(0.0, 1.0, 2.0))

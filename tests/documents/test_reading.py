@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from vsacli import InputError
 from vsacli.base import units
-from vsacli.base.errors import FieldProblem, InputError
+from vsacli.base.errors import FieldProblem
 from vsacli.documents.fields import (
     NON_NEGATIVE,
     Check,

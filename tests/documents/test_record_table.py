@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import pytest
 
+from vsacli import InputError
 from vsacli.base import units
-from vsacli.base.errors import InputError
 from vsacli.documents.fields import POSITIVE, Name, number, value
 from vsacli.documents.record_checks import DeclaredRecord
 from vsacli.documents.record_table import read_records
@@ -66,7 +66,7 @@ def test_names_may_hold_separators_and_look_like_anything(read):
         ),
         ("name[m],mass\napple,1", 1, "column 'name': holds texts, which have no unit"),
         ("1,2\n3,4", 1, "expected a header line with column names such as time, base.q, found numbers"),
-        ("name,mass\n# nothing", 0, "has a header but no rows of values"),
+        ("name,mass\n# nothing", 0, "no rows of values"),
         ("name,mass\napple,1\npear", 3, "expected 2 values, one for each column of the header, found 1"),
         ("name,mass\napple,1,5", 2, "one for each column of the header, found 3; names with the separator"),
         ("name,mass\napple,-1", 2, "mass: must be positive, not -1 kg$"),

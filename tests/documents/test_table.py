@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.documents.csv_file import CHUNK, MAX_HEADER
 from vsacli.documents.source import MAX_DOCUMENT_BYTES
 from vsacli.documents.table import read_table

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.documents.table import read_table
 from vsacli.documents.time_column import NANOSECONDS, ClockTime, nanoseconds_since_first, read_clock
 

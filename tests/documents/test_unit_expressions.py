@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.expression import BASES, conversion_factor
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.documents.source import Problems
 from vsacli.documents.tree import MAX_LEVELS, MAX_NODES, ListNode, MapNode, TextNode, parse_yaml
 

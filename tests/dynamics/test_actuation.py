@@ -12,15 +12,19 @@ from oracles.scalar_vsa import Actuation, Curve, Side, actuation
 from samples.marks import needs_compiler, slow_but
 from samples.shipped import shipped_run
 
-from vsacli import inverse_dynamics
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.analysis.result import Result
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.joint import Inertia, Joint, Link, Pose
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli import (
+    Antagonistic,
+    Inertia,
+    Joint,
+    Link,
+    Motor,
+    Pose,
+    Result,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+    laws,
+)
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = 300
@@ -49,7 +53,7 @@ def unlike(branches: tuple[str, ...]) -> tuple[Robot, Trajectory]:
     actuators = [
         Antagonistic(
             motor=(Motor(inertia=3.2, damping=0.1), Motor(inertia=2.5 - 0.5 * index, damping=0.3)),
-            spring=(Cubic(k=400, k_c=2000), Cubic(k=420 - 60 * index, k_c=2500 + 4000 * index)),
+            spring=(laws.Cubic(k=400, k_c=2000), laws.Cubic(k=420 - 60 * index, k_c=2500 + 4000 * index)),
             branch=branch,
         )
         for index, branch in enumerate(branches)
@@ -76,12 +80,12 @@ def sides_of(joint: Joint) -> tuple[Side, Side]:
     first, second = (
         Side(spring.k, spring.k_c, motor.inertia, motor.damping)
         for spring, motor in zip(joint.actuator.spring, joint.actuator.motor, strict=True)
-        if isinstance(spring, Cubic)
+        if isinstance(spring, laws.Cubic)
     )
     return first, second
 
 
-def recomputed(joint: Joint, result: Result, index: int, steps: FloatArray) -> Iterator[Actuation]:
+def recomputed(joint: Joint, result: Result, index: int, steps: np.ndarray) -> Iterator[Actuation]:
     """One sample after the other, from the motion, the stiffness and the link torque."""
     branch = 1 if joint.actuator.branch == "positive" else -1
     for step in steps:

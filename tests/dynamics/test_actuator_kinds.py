@@ -12,19 +12,24 @@ from samples.plants import all_rigid, elastic, rigid, with_actuators
 from samples.robots import MotionArrays, random_motion, random_robot, robot_of_ones
 from samples.signals import by_name
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.tendons import Quadratic
-from vsacli.actuators.motor import Motor
+from vsacli import (
+    Antagonistic,
+    DenavitHartenberg,
+    Elastic,
+    Flag,
+    Inertia,
+    Joint,
+    Limits,
+    Link,
+    Motion,
+    Motor,
+    Robot,
+    laws,
+    motor_torques,
+)
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
 from vsacli.base.variables import VARIABLES, Block
 from vsacli.dynamics.drive import drive
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Motion
 
 NAN = np.nan
 OF_MOTORS = ("phi", "dphi", "theta", "dtheta", "ddtheta", "tau_transmission", "tau_motor", "motor_power")
@@ -36,7 +41,7 @@ def computed(robot: Robot, motion: MotionArrays, stiffness: float = NAN) -> Bloc
     """A block of unrelated steps at a constant stiffness."""
     sigma = np.full_like(motion[0], stiffness)
     rates = np.zeros_like(sigma)
-    return compute_block(robot, Motion(np.arange(float(len(sigma))), *motion, by_name(sigma, rates, rates)))
+    return motor_torques(robot, Motion(np.arange(float(len(sigma))), *motion, by_name(sigma, rates, rates)))
 
 
 def gentle(robot: Robot, samples: int, seed: int) -> MotionArrays:
@@ -46,7 +51,7 @@ def gentle(robot: Robot, samples: int, seed: int) -> MotionArrays:
     return q, dq, ddq, d3q, d4q
 
 
-def assert_near(found: FloatArray, expected: FloatArray, relative: float = 1e-12) -> None:
+def assert_near(found: np.ndarray, expected: np.ndarray, relative: float = 1e-12) -> None:
     np.testing.assert_allclose(found, expected, rtol=0, atol=relative * np.abs(expected).max())
 
 
@@ -104,7 +109,7 @@ def test_an_elastic_chain_becomes_rigid_as_its_springs_stiffen() -> None:
     robot = random_robot("RPR", seed=3)
     motion = gentle(robot, 20, seed=4)
 
-    def torques(kind: Elastic | None) -> FloatArray:
+    def torques(kind: Elastic | None) -> np.ndarray:
         actuators = dict.fromkeys(range(3), kind or rigid())
         return computed(with_actuators(robot, actuators), motion).tau_motor[..., 0]
 
@@ -120,7 +125,7 @@ def test_a_pair_of_quadratic_springs_is_an_elastic_joint() -> None:
     """Springs of any k at a constant stiffness: only their motors add up."""
     sigma = 700.0
     motor = Motor(inertia=1.7, damping=0.3)
-    pair = Antagonistic(motor=(motor, motor), spring=(Quadratic(k=900), Quadratic(k=900)))
+    pair = Antagonistic(motor=(motor, motor), spring=(laws.Quadratic(k=900), laws.Quadratic(k=900)))
     spring = elastic(stiffness=sigma, inertia=2 * motor.inertia, damping=2 * motor.damping)
     joint = random_robot("R", seed=1).joints[0]
     rng = np.random.default_rng(2)

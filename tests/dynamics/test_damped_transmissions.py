@@ -13,25 +13,29 @@ from samples.driven_arm import ARM, DURATION, LINK, assert_follows, motion_of, r
 from samples.full_model import Drive, springs_of
 from samples.marks import slow
 from samples.mechanisms import DEVICES
+from samples.moves import move
 
-from vsacli import Gains, Robot, inverse_dynamics, simulate
+from vsacli import (
+    Antagonistic,
+    Damper,
+    Elastic,
+    Flag,
+    Gains,
+    InputError,
+    Motor,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+    laws,
+    simulate,
+)
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.antagonistic import Antagonistic
 from vsacli.actuators.damped_springs import DampedSprings
-from vsacli.actuators.damper import Damper
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
 from vsacli.actuators.transmission import Command
 from vsacli.analysis.run import Run
-from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
-from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
+from vsacli.base.signals import DAMPING
 from vsacli.dynamics.internal_motion import March, _CellSolution, _Peaks, internal_motions
-from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.sinusoids import Sinusoids
-from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 MOTOR = Motor(inertia=0.2, damping=0.1)
 PARALLEL = Damper(location="transmission", range=(0, 10))
@@ -44,7 +48,7 @@ def pair(q: Any, *theta: Any) -> Any:
 
 CASES: dict[str, tuple[Actuator, Drive, Ends]] = {
     "antagonistic": (
-        Antagonistic(motor=(MOTOR, MOTOR), spring=(Cubic(k=400, k_c=2000),) * 2),
+        Antagonistic(motor=(MOTOR, MOTOR), spring=(laws.Cubic(k=400, k_c=2000),) * 2),
         Drive(np.diag([0.2, 0.2]), [0.1, 0.1], springs_of(pair, 2)),
         (900, 1200),
     ),
@@ -229,7 +233,7 @@ def test_it_starts_where_the_robot_says() -> None:
 @pytest.mark.slow
 def test_beyond_the_largest_torque_it_is_unstable() -> None:
     """Sides that differ have a largest torque at a stiffness; it starts beyond, and comes back at once."""
-    springs = Cubic(k=30, k_c=100), Cubic(k=30, k_c=900)
+    springs = laws.Cubic(k=30, k_c=100), laws.Cubic(k=30, k_c=900)
     actuator = Antagonistic(motor=(MOTOR, MOTOR), spring=springs)
     damper = Damper(location="transmission", range=(0, 10), start=0.3325)
     result = inverse_dynamics(robot_of(LINK, [actuator], [damper]), motion_of([(90, 90)], [(5, 5)]))
@@ -287,12 +291,8 @@ def test_loads_that_begin_and_pass_zero_do_not_make_cells_small(end: float) -> N
     pendular = pendulum("awas", Damper(location="transmission", range=(0, 1)))
     light = replace(pendular.joints[0], damping=0.0)
     robot = replace(pendular, gravity=(0, 0, 0), joints=(light,))
-    span = (0.0, 2.0)
-    position = RestToRest(signal=POSITION, span=span, degree=9, start=(0.2,), end=(end,))
-    stiffness = RestToRest(signal=STIFFNESS, span=span, degree=5, start=(600.0,), end=(600.0,))
-    damping = RestToRest(signal=DAMPING, span=span, degree=3, start=(0.001,), end=(0.001,))
-    profiles = {STIFFNESS.key: stiffness, DAMPING.key: damping}
-    inside = internal_motions(robot, Trajectory(UniformTimes(2.0, 200), position, profiles, name="rest"))
+    constant = {"stiffness": ([600.0],) * 2, "damping": ([0.001],) * 2}
+    inside = internal_motions(robot, move(2.0, 200, ([0.2], [end]), degrees=(9, 3), **constant))
     assert not inside.stops
     assert len(inside.breakpoints) < 200
 
@@ -300,15 +300,9 @@ def test_loads_that_begin_and_pass_zero_do_not_make_cells_small(end: float) -> N
 @pytest.mark.parametrize("turns", [0, slow(20)])
 def test_positions_of_many_turns_do_not_make_cells_small(turns: int) -> None:
     """Deflections are differences of positions: nothing below their rounding is resolved by shorter cells."""
-    robot, span = pendulum("awas"), (0.0, 1.5)
-    begin = 800.0
-    position = RestToRest(
-        signal=POSITION, span=span, degree=9, start=(begin,), end=(begin + 0.5 + 6 * turns,)
-    )
-    stiffness = RestToRest(signal=STIFFNESS, span=span, degree=5, start=(600.0,), end=(800.0,))
-    damping = RestToRest(signal=DAMPING, span=span, degree=5, start=(2.0,), end=(10.0,))
-    profiles = {STIFFNESS.key: stiffness, DAMPING.key: damping}
-    inside = internal_motions(robot, Trajectory(UniformTimes(1.5, 200), position, profiles, name="turned"))
+    commanded = {"stiffness": ([600.0], [800.0]), "damping": ([2.0], [10.0])}
+    position = [800.0], [800.5 + 6 * turns]
+    inside = internal_motions(pendulum("awas"), move(1.5, 200, position, degrees=(9, 5), **commanded))
     assert not inside.stops
     assert len(inside.breakpoints) < 50 + 10 * turns
 
@@ -328,11 +322,7 @@ def test_motions_inside_go_as_far_as_the_trajectory() -> None:
 
 def test_simulation_knows_how_fast_it_settles() -> None:
     """Degree 7 begins with a jump of the snap: what moves inside settles within milliseconds."""
-    span = (0.0, 4.0)
-    position = RestToRest(signal=POSITION, span=span, degree=7, start=(-1.2,), end=(0.3,))
-    damping = RestToRest(signal=DAMPING, span=span, degree=3, start=(1.0,), end=(2.0,))
-    profiles = {"damping": damping}
-    trajectory = Trajectory(UniformTimes(4.0, 100), position, profiles, name="abrupt")
+    trajectory = move(4.0, 100, ([-1.2], [0.3]), damping=([1.0], [2.0]))
     robot = pendulum("elastic")
     past, expected = simulate(robot, trajectory).history, inverse_dynamics(robot, trajectory)
     peak = np.nanmax(np.abs(expected.tau_motor))

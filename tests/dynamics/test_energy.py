@@ -19,16 +19,11 @@ from samples.simulated import short_motion
 from scipy.integrate import trapezoid
 from scipy.interpolate import make_interp_spline
 
-from vsacli import inverse_dynamics
+from vsacli import Flag, Result, Robot, Trajectory, inverse_dynamics
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.analysis.result import Result
 from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
 from vsacli.dynamics.energy import EnergyMeter, Flow
 from vsacli.dynamics.losses import integrals, positive_part
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Trajectory
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -59,19 +54,19 @@ CASES = {
 }
 
 
-def integral(time: FloatArray, values: FloatArray) -> FloatArray:
+def integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     """From the first time on, by an interpolating spline of degree 7: error O(h^8)."""
     spline = make_interp_spline(time, values, k=7).antiderivative()
     return spline(time) - spline(time[0])
 
 
-def constants(robot: Robot) -> tuple[FloatArray, FloatArray]:
+def constants(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """Inertia and damping of the motors, (joints, 2), NaN where there is none."""
     drivetrain = Drivetrain(robot.actuators)
     return drivetrain.of_joints(drivetrain.inertia), drivetrain.of_joints(drivetrain.damping)
 
 
-def energy_of_motion(robot: Robot, result: Result) -> FloatArray:
+def energy_of_motion(robot: Robot, result: Result) -> np.ndarray:
     """Kinetic and potential energy of links and rotors, (samples,), and what the springs hold."""
     chain = chain_of(robot, (result.q, result.dq, result.ddq, result.d3q, result.d4q))
     inertia, _ = constants(robot)
@@ -79,13 +74,13 @@ def energy_of_motion(robot: Robot, result: Result) -> FloatArray:
     return chain.kinetic_energy(0) + chain.potential_energy(0) + rotors + result.elastic_energy.sum(axis=1)
 
 
-def lost_power(robot: Robot, result: Result) -> FloatArray:
+def lost_power(robot: Robot, result: Result) -> np.ndarray:
     _, damping = constants(robot)
     joints = np.array([joint.damping for joint in robot.joints])
     return (joints * result.dq**2).sum(axis=1) + np.nansum(damping * result.dtheta**2, axis=(1, 2))
 
 
-def wrench_power(robot: Robot, trajectory: Trajectory, result: Result) -> FloatArray:
+def wrench_power(robot: Robot, trajectory: Trajectory, result: Result) -> np.ndarray:
     if trajectory.wrench is None:
         return np.zeros(len(result.time))
     power = []

@@ -13,12 +13,20 @@ from samples.plants import all_rigid, elastic, random_state, rigid, torques_of, 
 from samples.robots import random_robot, still_joint, vsa_3r
 from samples.trees import finger, hand, reordered
 
-from vsacli.base.errors import InputError
-from vsacli.base.wrench import Wrench
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.dynamics.forward import State, mass_matrix, state_derivative
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link, Pose
-from vsacli.robot.model import Robot
+from vsacli import (
+    DenavitHartenberg,
+    Inertia,
+    InputError,
+    Joint,
+    Link,
+    Pose,
+    Robot,
+    State,
+    Wrench,
+    link_torques,
+    mass_matrix,
+    state_derivative,
+)
 
 NOTHING = Link(mass=0, com=(0, 0, 0), inertia=Inertia(xx=0, yy=0, zz=0))
 

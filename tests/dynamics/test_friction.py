@@ -16,18 +16,21 @@ from samples.shipped import shipped_run
 from samples.simulated import short_motion
 from scipy.interpolate import PPoly, make_interp_spline
 
-from vsacli import inverse_dynamics, link_torques
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.friction import REST, Friction, FrictionLaws
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
+from vsacli import (
+    Antagonistic,
+    Elastic,
+    Friction,
+    InputError,
+    Motor,
+    Report,
+    Rigid,
+    Robot,
+    inverse_dynamics,
+    laws,
+    link_torques,
+)
+from vsacli.actuators.friction import REST, FrictionLaws
 from vsacli.analysis.dry_friction import DryFrictionSummary
-from vsacli.analysis.report import Report
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InvalidRecordError
-from vsacli.robot.model import Robot
 
 ROUNDING = 1e-8
 """Of the energy that flows: Hermite's rule at 1 kHz leaves about 1e-10."""
@@ -59,16 +62,16 @@ def with_friction(robot: Robot, of_motors: Friction | None, of_joints: Friction 
 @pytest.mark.parametrize("friction", [SHARP, SMOOTH, Friction(coulomb=(1.0, 1.0), width=1e-3)])
 def test_several_laws_at_once_are_the_law(friction):
     velocity = np.array([[-2.0, 0.3], [-1e-4, 1e-9], [0.0, 5.0]])
-    laws = FrictionLaws.of([friction, None])
-    assert laws is not None
+    frictions = FrictionLaws.of([friction, None])
+    assert frictions is not None
     expected = [[law(friction, v), 0.0] for v in velocity[:, 0]]
-    np.testing.assert_allclose(laws.torque(velocity), expected, rtol=1e-15)  # rounding
+    np.testing.assert_allclose(frictions.torque(velocity), expected, rtol=1e-15)  # rounding
 
 
 def test_what_rests_has_no_direction():
-    laws = FrictionLaws.of([SHARP])
-    assert laws is not None
-    found = laws.torque(np.array([[-2 * REST], [-REST], [0.0], [REST], [2 * REST]]))[:, 0]
+    frictions = FrictionLaws.of([SHARP])
+    assert frictions is not None
+    found = frictions.torque(np.array([[-2 * REST], [-REST], [0.0], [REST], [2 * REST]]))[:, 0]
     np.testing.assert_allclose(found, [-2.9, 0.1, 0.1, 0.1, 2.1], rtol=1e-15)  # rounding
 
 
@@ -112,7 +115,7 @@ def test_friction_between_links_and_its_derivatives_are_those_of_sympy():
 MOTOR = Motor(inertia=0.2, damping=0.1, friction=SMOOTH)
 DRIVES = {
     "antagonistic": (
-        Antagonistic(motor=(MOTOR, MOTOR), spring=(Cubic(k=400, k_c=2000),) * 2),
+        Antagonistic(motor=(MOTOR, MOTOR), spring=(laws.Cubic(k=400, k_c=2000),) * 2),
         Drive(
             np.diag([0.2, 0.2]),
             [0.1, 0.1],
@@ -158,7 +161,7 @@ def test_the_full_model_with_friction_follows(kinds):
     assert np.abs(result.q[-1] - (START + MOVE)).max() < 1e-12  # it moved
 
 
-def turning_points(time: FloatArray, theta: FloatArray) -> FloatArray:
+def turning_points(time: np.ndarray, theta: np.ndarray) -> np.ndarray:
     """Where a motor turns back, and both ends, by a spline of degree 7."""
     spline = make_interp_spline(time, theta, k=7)
     turns = PPoly.from_spline(spline.derivative()).roots(extrapolate=False)
@@ -166,7 +169,7 @@ def turning_points(time: FloatArray, theta: FloatArray) -> FloatArray:
     return spline(np.sort(np.concatenate((ends, turns[(turns > ends[0]) & (turns < ends[1])]))))
 
 
-def lost_to(friction: Friction, time: FloatArray, theta: FloatArray, dtheta: FloatArray) -> float:
+def lost_to(friction: Friction, time: np.ndarray, theta: np.ndarray, dtheta: np.ndarray) -> float:
     """Work against friction: of the sign function by the ways forward and back, else by the power."""
     if friction.width:
         power = np.array([law(friction, velocity) * velocity for velocity in dtheta])
@@ -177,7 +180,7 @@ def lost_to(friction: Friction, time: FloatArray, theta: FloatArray, dtheta: Flo
     return float((size * np.abs(ways)).sum() + friction.offset * ways.sum())
 
 
-def damped(time: FloatArray, damping: float, velocity: FloatArray) -> float:
+def damped(time: np.ndarray, damping: float, velocity: np.ndarray) -> float:
     spline = make_interp_spline(time, damping * velocity**2, k=5).antiderivative()
     return float(spline(time[-1]) - spline(time[0]))
 
@@ -259,11 +262,11 @@ def test_the_report_says_once_where_torques_are_open():
 
 def test_friction_between_links_must_be_smooth_and_of_one_size():
     robot, _ = shipped_run("vsa_3r", "rest_to_rest")
-    with pytest.raises(InvalidRecordError, match=r"width: must be positive: .* give the friction to"):
+    with pytest.raises(InputError, match=r"width: must be positive: .* give the friction to"):
         with_friction(robot, None, Friction(coulomb=(1.0, 1.0)))
-    with pytest.raises(InvalidRecordError, match=r"give their mean 2.5, and half their difference .*: -0.5"):
+    with pytest.raises(InputError, match=r"give their mean 2.5, and half their difference .*: -0.5"):
         with_friction(robot, None, SMOOTH)
-    with pytest.raises(InvalidRecordError, match=r"width: must be at least 1e-30 in size, not 1e-160"):
+    with pytest.raises(InputError, match=r"width: must be at least 1e-30 in size, not 1e-160"):
         with_friction(robot, None, Friction(coulomb=(1.0, 1.0), width=1e-160))  # its square is no number
     only_offset = with_friction(robot, None, Friction(coulomb=(0.0, 0.0), offset=1.0))
     found = link_torques(only_offset, np.zeros(3)).tau_e - link_torques(robot, np.zeros(3)).tau_e

@@ -22,15 +22,9 @@ from samples.drives import joint_with, springs, with_joint
 from samples.marks import slow_but
 from samples.shipped import shipped_run
 
-from vsacli import Trajectory, inverse_dynamics
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.tendons import Exponential
-from vsacli.actuators.motor import Motor
+from vsacli import Elastic, InputError, Motor, Robot, Trajectory, inverse_dynamics, laws
 from vsacli.analysis.run import Run
-from vsacli.base.errors import InputError
 from vsacli.dynamics.integrated_deflections import DeflectionEquation, integrate_deflections
-from vsacli.robot.model import Robot
 
 TORQUE_AGREEMENT = 1e-9
 """Of the peak motor torque: a drift of 1e-11, which A^-1 magnifies up to a hundredfold at a margin of 3 %."""
@@ -38,13 +32,13 @@ TORQUE_AGREEMENT = 1e-9
 
 def unlike(branch: str) -> tuple[Robot, Trajectory]:
     """The arm with a shoulder whose springs differ."""
-    actuator = springs(Cubic(k=400, k_c=2000), Cubic(k=360, k_c=6000), branch)
+    actuator = springs(laws.Cubic(k=400, k_c=2000), laws.Cubic(k=360, k_c=6000), branch)
     return with_joint(ARM, 1, joint_with(actuator)), motion(end=(1275.0, 1275.0))
 
 
 def tendons() -> tuple[Robot, Trajectory]:
     """The arm with a shoulder that two exponential tendons drive."""
-    tendon = Exponential(c=2.0, a=12.0)
+    tendon = laws.Exponential(c=2.0, a=12.0)
     return with_joint(ARM, 1, joint_with(springs(tendon, tendon))), motion(end=(1275.0, 1275.0))
 
 

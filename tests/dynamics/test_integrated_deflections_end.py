@@ -17,9 +17,8 @@ from samples.deflections import (
 )
 from samples.drives import Stopped, joint_with, springs, with_joint
 
-from vsacli import inverse_dynamics
-from vsacli.analysis.result import Result
-from vsacli.base.flags import SINGULAR_MARGIN, Flag, has_flag
+from vsacli import Flag, Result, inverse_dynamics
+from vsacli.base.flags import SINGULAR_MARGIN, has_flag
 from vsacli.dynamics.integrated_deflections import (
     REASONS,
     SINGULAR,

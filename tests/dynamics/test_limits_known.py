@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 from samples.command_line import REST_TO_REST, ROBOT
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
+from vsacli import Flag, inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.reach import LimitCheck
-from vsacli.base.flags import Flag
 from vsacli.dynamics import inverse
 
 OF_JERK = LimitCheck(Flag.VELOCITY_LIMIT, "d3q", None, (-1.0, 1.0))

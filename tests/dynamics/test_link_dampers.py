@@ -11,21 +11,28 @@ import sympy
 from samples.driven_arm import ARM, DURATION, assert_follows, motion_of, robot_of
 from samples.full_model import Drive, springs_of
 
-from vsacli import Gains, State, inverse_dynamics, link_torques, simulate, state_derivative
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.damper import Damper
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
+from vsacli import (
+    Antagonistic,
+    Damper,
+    Elastic,
+    Flag,
+    Gains,
+    InputError,
+    Motor,
+    Rigid,
+    Robot,
+    State,
+    inverse_dynamics,
+    laws,
+    link_torques,
+    simulate,
+    state_derivative,
+)
 from vsacli.dynamics.dampers import damper_torque
-from vsacli.robot.model import Robot
 
 MOTOR = Motor(inertia=0.2, damping=0.1)
 ACTUATORS = [
-    Antagonistic(motor=(MOTOR, MOTOR), spring=(Cubic(k=400, k_c=2000),) * 2),
+    Antagonistic(motor=(MOTOR, MOTOR), spring=(laws.Cubic(k=400, k_c=2000),) * 2),
     Elastic(motor=MOTOR, stiffness=800),
     Rigid(motor=MOTOR),
 ]

@@ -21,10 +21,7 @@ from samples.robots import (
     with_gravity,
 )
 
-from vsacli.base.arrays import FloatArray
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
+from vsacli import DenavitHartenberg, Inertia, Joint, Link, Robot, link_torques
 
 ROUNDING = 1e-12
 """Of the largest term compared: some hundred operations of eps = 2e-16 each, and a margin of ten or more."""
@@ -45,7 +42,7 @@ def with_joints(robot: Robot, joints: tuple[Joint, ...]) -> Robot:
     return dataclasses.replace(robot, joints=joints)
 
 
-def mass_matrix_from(robot: Robot, q: FloatArray, order: int) -> FloatArray:
+def mass_matrix_from(robot: Robot, q: np.ndarray, order: int) -> np.ndarray:
     """M (samples, joints, joints); a column is the cost of a unit derivative of order 2 to 4 at one joint."""
     weightless = with_gravity(robot, (0, 0, 0))
     columns = []
@@ -190,7 +187,7 @@ def test_torques_are_linear_in_gravity(types: str) -> None:
     motion = random_motion(robot, SAMPLES, seed=9)
     first, second = np.array([4.0, -7.0, 2.0]), np.array([-9.0, 1.0, 5.0])
 
-    def derivatives(gravity: FloatArray) -> FloatArray:
+    def derivatives(gravity: np.ndarray) -> np.ndarray:
         return np.array(link_torques(with_gravity(robot, gravity), *motion))
 
     combined = derivatives(2 * first - 3 * second)

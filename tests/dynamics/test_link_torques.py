@@ -17,10 +17,7 @@ from samples.robots import (
 )
 from samples.wrenches import random_wrench
 
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.model import Robot
+from vsacli import InputError, Robot, link_torques
 
 ROUNDING = 1e-12
 """Of each joint's peak: a 7-joint chain is a few hundred operations deep, so some 100 eps = 2e-14; the rest
@@ -39,7 +36,7 @@ ROBOTS = [
 robots = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 
 
-def assert_same(actual: FloatArray, expected: FloatArray) -> None:
+def assert_same(actual: np.ndarray, expected: np.ndarray) -> None:
     """Equal to rounding of each joint's peak over the samples."""
     assert actual.shape == expected.shape
     peak, gap = np.abs(expected).max(axis=0), np.abs(actual - expected).max(axis=0)
@@ -119,7 +116,7 @@ def test_each_result_has_the_shape_of_the_motion(samples: int) -> None:
 @pytest.mark.parametrize("position", range(5))
 def test_a_wrong_shape_is_refused_with_the_one_expected(position: int, wrong: tuple[int, ...]) -> None:
     robot = random_robot("RP", seed=1)
-    motion: list[FloatArray] = list(random_motion(robot, 5, seed=1))
+    motion: list[np.ndarray] = list(random_motion(robot, 5, seed=1))
     motion[position] = np.zeros(wrong)
     name = ("q", "dq", "ddq", "d3q", "d4q")[position]
     with pytest.raises(InputError) as refusal:

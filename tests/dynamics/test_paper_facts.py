@@ -12,12 +12,8 @@ from samples.drives import ALIKE, command, joint_with, motion
 from samples.robots import vsa_3r
 from scipy.optimize import brentq
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
-from vsacli.actuators.pairs import make_pair
-from vsacli.analysis.result import Result
-from vsacli.base.arrays import FloatArray
+from vsacli import Result, inverse_dynamics, laws, load_robot, load_trajectory, motor_torques
 from vsacli.dynamics.drive import drive
-from vsacli.dynamics.inverse import compute_block
 
 ROOT = Path(__file__).parents[2]
 ARM = load_robot(ROOT / "robots" / "vsa_3r.yaml")
@@ -88,7 +84,7 @@ def test_unloaded_joint_and_the_largest_load_it_could_carry(
     # Half the last digit given.
     assert rest.phi[:, 0] == pytest.approx([deflection, -deflection], abs=5e-7)
     assert rest.tau_transmission[:, 0] == pytest.approx([torque, -torque], abs=5e-5)
-    pair = make_pair(ALIKE, ALIKE)
+    pair = laws.make_pair(ALIKE, ALIKE)
 
     def lack(tau_e: float) -> float:
         return float(pair.solve(np.array([tau_e]), np.array([stiffness])).lower[0] - stiffness)
@@ -145,8 +141,8 @@ def test_snap_is_not_zero_at_the_ends(rising: Result):
 def base_margin_and_torque(duration: float) -> tuple[float, float]:
     """Smallest margin and largest motor torque of joint 1, sampled finely enough for either."""
     trajectory = motion(duration=duration)
-    block = compute_block(ARM, trajectory.at(np.linspace(0, duration, 10_001)))
-    margin: FloatArray = 1 - block.stiffness_min[:, 0] / block.stiffness[:, 0]
+    block = motor_torques(ARM, trajectory.at(np.linspace(0, duration, 10_001)))
+    margin: np.ndarray = 1 - block.stiffness_min[:, 0] / block.stiffness[:, 0]
     return float(margin.min()), float(np.nanmax(np.abs(block.tau_motor[:, 0])))
 
 

@@ -9,13 +9,19 @@ import pytest
 from samples.command_line import REPOSITORY
 from samples.marks import slow
 
-from vsacli import Motion, inverse_dynamics, link_torques, load_robot, load_trajectory, motor_torques
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli import (
+    InputError,
+    Motion,
+    Robot,
+    inverse_dynamics,
+    link_torques,
+    load_robot,
+    load_trajectory,
+    motor_torques,
+)
 from vsacli.compute.engine import NUMBERS, NUMPY
 from vsacli.compute.engine.number_engine import MOST_SAMPLES, RECORDED_FROM, _recorded
 from vsacli.dynamics.inverse import InverseDynamics
-from vsacli.robot.model import Robot
 
 ROBOTS = REPOSITORY / "robots"
 QUICK = ("vsa_3r", "lwr_7r_vsa", "mixed_3r", "maccepa_1r", "cam_1r", "rp_2")
@@ -25,7 +31,7 @@ FILES = [
 ]
 
 
-def random_rows(kernel: InverseDynamics, samples: int, seed: int) -> list[FloatArray]:
+def random_rows(kernel: InverseDynamics, samples: int, seed: int) -> list[np.ndarray]:
     """Inputs of any size, among them infeasible and singular samples."""
     rng = np.random.default_rng(seed)
     rows = []

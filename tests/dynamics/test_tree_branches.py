@@ -9,7 +9,6 @@ import pytest
 from samples.trees import finger, reordered, tree_cases, tree_run
 
 from vsacli import Result, inverse_dynamics, motor_torques
-from vsacli.base.arrays import AnyArray
 from vsacli.base.variables import VARIABLES
 
 ROUNDING = 1e-12
@@ -20,7 +19,7 @@ pytestmark = pytest.mark.cases(5)
 trees = pytest.mark.parametrize("case", tree_cases(50))
 
 
-def of_joints(result: Result, places: Sequence[int]) -> dict[str, AnyArray]:
+def of_joints(result: Result, places: Sequence[int]) -> dict[str, np.ndarray]:
     """Variables of some joints, by index, (samples, joints[, motors])."""
     arrays = {name: getattr(result, name, None) for name in VARIABLES if "joint" in VARIABLES[name].dims}
     return {name: array[:, places] for name, array in arrays.items() if array is not None}

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from samples.trees import hand
 
+from vsacli import Robot
 from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.tracing import Tape
 from vsacli.control.codegen.cost import worst_cost
 from vsacli.dynamics.elastic_torques import LinkTorques
-from vsacli.robot.model import Robot
 
 
 def operations(robot: Robot, frame: WrenchFrame | None) -> int:

@@ -8,9 +8,9 @@ from oracles.lagrange import chain_of
 from samples.robots import MotionArrays
 from samples.trees import tree_cases, tree_run
 
+from vsacli import motor_torques
 from vsacli.base.variables import Block
 from vsacli.dynamics.balances import link_energy, link_powers
-from vsacli.dynamics.inverse import compute_block
 
 ROUNDING = 1e-12
 """Of the largest energy or power: sums of some thousand terms."""
@@ -27,7 +27,7 @@ def motion_of(block: Block) -> MotionArrays:
 @trees
 def test_energy_is_that_of_lagranges_equations_but_for_a_constant(case: tuple[int, int | None]) -> None:
     robot, motion = tree_run(*case)
-    block = compute_block(robot, motion.trajectory(robot).block(0, 41))
+    block = motor_torques(robot, motion.trajectory(robot).block(0, 41))
     chain = chain_of(robot, motion_of(block))
     expected = chain.kinetic_energy(0) + chain.potential_energy(0)
     found = link_energy(robot, block)
@@ -40,7 +40,7 @@ def test_energy_is_that_of_lagranges_equations_but_for_a_constant(case: tuple[in
 def test_powers_of_joints_losses_and_wrenches_change_the_energy(case: tuple[int, int | None]) -> None:
     robot, motion = tree_run(*case)
     trajectory = motion.trajectory(robot)
-    block = compute_block(robot, trajectory.block(0, 41))
+    block = motor_torques(robot, trajectory.block(0, 41))
     chain = chain_of(robot, motion_of(block))
     assert trajectory.wrench is not None
     powers = link_powers(robot, block, trajectory.wrench.frame)

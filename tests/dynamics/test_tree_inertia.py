@@ -13,13 +13,10 @@ from samples.plants import random_state, rigid, torques_of
 from samples.robots import random_motion
 from samples.trees import SMALL, hand, random_tree, random_wrenches, without_resistance
 
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot, link_torques, mass_matrix, state_derivative
 from vsacli.compute.tracing import Program, Tape, TracedArray
 from vsacli.compute.tracing.python_functions import StateFunction
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.dynamics.forward import mass_matrix, state_derivative
 from vsacli.dynamics.rigid_body import link_dynamics
-from vsacli.robot.model import Robot
 
 EXACT = 1e-12
 """Relative to the largest entry: two different sums of some thousand terms, each good to 1e-16."""
@@ -29,7 +26,7 @@ pytestmark = pytest.mark.cases(4)
 trees = pytest.mark.parametrize("seed", slow_but(SMALL, range(50)))
 
 
-def relative(found: FloatArray, expected: FloatArray) -> float:
+def relative(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.abs(found - expected).max() / np.abs(expected).max())
 
 
@@ -41,7 +38,7 @@ def all_rigid(robot: Robot) -> Robot:
     return replace(robot, joints=tuple(joints))
 
 
-def on_one_path(robot: Robot) -> FloatArray:
+def on_one_path(robot: Robot) -> np.ndarray:
     """Whether of two joints one is above the other, (joints, joints)."""
     joints = range(len(robot.joints))
     return np.array([[i in robot.paths[k] or k in robot.paths[i] for k in joints] for i in joints])
@@ -106,7 +103,7 @@ def test_recorded_solutions_for_the_mass_matrix(seed: int) -> None:
     assert relative(recorded_solution(robot, matrix, torque), np.linalg.solve(matrix, torque)) < bound
 
 
-def recorded_solution(robot: Robot, matrix: FloatArray, torque: FloatArray) -> FloatArray:
+def recorded_solution(robot: Robot, matrix: np.ndarray, torque: np.ndarray) -> np.ndarray:
     return np.array(StateFunction(solving_program(robot))(np.concatenate([matrix.ravel(), torque])))
 
 

@@ -14,12 +14,8 @@ from samples.marks import slow_but
 from samples.robots import MotionArrays, random_motion
 from samples.trees import SMALL, random_tree, random_wrenches, read_tree, without_resistance
 
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.base.wrench import Wrench, WrenchFrame, frames_by_tool
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.kinematics import forward_kinematics
-from vsacli.robot.model import Robot
+from vsacli import InputError, Robot, Wrench, forward_kinematics, link_torques
+from vsacli.base.wrench import WrenchFrame, frames_by_tool
 
 ROUNDING = 1e-12
 """Of each joint's peak: 4e-15 is seen, rounding of some thousand operations; a wrong term shows at 1e-3."""
@@ -35,7 +31,7 @@ trees = pytest.mark.parametrize("seed", slow_but((1, *SMALL), range(100)))
 some_trees = pytest.mark.parametrize("seed", slow_but(SMALL, range(50)))
 
 
-def assert_same(actual: FloatArray, expected: FloatArray, rounding: float = ROUNDING) -> None:
+def assert_same(actual: np.ndarray, expected: np.ndarray, rounding: float = ROUNDING) -> None:
     """Equal to rounding of each joint's peak over the samples."""
     assert actual.shape == expected.shape
     peak, gap = np.abs(expected).max(axis=0), np.abs(actual - expected).max(axis=0)
@@ -44,7 +40,7 @@ def assert_same(actual: FloatArray, expected: FloatArray, rounding: float = ROUN
 
 def lagrange_torques(
     tree: Robot, motion: MotionArrays, wrench: Wrench, order: int, *, modified: bool
-) -> FloatArray:
+) -> np.ndarray:
     chain = chain_of(tree, motion, modified=modified)
     total = np.column_stack(chain.torques(order))
     by_order = (wrench.wrench, wrench.dwrench, wrench.ddwrench)

@@ -8,17 +8,16 @@ from samples.blurred import Blurred, random_covariances
 from samples.plants import elastic, rigid, with_actuators
 from samples.robots import random_robot, vsa_3r
 
+from vsacli import Motion, Trajectory, Wrench, motor_torques
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.base.variables import UNCERTAIN, VARIABLES
-from vsacli.base.wrench import WRENCH_NAMES, Wrench
+from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.dynamics import uncertainty
-from vsacli.dynamics.inverse import compute_block
 from vsacli.dynamics.uncertainty import MARGIN, Uncertainty
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Motion, Trajectory
 
 SPAN = (0.0, 2.0)
 SIZES = 1e-5 * np.array([1.0, 10.0, 100.0, 1e3, 1e4])
@@ -72,7 +71,7 @@ def drawn(robot, trajectory, time):
     wrench = None
     if trajectory.wrench is not None:
         wrench = Wrench(*(arrays[name] for name in WRENCH_NAMES), frame=trajectory.wrench.frame)
-    block = compute_block(robot, Motion.of(np.full(DRAWS, time), arrays, wrench))
+    block = motor_torques(robot, Motion.of(np.full(DRAWS, time), arrays, wrench))
     assert not block.flags.any()
     return {name: np.std(getattr(block, name), axis=0) for name in COMPUTED}
 

@@ -13,14 +13,10 @@ from samples.marks import needs
 from samples.shipped import shipped_run
 from scipy.integrate import trapezoid
 
-from vsacli import inverse_dynamics, load_robot, open_result, simulate
-from vsacli.actuators.motor import Motor
+from vsacli import Flag, InputError, Motor, Robot, inverse_dynamics, load_robot, open_result, simulate
 from vsacli.actuators.reach import LIMIT_ROUNDING
-from vsacli.base.errors import InputError, InvalidRecordError
-from vsacli.base.flags import Flag
 from vsacli.base.outputs import Outputs
 from vsacli.results.store.writer import ResultWriter
-from vsacli.robot.model import Robot
 
 SHAFT = {"gear_ratio": -20.0, "side": "shaft", "torque_constant": 0.2, "resistance": 1.5}
 
@@ -95,7 +91,7 @@ REFUSED = {
 
 @pytest.mark.parametrize(("fields", "reason"), REFUSED.values(), ids=REFUSED)
 def test_what_is_missing_is_named(fields, reason):
-    with pytest.raises(InvalidRecordError, match=reason):
+    with pytest.raises(InputError, match=reason):
         Motor(inertia=1.0, **fields)
 
 

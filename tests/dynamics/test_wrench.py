@@ -12,11 +12,8 @@ from samples.paths import STEP, Path, complex_torques
 from samples.robots import random_motion, random_robot, robot_of_ones, vsa_3r
 from samples.wrenches import held, random_wrench
 
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES, Wrench
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.model import Robot
+from vsacli import InputError, Robot, Wrench, link_torques
+from vsacli.base.wrench import WRENCH_FRAMES, WRENCH_NAMES
 
 ROUNDING = 1e-12
 """Of each joint's peak: a few hundred operations, so some 100 eps; the rest is margin."""
@@ -34,7 +31,7 @@ robots = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 frames = pytest.mark.parametrize("frame", WRENCH_FRAMES)
 
 
-def assert_same(actual: FloatArray, expected: FloatArray, scale: FloatArray | None = None) -> None:
+def assert_same(actual: np.ndarray, expected: np.ndarray, scale: np.ndarray | None = None) -> None:
     """Equal to rounding of each joint's peak over the samples (or that of `scale`)."""
     assert actual.shape == expected.shape
     peak = np.abs(expected if scale is None else scale).max(axis=0)

@@ -15,12 +15,9 @@ from oracles.urdf_pinocchio import UrdfOracle
 from samples.robots import at_rest, random_motion
 from samples.shipped import EXAMPLES, shipped_robot
 
+from vsacli import Robot, link_torques, mass_matrix
 from vsacli.actuators.drivetrain import Drivetrain
-from vsacli.base.arrays import FloatArray
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.dynamics.forward import mass_matrix
 from vsacli.files.examples import Example
-from vsacli.robot.model import Robot
 
 ROUNDING = 1e-12
 """Relative to the largest: two different sums of some hundred terms, each good to 1e-16."""
@@ -34,11 +31,11 @@ UR_JOINTS = [
 ]
 
 
-def static_load(robot: Robot, *q: float) -> FloatArray:
+def static_load(robot: Robot, *q: float) -> np.ndarray:
     return link_torques(robot, *at_rest(robot, np.array([q])))[0][0]
 
 
-def relative(found: FloatArray, expected: FloatArray) -> float:
+def relative(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.abs(found - expected).max() / np.abs(expected).max())
 
 

@@ -13,8 +13,7 @@ from samples.command_line import contents
 from samples.marks import slow
 from samples.shipped import EXAMPLES
 
-from vsacli import inverse_dynamics, load_trajectory
-from vsacli.base.errors import InputError
+from vsacli import InputError, inverse_dynamics, load_trajectory
 from vsacli.files import examples as module
 from vsacli.files.examples import Example, ExampleTrajectory, examples, opening_comment
 

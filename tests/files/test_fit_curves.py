@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError, Trajectory
 from vsacli.files.placeholder_robot import placeholder_robot
 from vsacli.files.recordings.fit_curves import recorded_curves, table_profiles
 from vsacli.results.charts.measured import RecordedCurve
-from vsacli.trajectory.trajectory import Trajectory
 
 RATE, DURATION, NOISE = 500, 10.0, 1e-4
 

@@ -12,15 +12,12 @@ import pytest
 from samples.command_line import REPOSITORY
 from samples.marks import slow_but
 
-from vsacli import load_robot, load_trajectory
+from vsacli import InputError, Robot, inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.kinds import ACTUATORS, mechanisms_of
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.base.errors import InputError
 from vsacli.files.device_actuators import DEVICES
 from vsacli.files.examples import example_tables, examples
 from vsacli.files.robot_template import LinkSizes, robot_template
 from vsacli.files.templates import trajectory_template
-from vsacli.robot.model import Robot
 
 FINGER = LinkSizes((0.045, 0.03), (0.025, 0.015))
 SIZES = {

@@ -14,7 +14,7 @@ from samples.command_line import REPOSITORY, ROBOT
 from samples.hostile import CSV, XML, YAML, damaged, fuzz
 from samples.marks import slow
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.json_records import json_value
 from vsacli.files.info import describe_file
 from vsacli.files.info.text import render

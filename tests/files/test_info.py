@@ -6,7 +6,6 @@ import dataclasses
 import itertools
 import json
 import math
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +14,10 @@ import pytest
 from samples.command_line import REPOSITORY, ROBOT, rest_to_rest, without_hint
 from samples.marks import slow, slow_but
 
-from vsacli.dynamics.elastic_torques import link_torques
+from vsacli import Joint, Limits, Pose, Robot, link_torques, load_robot, load_trajectory
 from vsacli.files.info.robot_info import describe_robot, free_range, reach, reach_bounds, static_load
 from vsacli.files.info.trajectory_info import describe_trajectory
-from vsacli.robot.file import load_robot
-from vsacli.robot.joint import Joint, Limits, Pose
 from vsacli.robot.kinematics import frames
-from vsacli.robot.model import Robot
-from vsacli.trajectory.file import load_trajectory
 
 ARM = load_robot(ROBOT)
 NAMES = sorted(path.stem for path in (REPOSITORY / "robots").glob("*.yaml"))
@@ -171,11 +166,13 @@ def test_peaks_of_a_polynomial_are_the_published_ones() -> None:
     assert (description["samples"], description["duration"]) == (4001, 4)
 
 
-def test_ranges_go_over_all_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
-    trajectory = load_trajectory(REPOSITORY / "trajectories" / "rest_to_rest.yaml", ARM)
-    whole = describe_trajectory(trajectory, ARM.joint_names)
-    monkeypatch.setattr("vsacli.files.info.trajectory_info.BLOCK_SAMPLES", 100)
-    assert describe_trajectory(trajectory, ARM.joint_names) == whole
+def test_ranges_go_over_all_blocks() -> None:
+    """Extremes are at start, middle and end, of which 8192 samples are less than a half."""
+    path = REPOSITORY / "trajectories" / "rest_to_rest.yaml"
+    few, many = (load_trajectory(path, ARM, {"rate": rate}) for rate in (100, 5000))
+    for name in ("q", "dq", "d4q", "stiffness"):
+        coarse, fine = (describe_trajectory(each, ARM.joint_names)["joints"][1][name] for each in (few, many))
+        assert fine == pytest.approx(coarse)
 
 
 def test_robot_on_the_command_line(vsacli: Any) -> None:
@@ -280,10 +277,12 @@ def test_every_robot_that_comes_along_is_described(vsacli: Any, name: str) -> No
     assert len(table) >= 7
 
 
-def test_the_cache_is_shown_and_emptied(vsacli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_cache_is_shown_and_emptied(
+    vsacli: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, temporary_files: Any
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "temporary").mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    temporary_files(tmp_path / "temporary")
     folder = tmp_path / "cache" / "vsacli"
     left = ".vsacli-000000000000-1-1-0123456789abcdef.tmp"
     for key in ("a", "b"):

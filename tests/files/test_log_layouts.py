@@ -13,8 +13,7 @@ import yaml
 from samples.command_line import REPOSITORY, Outcome
 from samples.random_logs import random_log
 
-from vsacli import load_robot, load_trajectory
-from vsacli.base.errors import InputError
+from vsacli import InputError, load_robot, load_trajectory
 from vsacli.files.recordings import describe_recording
 from vsacli.trajectory.recorded.problems import find_disorder
 

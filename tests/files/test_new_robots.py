@@ -12,24 +12,29 @@ import click
 import pytest
 from samples.marks import slow, slow_but
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
+from vsacli import (
+    Antagonistic,
+    DenavitHartenberg,
+    Elastic,
+    InputError,
+    Joint,
+    Limits,
+    Link,
+    Motor,
+    Serial,
+    inverse_dynamics,
+    laws,
+    load_robot,
+    load_trajectory,
+    mechanisms,
+)
 from vsacli.actuators.kinds import ACTUATORS, TENDONS, mechanisms_of
-from vsacli.actuators.laws import LAWS, Tendon
-from vsacli.actuators.mechanisms import MECHANISMS
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.serial import Serial
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.base.errors import InputError
 from vsacli.cli.new import new
 from vsacli.documents.fields import declared_fields
 from vsacli.files.device_actuators import DEVICES
 from vsacli.files.examples import example_tables
 from vsacli.files.robot_template import SOURCES, robot_template
 from vsacli.files.templates import trajectory_template
-from vsacli.robot.file import load_robot
-from vsacli.robot.joint import DenavitHartenberg, Joint, Limits, Link
-from vsacli.trajectory.file import load_trajectory
 
 RECORDS = (Antagonistic, DenavitHartenberg, Elastic, Joint, Limits, Link, Motor, Serial)
 """Records of a robot file whose values have a source."""
@@ -96,14 +101,14 @@ def test_every_kind_and_mechanism_carries_others(actuator: str, tmp_path: Path) 
 
 
 def test_tendons_are_the_laws_that_only_pull() -> None:
-    pulling = [name for name, law in LAWS.items() if issubclass(law, Tendon)]
+    pulling = [name for name, law in laws.LAWS.items() if issubclass(law, laws.Tendon)]
     assert sorted(pulling) == sorted(TENDONS)
 
 
 def test_every_law_has_an_example_and_a_kind_that_is_made_of_it() -> None:
-    assert all("revolute" in law.examples for law in LAWS.values())
-    assert set(mechanisms_of("antagonistic")) == set(LAWS)
-    assert set(mechanisms_of("serial")) == set(MECHANISMS)
+    assert all("revolute" in law.examples for law in laws.LAWS.values())
+    assert set(mechanisms_of("antagonistic")) == set(laws.LAWS)
+    assert set(mechanisms_of("serial")) == set(mechanisms.MECHANISMS)
 
 
 def test_a_later_joint_explains_what_is_new_about_it() -> None:
@@ -123,7 +128,7 @@ def test_a_later_joint_explains_what_is_new_about_it() -> None:
 
 
 def test_each_source_of_a_value_is_said_once_of_a_field_that_exists() -> None:
-    text = robot_template("RRRR", ("rigid", "elastic", "serial", "antagonistic"))
+    text = robot_template("R" * len(ACTUATORS), tuple(ACTUATORS))
     said = " ".join(re.sub(r"^.*?# ", "", line) for line in text.splitlines() if "# " in line)
     for field, source in SOURCES.items():
         name, _, key = field.partition(".")
@@ -146,7 +151,7 @@ def completions(option: str, incomplete: str) -> list[str]:
 
 
 def test_every_kind_of_actuator_is_completed() -> None:
-    assert set(completions("--actuator", "")) == {*EVERY_ACTUATOR, *MECHANISMS, *DEVICES}
+    assert set(completions("--actuator", "")) == {*EVERY_ACTUATOR, *mechanisms.MECHANISMS, *DEVICES}
     assert completions("--actuator", "serial:v") == ["serial:variable_ratio"]
     assert completions("--joint", "elbow:ri") == ["elbow:rigid"]
     assert completions("--joint", "elb") == []

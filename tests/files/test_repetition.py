@@ -13,8 +13,8 @@ import scipy
 from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT, contents
 from samples.marks import needs_compiler
 
+from vsacli import open_result
 from vsacli.results.store import inputs
-from vsacli.results.store.reader import StoredResult
 
 RUNS = {
     "plain": (ROBOT, REST_TO_REST),
@@ -94,7 +94,7 @@ def test_a_result_is_known_by_what_it_holds(vsacli: Any) -> None:
 @pytest.mark.slow
 def test_engine_and_options_are_on_record(vsacli: Any) -> None:
     assert vsacli("invdyn", ROBOT, REST_TO_REST, "--engine", "numpy", "-o", "r.h5", "-q").code == 0
-    with StoredResult.open("r.h5") as result:
+    with open_result("r.h5") as result:
         provenance = result.provenance()
     assert (provenance["engine"], provenance["compiler"]) == ("numpy", "")
     assert provenance["options"] == {

@@ -12,17 +12,15 @@ import yaml
 from samples.command_line import REPOSITORY, contents
 from samples.marks import slow
 
+from vsacli import InputError, Joint, Robot, inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.base.errors import InputError
 from vsacli.documents.commented import WIDTH
 from vsacli.documents.fields import OneOf, PairOf, RecordOf, declared_fields
 from vsacli.files.robot_template import MOST_JOINTS, robot_template
 from vsacli.files.templates import trajectory_template
-from vsacli.robot.file import RobotFile, load_robot
-from vsacli.robot.joint import Joint
-from vsacli.robot.model import OF_PLACEHOLDERS, Robot
-from vsacli.trajectory.file import OF_ANY_ROBOT, load_trajectory
+from vsacli.robot.file import RobotFile
+from vsacli.robot.model import OF_PLACEHOLDERS
+from vsacli.trajectory.file import OF_ANY_ROBOT
 
 ROBOTS = sorted((REPOSITORY / "robots").glob("*.yaml"))
 LONG = ("cam_1r", "compact_1r", "lwr_7r_vsa", "measured_1r", "panda_7r", "puma_560", "sliding_anchor_1r")

@@ -8,8 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from vsacli import open_result
-from vsacli.base.errors import InputError
+from vsacli import InputError, open_result
 
 DAMAGE = {
     "sample 3 is at nan s": lambda time: time.__setitem__(3, np.nan),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from samples.figures import rest_to_rest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.results.plots import plot_stored
 from vsacli.results.store.excerpt import Excerpt
 

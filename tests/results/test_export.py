@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from samples.results import python, random_block, write_result
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.outputs import Outputs
 from vsacli.base.variables import Block
-from vsacli.results.exports import selection
 from vsacli.results.exports.formats import CSV
 from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
 from vsacli.results.store.reader import StoredResult
@@ -97,11 +96,11 @@ def test_a_lower_rate_takes_every_nth_sample(stored, block, rate):
     assert rows(result, rate=rate)[1:] == rows(result)[1:][::stride]
 
 
-def test_the_size_of_the_blocks_makes_no_difference(stored, block, monkeypatch):
+def test_the_size_of_the_blocks_makes_no_difference(stored, block, cells):
     result = stored(block)
     expected = rows(result, ["tau_motor", "q"], rate=RATE / 3)
-    for cells in (1, 50, 100):
-        monkeypatch.setattr(selection, "CELLS", cells)
+    for together in (1, 50, 100):
+        cells(together)
         assert rows(result, ["tau_motor", "q"], rate=RATE / 3) == expected
 
 
@@ -230,7 +229,7 @@ def test_a_refused_export_leaves_no_file(stored, block, tmp_path):
 
 FULL = """
 import resource
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.outputs import Outputs
 from vsacli.results.exports.formats import CSV
 from vsacli.results.exports.result_format import export_result

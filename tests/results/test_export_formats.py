@@ -14,9 +14,9 @@ from samples.marks import slow_but
 from samples.results import STORED, python, random_block, write_result
 from scipy.io import loadmat
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.variables import Block
-from vsacli.results.exports import FORMATS, formats, selection
+from vsacli.results.exports import FORMATS, formats
 from vsacli.results.exports.result_format import UndefinedSamplesError, export_result
 from vsacli.results.store.reader import StoredResult
 
@@ -113,8 +113,8 @@ def test_parquet_says_units_and_where_it_comes_from(stored):
     assert schema.metadata == {b"robot_name": b"two", b"trajectory_name": b"swing", b"verdict": b"ok"}
 
 
-def test_parquet_comes_in_groups_of_rows(stored, monkeypatch):
-    monkeypatch.setattr(selection, "CELLS", 200)
+def test_parquet_comes_in_groups_of_rows(stored, cells):
+    cells(200)
     file = parquet.ParquetFile(exported(stored(random_block(SAMPLES, 2)), "parquet"))
     assert file.num_row_groups == 5
     assert file.read().num_rows == SAMPLES
@@ -227,7 +227,7 @@ def test_the_times_alone(stored, name):
 
 FULL = """
 import io, resource, sys
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.outputs import Outputs
 from vsacli.results.exports import FORMATS
 from vsacli.results.exports.result_format import export_result

@@ -18,8 +18,7 @@ from samples.command_line import ROBOT
 from samples.marks import slow_but
 from samples.results import random_block, write_result
 
-from vsacli import open_result
-from vsacli.base.errors import InputError
+from vsacli import InputError, open_result
 from vsacli.results.store import damage
 from vsacli.results.store.reader import StoredResult
 
@@ -29,7 +28,7 @@ SECONDS = 30
 
 READER = """
 import resource, sys
-from vsacli.base.errors import InputError, StorageError
+from vsacli import InputError, StorageError
 from vsacli.files.info import describe_file, render
 from vsacli.files.validation import check_files
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from samples.figures import rest_to_rest
 from samples.results import random_block, write_result
 
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.results.plots import FORMATS, compare_files, plot_stored, save_figures
 from vsacli.results.store.reader import StoredResult
 

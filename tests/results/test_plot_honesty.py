@@ -17,7 +17,7 @@ from samples.command_line import REPOSITORY
 from samples.figures import rest_to_rest
 from samples.pages import Page
 
-from vsacli.base.flags import Flag
+from vsacli import Flag
 from vsacli.results.plots import compare_files, plot_stored
 from vsacli.results.store.reader import open_stored
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from samples.figures import Result, rest_to_rest
 
-from vsacli.base.flags import Flag
+from vsacli import Flag
 from vsacli.results.plots import compare_files, plot_stored
 
 

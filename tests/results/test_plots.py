@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from samples.figures import rest_to_rest, without
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.results.charts.figures import RESULT_DRAWINGS, omitted_figures
 from vsacli.results.charts.reduction import visible_range
 from vsacli.results.plots import compare_files, plot_stored, save_figures

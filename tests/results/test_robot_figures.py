@@ -20,13 +20,12 @@ from samples.torso import torso_text, written
 from samples.trees import hand
 from samples.wrenches import held
 
-from vsacli import inverse_dynamics, load_robot
+from vsacli import Robot, inverse_dynamics, load_robot
 from vsacli.files.info.robot_info import load_sizes, static_load
 from vsacli.results.charts.arm_chart import ArmPoints, arm_chart, home_position
 from vsacli.results.charts.look import STYLES, drawing_with
 from vsacli.results.charts.robot_charts import LIMITS, ActuatorChart, StiffnessMap, actuator_charts
 from vsacli.results.plots import actuators_figure, arm_figure, stiffness_figure
-from vsacli.robot.model import Robot
 
 FILES = sorted((REPOSITORY / "robots").rglob("*.yaml"))
 bundled = pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)

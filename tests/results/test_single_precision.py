@@ -11,8 +11,7 @@ import pytest
 from samples.command_line import ROBOT, rest_to_rest
 from samples.results import STORED, random_block, write_result
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory, open_result
-from vsacli.base.errors import InputError, StorageError
+from vsacli import InputError, StorageError, inverse_dynamics, load_robot, load_trajectory, open_result
 from vsacli.results.store.reader import StoredResult
 
 HALF_AN_ULP = 2.0**-24

@@ -26,10 +26,7 @@ from samples.results import (
     writing,
 )
 
-from vsacli.actuators.laws import LAWS
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag
+from vsacli import Flag, InputError, laws
 from vsacli.base.outputs import Staged
 from vsacli.base.units import POSITION
 from vsacli.documents.fields import number
@@ -213,8 +210,8 @@ def test_xarray_opens_the_groups_too(path):
 
 
 @pytest.mark.slow
-def test_blocks_of_any_size_give_the_same_file(tmp_path, block, monkeypatch):
-    monkeypatch.setattr("vsacli.results.store.new_file.CHUNK_BYTES", 2**11)  # several chunks in 250 samples
+def test_blocks_of_any_size_give_the_same_file(tmp_path, block, chunks):
+    chunks(2**11)  # several chunks in 250 samples
 
     def contents(step):
         with h5py.File(write_result(tmp_path / f"{step}.h5", block, step=step)) as file:
@@ -315,15 +312,15 @@ def test_the_robot_is_stored_as_arrays_of_its_declared_fields(path):
 
 
 @dataclass(frozen=True)
-class Hooke(Cubic):
+class Hooke(laws.Cubic):
     reach: float = number(POSITION, "a field that the cubic law lacks")
 
 
 def test_joints_with_different_fields_share_the_arrays(monkeypatch):
-    monkeypatch.setitem(LAWS.homes, "hooke", f"{__name__}:Hooke")
+    monkeypatch.setitem(laws.LAWS.homes, "hooke", f"{__name__}:Hooke")
     mixed = robot()
     odd = dataclasses.replace(
-        mixed.joints[0].actuator, spring=(Hooke(k=1, k_c=1, reach=0.5), Cubic(k=2, k_c=2))
+        mixed.joints[0].actuator, spring=(Hooke(k=1, k_c=1, reach=0.5), laws.Cubic(k=2, k_c=2))
     )
     first = dataclasses.replace(mixed.joints[0], actuator=odd)
     mixed = dataclasses.replace(mixed, joints=(first, mixed.joints[1]))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import errno
-import os
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import h5py
 import numpy as np
@@ -24,8 +23,9 @@ from samples.results import (
     write_result,
     writing,
 )
+from samples.system_errors import fail_with
 
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.outputs import Staged
 from vsacli.base.variables import Block
 from vsacli.results.store import new_file
@@ -37,17 +37,26 @@ ROWS = 32
 
 
 @pytest.fixture
-def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+def small_chunks(chunks: Callable[[int], None]) -> None:
     """Several chunks in a few samples."""
-    monkeypatch.setattr(new_file, "CHUNK_BYTES", ROWS * 2 * 2 * 8)
+    chunks(ROWS * 2 * 2 * 8)
 
 
 @pytest.fixture
-def in_a_thread(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Short files, too, are written in a thread, and stored by another."""
-    monkeypatch.setattr(new_file, "BEHIND_FROM", 0)
-    monkeypatch.setattr(new_file, "BEHIND", 5000)
-    monkeypatch.setattr(new_file, "SYNCED", 3000)
+def write_behind(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, int], None]:
+    """Have short files, too, written in a thread, and stored by another; set the bytes that may wait."""
+
+    def wait_for(writing: int, storing: int) -> None:
+        for name, size in (("BEHIND_FROM", 0), ("BEHIND", writing), ("SYNCED", storing)):
+            monkeypatch.setattr(new_file, name, size)
+
+    return wait_for
+
+
+@pytest.fixture
+def in_a_thread(write_behind: Callable[[int, int], None]) -> None:
+    """Samples are written in a thread."""
+    write_behind(5000, 3000)
 
 
 def threads() -> list[str]:
@@ -175,16 +184,10 @@ def test_an_exception_of_the_caller_ends_the_thread(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("small_chunks", "in_a_thread")
-def test_a_disk_that_fails_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_fails_meanwhile(tmp_path: Path, before_system_call: Any) -> None:
     """Whatever the disk says to the thread is said of the file, which gets no name."""
-    sync = os.fsync
-
-    def failing(descriptor: int) -> None:
-        if threading.current_thread().name == "vsacli-syncing":
-            raise OSError(errno.EIO, os.strerror(errno.EIO))
-        sync(descriptor)
-
-    monkeypatch.setattr(os, "fsync", failing)
+    in_thread = fail_with(errno.EIO, lambda _: threading.current_thread().name == "vsacli-syncing")
+    before_system_call("fsync", in_thread)
     with pytest.raises(StorageError, match=r"r\.h5.*Input/output error"):
         write_result(tmp_path / "r.h5", random_block(10 * ROWS, 2))
     assert list(tmp_path.iterdir()) == []
@@ -192,10 +195,9 @@ def test_a_disk_that_fails_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 @pytest.fixture
-def behind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[NewFile]:
+def behind(write_behind: Callable[[int, int], None], tmp_path: Path) -> Iterator[NewFile]:
     """A file all of whose tasks are done in a thread; 10 bytes may wait."""
-    monkeypatch.setattr(new_file, "BEHIND_FROM", 0)
-    monkeypatch.setattr(new_file, "BEHIND", 10)
+    write_behind(10, new_file.SYNCED)
     file = NewFile(Staged.unnamed(tmp_path / "r.h5"))
     yield file
     file.discard()

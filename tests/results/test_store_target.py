@@ -15,7 +15,7 @@ from samples.results import (
     writing,
 )
 
-from vsacli.base.errors import StorageError
+from vsacli import StorageError
 from vsacli.base.outputs import Outputs
 from vsacli.results.store.reader import StoredResult
 
@@ -56,9 +56,9 @@ def test_an_existing_file_is_refused_before_the_first_step(tmp_path, old):
     assert (tmp_path / "r.h5").read_bytes() == old
 
 
-def test_the_whole_file_is_on_the_disk_before_it_has_its_name(tmp_path, block, monkeypatch):
+def test_the_whole_file_is_on_the_disk_before_it_has_its_name(tmp_path, block, before_system_call):
     path, synced = tmp_path / "r.h5", []
-    monkeypatch.setattr(os, "fsync", lambda file: synced.append((os.fstat(file).st_size, path.exists())))
+    before_system_call("fsync", lambda file: synced.append((os.fstat(file).st_size, path.exists())))
     write_result(path, block)
     assert synced[0] == (path.stat().st_size, False)
 
@@ -70,11 +70,8 @@ def test_an_existing_file_is_replaced_on_request(tmp_path, block):
     assert [path.name for path in tmp_path.iterdir()] == ["r.h5"]
 
 
-@pytest.mark.parametrize("links", [True, False])
-def test_a_file_that_appears_during_the_run_is_not_replaced(tmp_path, block, monkeypatch, links):
-    if not links:
-        monkeypatch.setattr(os, "link", no_links)
-
+@pytest.mark.usefixtures("links")
+def test_a_file_that_appears_during_the_run_is_not_replaced(tmp_path, block):
     def run():
         with writing(tmp_path / "r.h5", robot(), PlannedTrajectory(50)) as writer:
             writer.write(block)
@@ -87,12 +84,8 @@ def test_a_file_that_appears_during_the_run_is_not_replaced(tmp_path, block, mon
     assert [path.name for path in tmp_path.iterdir()] == ["r.h5"]
 
 
-def no_links(*_, **__):
-    raise PermissionError(1, "Operation not permitted")
-
-
-def test_file_systems_without_hard_links(tmp_path, block, monkeypatch):
-    monkeypatch.setattr(os, "link", no_links)
+@pytest.mark.usefixtures("no_hard_links")
+def test_file_systems_without_hard_links(tmp_path, block):
     with StoredResult.open(write_result(tmp_path / "r.h5", block)) as result:
         assert result.samples == 50
 

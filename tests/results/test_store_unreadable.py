@@ -13,7 +13,7 @@ from samples.results import (
     write_result,
 )
 
-from vsacli.base.errors import InputError, StorageError
+from vsacli import InputError, StorageError
 from vsacli.results.store.reader import StoredResult
 
 

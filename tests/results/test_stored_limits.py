@@ -10,10 +10,10 @@ from samples.command_line import REPOSITORY
 from samples.marks import slow_but
 from samples.results import PlannedTrajectory, writing
 
+from vsacli import load_robot
 from vsacli.base.simulation_variables import SIMULATED_NAMES
 from vsacli.dynamics.limits import limit_checks
 from vsacli.results.store.reader import StoredResult
-from vsacli.robot.file import load_robot
 
 ROBOTS = sorted((REPOSITORY / "robots").rglob("*.yaml"))
 NOT_STORED = ("tau_e",)

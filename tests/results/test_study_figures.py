@@ -18,7 +18,7 @@ from matplotlib.patches import Patch
 from samples.studies import DRAWN, study
 from scipy.stats import binomtest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.tables import ReportText
 from vsacli.cli.main import run
 from vsacli.results.charts.study_points import StudyPoints
@@ -135,14 +135,17 @@ def test_random_draws_have_intervals_with_a_mark_in_the_legend(drawn: StoredStud
     )
 
 
-def test_draws_that_several_motions_share_have_no_intervals(
-    drawn: StoredStudy, monkeypatch: pytest.MonkeyPatch
-) -> None:
+class TwoMotions(StoredStudy):
+    """A table each of whose draws was executed with two trajectories."""
+
+    def texts(self, name: str) -> list[str]:
+        return ["one.yaml", "two.yaml"] * (self.rows // 2) if name == "trajectory" else super().texts(name)
+
+
+def test_draws_that_several_motions_share_have_no_intervals(drawn: StoredStudy) -> None:
     """Runs of the same draw are not independent."""
-    trajectories = ["one.yaml", "two.yaml"] * (drawn.rows // 2)
-    read = drawn.texts
-    monkeypatch.setattr(drawn, "texts", lambda name: trajectories if name == "trajectory" else read(name))
-    assert not bands(study_figures(drawn)["feasibility"].axes[0])
+    with TwoMotions(drawn.path) as shared:
+        assert not bands(study_figures(shared)["feasibility"].axes[0])
 
 
 def test_axes_and_titles_are_words(table: StoredStudy, drawn: StoredStudy) -> None:

@@ -16,13 +16,12 @@ from samples.results import REPORT, PlannedTrajectory, robot, writing
 from samples.shipped import shipped_robot
 from samples.torso import FRAMES, SWING, torso, torso_result
 
-from vsacli import InputError, Pose, Result, inverse_dynamics, load_trajectory, open_result
+from vsacli import InputError, Pose, Result, Tool, inverse_dynamics, load_trajectory, open_result
 from vsacli.base.variables import VARIABLES, Block, Variable, column_names, row_shape
 from vsacli.base.wrench import WRENCH_AXES
 from vsacli.results.charts.stored import StoredCharts
 from vsacli.results.store.excerpt import Excerpt
 from vsacli.results.store.reader import open_stored
-from vsacli.robot.joint import Tool
 from vsacli.robot.kinematics import Geometry, frames_in_base
 
 TOOLS = ("left_hand", "right_hand", "lamp")

@@ -9,16 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.base.errors import InputError, InvalidRecordError
-from vsacli.robot.file import load_robot
-from vsacli.robot.model import Robot
-from vsacli.trajectory.file import load_trajectory
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli import (
+    Antagonistic,
+    Elastic,
+    InputError,
+    Motor,
+    Rigid,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+    load_robot,
+    load_trajectory,
+)
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 
@@ -273,5 +275,5 @@ def test_a_stiffness_with_gaps_is_refused() -> None:
 
 def test_a_rigid_joint_in_python_has_no_stiffness_to_limit() -> None:
     [joint] = robot(RIGID).joints
-    with pytest.raises(InvalidRecordError, match="has no stiffness to limit"):
+    with pytest.raises(InputError, match="has no stiffness to limit"):
         replace(joint, limits=replace(joint.limits, stiffness=(1.0, 2.0)))

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from samples.command_line import REPOSITORY, edited
 
-from vsacli import DenavitHartenberg, Inertia, Joint, Limits, Link, Motor
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws import Cubic, Exponential, SpringLaw
+from vsacli import Antagonistic, DenavitHartenberg, Inertia, Joint, Limits, Link, Motor, laws
 from vsacli.robot.attainable import attainable_stiffnesses
 
 DIGITS = 1e-5
 """Relative; the search of an end stops at 6e-6 of a step that is at most 58 % of the stiffness."""
 
 
-def joint_of(motors: tuple[Motor, Motor], springs: tuple[SpringLaw, SpringLaw], **limits: Any) -> Joint:
+def joint_of(
+    motors: tuple[Motor, Motor], springs: tuple[laws.SpringLaw, laws.SpringLaw], **limits: Any
+) -> Joint:
     return Joint(
         name="elbow",
         type="revolute",
@@ -31,7 +31,7 @@ def joint_of(motors: tuple[Motor, Motor], springs: tuple[SpringLaw, SpringLaw], 
 
 def tendons(largest: float = math.inf, deflection: float = math.inf, **limits: Any) -> Joint:
     """Two tendons of c (exp(a phi) - 1), c = 1.5 N m, a = 6/rad: stiffness a (c + tau)."""
-    spring = Exponential(c=1.5, a=6, max_deflection=deflection)
+    spring = laws.Exponential(c=1.5, a=6, max_deflection=deflection)
     return joint_of((Motor(inertia=0.1, max_torque=largest),) * 2, (spring,) * 2, **limits)
 
 
@@ -66,7 +66,7 @@ def test_a_load_that_the_motors_cannot_hold() -> None:
     assert attainable["unloaded"].range[1] == pytest.approx(198, rel=DIGITS)
 
 
-def stiffest(springs: tuple[Cubic, Cubic], largest: tuple[float, float], load: float) -> float:
+def stiffest(springs: tuple[laws.Cubic, laws.Cubic], largest: tuple[float, float], load: float) -> float:
     """The largest stiffness at which both motors hold a load, tau_1 + tau_2; one of them is at its end."""
     candidates = []
     for torque in (largest[0], load + largest[1]):
@@ -86,7 +86,7 @@ def stiffest(springs: tuple[Cubic, Cubic], largest: tuple[float, float], load: f
 @pytest.mark.parametrize("seed", range(6))
 def test_unequal_cubic_springs_and_motors(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    springs = tuple(Cubic(k=rng.uniform(50, 500), k_c=rng.uniform(200, 4000)) for _ in range(2))
+    springs = tuple(laws.Cubic(k=rng.uniform(50, 500), k_c=rng.uniform(200, 4000)) for _ in range(2))
     largest = tuple(rng.uniform(20, 200, 2).tolist())
     load = rng.uniform(0.05, 0.6) * min(largest)
     motors = tuple(Motor(inertia=0.1, max_torque=torque) for torque in largest)

@@ -12,15 +12,9 @@ from oracles.kinematics import tool_pose, transform
 from samples.robots import ODD_GRAVITY, random_motion, random_robot, with_gravity
 from samples.wrenches import random_wrench
 
-from vsacli import load_robot
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.base.wrench import Wrench
+from vsacli import InputError, Pose, Robot, Wrench, link_torques, load_robot
 from vsacli.compute.vector import Vector
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.joint import Pose
 from vsacli.robot.kinematics import base_gravity
-from vsacli.robot.model import Robot
 
 ROUNDING = 1e-12
 """Of the peak: a rotation more is some 10 eps; the rest is margin. A wrong axis or order shows at 1e-1."""
@@ -41,7 +35,7 @@ def assert_same(actual: object, expected: object) -> None:
     assert (np.abs(actual - expected) <= ROUNDING * peak).all()
 
 
-def rotation(pose: Pose) -> FloatArray:
+def rotation(pose: Pose) -> np.ndarray:
     return transform(pose).real[:3, :3]
 
 
@@ -93,7 +87,7 @@ def test_a_tool_without_a_wrench_changes_no_bit() -> None:
 def test_a_wrench_at_the_tool_is_that_wrench_moved_to_the_last_link() -> None:
     at_tool = random_wrench(40, "end_effector", seed=3)
 
-    def moved(rows: FloatArray, _: int) -> FloatArray:
+    def moved(rows: np.ndarray, _: int) -> np.ndarray:
         force, moment = rows[:, :3] @ rotation(HELD).T, rows[:, 3:] @ rotation(HELD).T
         return np.hstack([force, moment + np.cross(HELD.xyz, force)])
 

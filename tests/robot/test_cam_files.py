@@ -13,9 +13,7 @@ import pytest
 from samples.command_line import contents
 from samples.mechanisms import profile
 
-from vsacli import load_robot
-from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
-from vsacli.base.arrays import FloatArray
+from vsacli import load_robot, mechanisms
 
 ROBOT = """\
 format: vsacli-robot/1
@@ -155,8 +153,8 @@ def test_misfits_are_told_unless_they_are_rounding_and_with_their_place_if_they_
     assert "% of its range), at the deflection 0.25: near a kink or an outlier" in warning
 
 
-def cam(phi: FloatArray, lift: FloatArray) -> Cam:
-    return Cam(k=1, r=1, pretension=(0, 1), profile=profile(phi, lift))
+def cam(phi: np.ndarray, lift: np.ndarray) -> mechanisms.Cam:
+    return mechanisms.Cam(k=1, r=1, pretension=(0, 1), profile=profile(phi, lift))
 
 
 def test_a_symmetric_profile_rests_at_zero_and_is_symmetric():

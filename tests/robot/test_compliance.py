@@ -12,10 +12,17 @@ from samples.shipped import shipped_robot, shipped_run
 from samples.trees import SMALL, random_tree, without_resistance
 from samples.wrenches import held
 
-from vsacli import Trajectory, Wrench, forward_kinematics, inverse_dynamics, jacobian, tip_compliance
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.errors import InputError
+from vsacli import (
+    InputError,
+    Motor,
+    Rigid,
+    Trajectory,
+    Wrench,
+    forward_kinematics,
+    inverse_dynamics,
+    jacobian,
+    tip_compliance,
+)
 from vsacli.base.variables import Block
 
 ROUNDING = 1e-13

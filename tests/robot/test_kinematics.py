@@ -9,13 +9,8 @@ from oracles import pinocchio
 from samples.robots import random_motion, random_robot, vsa_3r
 from samples.wrenches import held, random_wrench
 
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli import InputError, Pose, Robot, forward_kinematics, jacobian, link_torques
 from vsacli.base.wrench import WRENCH_FRAMES
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.joint import Pose
-from vsacli.robot.kinematics import forward_kinematics, jacobian
-from vsacli.robot.model import Robot
 
 ROUNDING = 1e-13
 """Of a few dozen products of numbers of size 1 to 10 (m): some 100 eps, the rest is margin."""
@@ -29,7 +24,7 @@ robots = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 frames = pytest.mark.parametrize("frame", WRENCH_FRAMES)
 
 
-def positions(robot: Robot, seed: int = 1) -> FloatArray:
+def positions(robot: Robot, seed: int = 1) -> np.ndarray:
     return random_motion(robot, SAMPLES, seed=seed)[0]
 
 
@@ -115,7 +110,7 @@ def test_what_cannot_be_a_position_is_refused() -> None:
     for function in (forward_kinematics, jacobian):
         with pytest.raises(InputError, match=r"q must have the shape \(3\) or \(samples, 3\), not \(2,\)"):
             function(vsa_3r(), [0, 0])
-        with pytest.raises(InputError, match="q must be an array of numbers: could not convert"):
+        with pytest.raises(InputError, match="q must be an array"):
             function(vsa_3r(), ["a", "b", "c"])
     with pytest.raises(InputError, match="unknown frame 'tool' of the Jacobian"):
         jacobian(vsa_3r(), [0, 0, 0], "tool")

@@ -20,18 +20,24 @@ from samples.robots import inertia_from_tensor, random_robot, vsa_3r
 from samples.shipped import shipped_robot, shipped_run
 from samples.springs import SPRINGS
 
-from vsacli import State, inverse_dynamics
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.damper import Damper
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.friction import Friction
-from vsacli.actuators.laws.polynomial import Polynomial
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.actuators.serial import Serial
-from vsacli.base.errors import InputError
-from vsacli.dynamics.forward import state_derivative
-from vsacli.robot.joint import Inertia, Limits, Link, Pose
+from vsacli import (
+    Antagonistic,
+    Damper,
+    Elastic,
+    Friction,
+    Inertia,
+    InputError,
+    Limits,
+    Link,
+    Motor,
+    Pose,
+    Rigid,
+    Serial,
+    State,
+    inverse_dynamics,
+    laws,
+    state_derivative,
+)
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_drives import Start
 
@@ -98,7 +104,7 @@ def test_rigid_elastic_and_antagonistic_joints_of_both_types():
         Rigid(motor=geared),
         Rigid(motor=Motor(inertia=2, damping=0.3)),
         Elastic(motor=geared, stiffness=700),
-        Elastic(motor=Motor(inertia=1.5), spring=Polynomial(c1=300, c3=900)),
+        Elastic(motor=Motor(inertia=1.5), spring=laws.Polynomial(c1=300, c3=900)),
         robot.joints[4].actuator,
     )
     mixed = with_actuators(robot, *actuators)

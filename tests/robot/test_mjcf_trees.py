@@ -7,22 +7,15 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pytest
+from samples.moves import move
 from samples.mujoco_models import compiled, coordinates, forces_of_tools, inverse_error, mujoco
 from samples.robots import random_actuator, random_motion, random_robot
 from samples.shipped import shipped_robot
 from samples.trees import random_tree, random_wrenches, reordered, without_resistance
 
-from vsacli import forward_kinematics, inverse_dynamics
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.elastic_torques import link_torques
+from vsacli import Elastic, Motor, Rigid, Trajectory, forward_kinematics, inverse_dynamics, link_torques
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_drives import Start
-from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 ROUNDING = 1e-12
 """Of inverse dynamics, relative to the largest torque: sums of some hundred terms, each good to 1e-16, and
@@ -65,15 +58,10 @@ def test_link_torques_of_random_trees_under_wrenches(seed):
 
 def rest_to_rest(stiffness: list[tuple[float, float]], duration: float, rate: float) -> Trajectory:
     """A motion of joints by half a radian or meter in turn; stiffness from one to another, NaN if none."""
-    span, count = (0.0, duration), len(stiffness)
-    start = tuple(np.linspace(0.2, -0.3, count).tolist())
-    end = tuple(position + (-1) ** index / 2 for index, position in enumerate(start))
-    (start_stiffness, end_stiffness) = zip(*stiffness, strict=True)
-    position = RestToRest(signal=POSITION, span=span, degree=11, start=start, end=end)
-    commanded = RestToRest(
-        signal=STIFFNESS, span=span, degree=7, start=tuple(start_stiffness), end=tuple(end_stiffness)
-    )
-    return Trajectory(UniformTimes(duration, rate), position, {STIFFNESS.key: commanded}, name="move")
+    start = np.linspace(0.2, -0.3, len(stiffness)).tolist()
+    end = [position + (-1) ** index / 2 for index, position in enumerate(start)]
+    of_stiffness = tuple(zip(*stiffness, strict=True))
+    return move(duration, rate, (start, end), degrees=(11, 7), stiffness=of_stiffness)
 
 
 def run_of_all_drives():

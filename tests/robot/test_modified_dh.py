@@ -12,10 +12,8 @@ from oracles.kinematics import tool_pose
 from oracles.modified_dh import ModifiedChain, ModifiedJoint
 from samples.robots import ODD_GRAVITY, random_robot
 
-from vsacli import load_robot
-from vsacli.base.errors import InputError
-from vsacli.dynamics.elastic_torques import link_constants, link_torques
-from vsacli.robot.model import Robot
+from vsacli import InputError, Robot, link_torques, load_robot
+from vsacli.dynamics.elastic_torques import link_constants
 
 PANDA = [
     (0, "0", 0.333),

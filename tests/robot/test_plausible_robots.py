@@ -10,11 +10,21 @@ from samples.command_line import REPOSITORY, REST_TO_REST, edited
 from samples.robots import random_joint
 from samples.shipped import shipped_robot
 
-from vsacli import DenavitHartenberg, Inertia, Joint, Limits, Link, Motor, Robot, load_robot, load_trajectory
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws import Cubic, Exponential, Quadratic
-from vsacli.actuators.rigid import Rigid
+from vsacli import (
+    Antagonistic,
+    DenavitHartenberg,
+    Elastic,
+    Inertia,
+    Joint,
+    Limits,
+    Link,
+    Motor,
+    Rigid,
+    Robot,
+    laws,
+    load_robot,
+    load_trajectory,
+)
 from vsacli.files.robot_template import robot_template
 
 
@@ -45,7 +55,7 @@ def pair(motor: Motor, spring) -> Antagonistic:
 
 MEANT = {
     "a finger of three phalanges of 10 g": arm(
-        3, 0.01, 0.03, 0.006, pair(Motor(inertia=2e-6, max_torque=0.2), Exponential(c=0.02, a=8))
+        3, 0.01, 0.03, 0.006, pair(Motor(inertia=2e-6, max_torque=0.2), laws.Exponential(c=0.02, a=8))
     ),
     "a finger of 1 g": arm(
         2, 1e-3, 0.01, 0.002, Rigid(motor=Motor(inertia=3e-9, gear_ratio=256, side="shaft", max_torque=1e-4))
@@ -55,10 +65,10 @@ MEANT = {
         500,
         3.0,
         0.2,
-        pair(Motor(inertia=60, damping=2e3, max_torque=2e5), Cubic(k=2e5, k_c=2e6)),
+        pair(Motor(inertia=60, damping=2e3, max_torque=2e5), laws.Cubic(k=2e5, k_c=2e6)),
     ),
     "joints behind a spring that hardly hardens": arm(
-        2, 2, 0.3, 0.03, Elastic(motor=Motor(inertia=0.2), spring=Cubic(k=400, k_c=5))
+        2, 2, 0.3, 0.03, Elastic(motor=Motor(inertia=0.2), spring=laws.Cubic(k=400, k_c=5))
     ),
     "a space manipulator": arm(
         6,
@@ -73,7 +83,9 @@ MEANT = {
     "stiff gears on a light arm": arm(
         1, 1.0, 0.3, 0.02, Elastic(motor=Motor(inertia=3e-5, gear_ratio=160, side="shaft"), stiffness=1e4)
     ),
-    "springs without stiffness at rest": arm(2, 1.0, 0.2, 0.02, pair(Motor(inertia=0.05), Quadratic(k=80))),
+    "springs without stiffness at rest": arm(
+        2, 1.0, 0.2, 0.02, pair(Motor(inertia=0.05), laws.Quadratic(k=80))
+    ),
     "a leg in a wheel": arm(1, 0.2, 0.1, 0.05, Rigid(motor=Motor(inertia=1e-3, max_velocity=40))),
     "a snake of 30 modules": arm(
         30, 0.3, 0.08, 0.03, Rigid(motor=Motor(inertia=2e-6, gear_ratio=300, side="shaft"))

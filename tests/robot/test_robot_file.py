@@ -8,13 +8,19 @@ from pathlib import Path
 
 import pytest
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.base.errors import InputError
-from vsacli.robot.file import load_robot
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
-from vsacli.robot.model import Robot
+from vsacli import (
+    Antagonistic,
+    DenavitHartenberg,
+    Inertia,
+    InputError,
+    Joint,
+    Limits,
+    Link,
+    Motor,
+    Robot,
+    laws,
+    load_robot,
+)
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 
@@ -81,7 +87,7 @@ def test_every_field_is_read(load):
         link=Link(mass=2.0, com=(0.1, 0.0, 0.0), inertia=Inertia(xx=0.1, yy=0.2, zz=0.2)),
         damping=1e-5,
         actuator=Antagonistic(
-            motor=(Motor(inertia=3.2, damping=1e-4),) * 2, spring=(Cubic(k=400, k_c=2000),) * 2
+            motor=(Motor(inertia=3.2, damping=1e-4),) * 2, spring=(laws.Cubic(k=400, k_c=2000),) * 2
         ),
         limits=Limits(position=(-math.pi, math.pi / 2), velocity=(-3, 3), stiffness=(-math.inf, 2000)),
     )
@@ -92,7 +98,7 @@ def test_every_field_is_read(load):
         link=Link(mass=1.0, com=(0.0, 0.0, 0.05), inertia=Inertia(xx=0.1, yy=0.1, zz=0.1, yz=-0.01)),
         actuator=Antagonistic(
             motor=(Motor(inertia=10.0), Motor(inertia=11.0, max_torque=90.0)),
-            spring=(Cubic(k=4000, k_c=1e6), Cubic(k=5000, k_c=1e6, max_deflection=0.02)),
+            spring=(laws.Cubic(k=4000, k_c=1e6), laws.Cubic(k=5000, k_c=1e6, max_deflection=0.02)),
             branch="negative",
         ),
     )
@@ -287,7 +293,9 @@ def test_table_one_of_the_paper():
     moments = [dataclasses.astuple(joint.link.inertia)[:3] for joint in robot.joints]
     assert moments == [(0.1299, 0.0185, 0.1299), (0.0139, 0.0578, 0.0578), (0.0104, 0.0434, 0.0434)]
     assert [joint.actuator.motor[1].inertia for joint in robot.joints] == [3.20, 3.05, 1.98]
-    assert {spring for joint in robot.joints for spring in joint.actuator.spring} == {Cubic(k=400, k_c=2000)}
+    assert {spring for joint in robot.joints for spring in joint.actuator.spring} == {
+        laws.Cubic(k=400, k_c=2000)
+    }
 
 
 @pytest.mark.parametrize("path", sorted(ROBOTS.glob("*.yaml")), ids=lambda path: path.stem)

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from vsacli import load_robot
-from vsacli.base.errors import InputError
+from vsacli import InputError, load_robot
 
 HEAD = """
 format: vsacli-robot/1

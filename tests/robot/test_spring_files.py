@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from samples.command_line import contents
 
-from vsacli import load_robot
-from vsacli.actuators.laws.table import MeasuredSpring
+from vsacli import laws, load_robot
 from vsacli.actuators.laws.tendons import Mirrored
 
 ROBOT = """\
@@ -218,7 +217,7 @@ def rig(tmp_path: Path) -> Path:
 
 def test_a_table_is_read(rig: Path):
     first, second = load_robot(rig).joints[0].actuator.laws
-    assert isinstance(first, MeasuredSpring)
+    assert isinstance(first, laws.Table)
     assert second is first
     assert first.domain == (-0.5, 0.5)
     # The torques of a polynomial, which the fit can be.

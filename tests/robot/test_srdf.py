@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 from samples.urdf import joint, link, robot, write
 
-from vsacli.base.errors import InputError
-from vsacli.robot.urdf import import_urdf
+from vsacli import InputError, import_urdf
 from vsacli.robot.urdf.reader import read_urdf
 from vsacli.robot.urdf.srdf import ends_of_group
 

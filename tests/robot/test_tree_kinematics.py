@@ -10,10 +10,9 @@ from samples.marks import slow_but
 from samples.robots import random_motion
 from samples.trees import SMALL, random_tree
 
-from vsacli.base.errors import InputError
+from vsacli import InputError, forward_kinematics, jacobian
 from vsacli.base.wrench import WRENCH_FRAMES
 from vsacli.files.info.robot_info import gravity_torques
-from vsacli.robot.kinematics import forward_kinematics, jacobian
 
 ROUNDING = 1e-12
 """m: a chain of 20 products of numbers of size 1 to 20."""

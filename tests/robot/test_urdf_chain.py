@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from samples.urdf import joint, link, robot, write
 
-from vsacli.base.errors import InputError
-from vsacli.robot.urdf import import_urdf
+from vsacli import InputError, import_urdf
 
 NO_INERTIA = '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>'
 TREE = robot(

@@ -10,8 +10,7 @@ from oracles.kinematics import tool_pose
 from oracles.urdf_pinocchio import UrdfOracle
 from samples.urdf import joint, link, random_serial, robot, serial, write
 
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.urdf import import_urdf
+from vsacli import import_urdf, link_torques
 from vsacli.robot.urdf.link_tree import pose_matrix, roll_pitch_yaw
 
 RIGHT = "1.5707963267948966"

@@ -14,13 +14,18 @@ from samples.marks import slow
 from samples.robots import ODD_GRAVITY, random_motion, random_robot, robot_of_ones, vsa_3r
 from samples.shipped import shipped_robot
 
-from vsacli import Placeholders, forward_kinematics, import_urdf
-from vsacli.actuators.damper import Damper
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.friction import Friction
-from vsacli.actuators.motor import Motor
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.joint import Limits, Pose
+from vsacli import (
+    Damper,
+    Elastic,
+    Friction,
+    Limits,
+    Motor,
+    Placeholders,
+    Pose,
+    forward_kinematics,
+    import_urdf,
+    link_torques,
+)
 from vsacli.robot.models.urdf import NO_LIMIT, urdf_model
 
 ROUNDING = 1e-9

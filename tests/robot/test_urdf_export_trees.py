@@ -12,9 +12,7 @@ from samples.robots import ODD_GRAVITY, random_motion
 from samples.shipped import shipped_robot
 from samples.trees import random_tree, without_resistance
 
-from vsacli import Placeholders, forward_kinematics, import_urdf
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.joint import Limits, Tool
+from vsacli import Limits, Placeholders, Tool, forward_kinematics, import_urdf, link_torques
 from vsacli.robot.models.urdf import urdf_model
 
 ROUNDING = 1e-9

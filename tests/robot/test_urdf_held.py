@@ -10,9 +10,7 @@ import pytest
 from oracles.urdf_pinocchio import UrdfOracle
 from samples.urdf import joint, link, robot, write
 
-from vsacli.base.errors import InputError
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.urdf import import_urdf
+from vsacli import InputError, import_urdf, link_torques
 
 LIMIT = '<limit lower="-3" upper="3" velocity="1" effort="1"/>'
 LEFT = LIMIT.replace('"-3" upper="3"', '"0.01" upper="0.05"')

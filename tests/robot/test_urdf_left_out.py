@@ -7,8 +7,8 @@ import re
 import pytest
 from samples.urdf import joint, link, robot, serial, write
 
-from vsacli.base.errors import InputError
-from vsacli.robot.urdf import Placeholders, converted_robot_text, import_urdf
+from vsacli import InputError, Placeholders, import_urdf
+from vsacli.robot.urdf import converted_robot_text
 
 LIMIT = '<limit effort="32" velocity="1"/>'
 

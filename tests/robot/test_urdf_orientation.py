@@ -9,9 +9,7 @@ import pytest
 from samples.urdf import random_serial, serial, write
 from scipy.spatial.transform import Rotation
 
-from vsacli.base.errors import InputError
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.urdf import import_urdf
+from vsacli import InputError, import_urdf, link_torques
 
 ROUNDING = 1e-13
 """Relative, of torques at random positions; conversion between angles and quaternion rounds to 1e-16."""

@@ -11,14 +11,19 @@ from samples.command_line import REPOSITORY
 from samples.marks import slow
 from samples.urdf import joint, link, random_serial, robot, write
 
-from vsacli import load_robot, load_trajectory
+from vsacli import (
+    Placeholders,
+    import_urdf,
+    inverse_dynamics,
+    link_torques,
+    load_robot,
+    load_trajectory,
+    mass_matrix,
+)
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.dynamics.forward import mass_matrix
 from vsacli.files.templates import trajectory_template
 from vsacli.robot.model import OF_PLACEHOLDERS, WITHOUT_MASSES
-from vsacli.robot.urdf import Placeholders, converted_robot_text, import_urdf
+from vsacli.robot.urdf import converted_robot_text
 from vsacli.robot.urdf.placeholders import UNLOADED
 
 DESK_ARM = REPOSITORY / "robots" / "desk_arm.urdf"

@@ -10,9 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from samples.urdf import INERTIAL, joint, link, robot, serial
 
-from vsacli.base.errors import InputError
+from vsacli import InputError, Placeholders, import_urdf
 from vsacli.robot.joint import UNBOUNDED
-from vsacli.robot.urdf import Placeholders, import_urdf
 
 BOMB = '<!DOCTYPE robot [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>\n<robot name="&b;"/>'
 EXTERNAL = '<!DOCTYPE robot SYSTEM "file:///etc/passwd">\n<robot name="x"/>'

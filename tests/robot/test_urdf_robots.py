@@ -16,13 +16,10 @@ from oracles.urdf_pinocchio import UrdfOracle
 from samples.urdf_chains import ARMS, REFUSED, WHOLE_REFUSED, WITHOUT_ARMS
 from samples.urdf_deviations import deviations
 
-from vsacli import load_trajectory
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.base.errors import InputError
-from vsacli.dynamics.elastic_torques import link_torques
+from vsacli import InputError, import_urdf, inverse_dynamics, link_torques, load_trajectory
 from vsacli.files.templates import trajectory_template
 from vsacli.robot.plausibility import robot_rules_with_findings
-from vsacli.robot.urdf import Conversion, import_urdf
+from vsacli.robot.urdf import Conversion
 from vsacli.robot.urdf.link_tree import MOVING, Urdf, joints_below
 from vsacli.robot.urdf.reader import read_urdf
 

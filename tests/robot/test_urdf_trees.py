@@ -12,12 +12,8 @@ from samples.marks import slow
 from samples.urdf import INERTIAL, joint, link, random_tree, robot, write
 from samples.urdf_deviations import deviations
 
-from vsacli import load_robot
-from vsacli.base.errors import InputError
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.dynamics.forward import mass_matrix
-from vsacli.robot.joint import Pose
-from vsacli.robot.urdf import converted_robot_text, import_urdf
+from vsacli import InputError, Pose, import_urdf, link_torques, load_robot, mass_matrix
+from vsacli.robot.urdf import converted_robot_text
 
 RIGHT_ANGLE = "1.5707963267948966"
 LIMIT = '<limit lower="-2" upper="2" velocity="3" effort="40"/>'

@@ -11,9 +11,7 @@ import pytest
 from samples.command_line import REPOSITORY
 from samples.urdf import INERTIAL, joint, link, robot, write
 
-from vsacli.base.errors import InputError
-from vsacli.robot.model import Robot
-from vsacli.robot.urdf import Placeholders, import_urdf
+from vsacli import InputError, Placeholders, Robot, import_urdf
 from vsacli.robot.urdf.vocabulary import ROBOT, ElementRule
 
 CHILDREN = (

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.trajectory.curves.closed_form import ClosedForm
 
 
@@ -22,7 +21,7 @@ class Blurred:
     """
 
     exact: ClosedForm
-    covariances: FloatArray
+    covariances: np.ndarray
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     unreliable: tuple[float, float] = (0.0, 0.0)
@@ -42,7 +41,7 @@ class Blurred:
         return True
 
     @property
-    def breakpoints(self) -> FloatArray:
+    def breakpoints(self) -> np.ndarray:
         return self.exact.breakpoints
 
     @property
@@ -50,7 +49,7 @@ class Blurred:
         return self
 
     @property
-    def stated(self) -> BoolArray:
+    def stated(self) -> np.ndarray:
         return np.full(self.components, self.known)
 
     @property
@@ -60,17 +59,17 @@ class Blurred:
     def summary(self) -> dict[str, Any]:
         return {}
 
-    def at(self, time: FloatArray) -> FloatArray:
+    def at(self, time: np.ndarray) -> np.ndarray:
         return self.exact.at(time)
 
-    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
+    def samples(self, _start: int, _stop: int, time: np.ndarray, /) -> np.ndarray:
         return self.exact.at(time)
 
-    def covariance(self, time: FloatArray) -> FloatArray:
+    def covariance(self, time: np.ndarray) -> np.ndarray:
         return np.repeat(self.covariances[..., None], len(time), axis=-1)
 
 
-def random_covariances(seed: int, components: int, sizes: FloatArray) -> FloatArray:
+def random_covariances(seed: int, components: int, sizes: np.ndarray) -> np.ndarray:
     """Covariances of correlated functions of these sizes, (components, orders, orders)."""
     rng = np.random.default_rng(seed)
     roots = rng.standard_normal((components, len(sizes), len(sizes))) * sizes[:, None] / np.sqrt(len(sizes))

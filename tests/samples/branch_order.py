@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from samples.trees import TreeMotion, finger, hand, reordered, tree_run, tree_text
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Robot
+from vsacli import Robot
 
 _PLACE = re.compile(r"\w+/(\w+\.yaml)(:\d+: )?")
 """A file in the folder of one order, and a line of it."""
@@ -88,7 +87,7 @@ def _write(name: str, robot: Robot, motion: TreeMotion, folder: Path) -> TreeFil
     return files
 
 
-def _polynomial(degree: int, ends: FloatArray | dict[str, FloatArray]) -> dict[str, Any]:
+def _polynomial(degree: int, ends: np.ndarray | dict[str, np.ndarray]) -> dict[str, Any]:
     """A polynomial between the ends of each joint, by name, or component."""
     names = ("start", "end")
     if isinstance(ends, dict):

@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
-
 COLUMNS = (
     *("name", "inertia[g cm^2]", "continuous_torque[mNm]", "max_torque[mNm]", "max_velocity[rpm]"),
     *(
@@ -66,10 +64,10 @@ def write(path: Path, motors: Sequence[dict[str, Any]]) -> Path:
 def shares_used(
     motor: dict[str, Any],
     ratio: float,
-    velocity: FloatArray,
-    acceleration: FloatArray,
-    load: FloatArray,
-    weight: FloatArray,
+    velocity: np.ndarray,
+    acceleration: np.ndarray,
+    load: np.ndarray,
+    weight: np.ndarray,
 ) -> dict[str, float]:
     """What a motor with a gear uses of its limits for a motion on the joint's side, each (samples,).
 

@@ -12,17 +12,11 @@ from samples.plants import with_actuators
 from samples.robots import vsa_3r
 from samples.shipped import shipped_run
 from samples.simulated import short_motion
-from vsacli.actuators.friction import Friction
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.arrays import FloatArray
-from vsacli.control.gains import Gains
+from vsacli import Friction, Gains, InitialError, Motor, Rigid, Robot, Trajectory
 from vsacli.control.simulation.boundaries import Boundary, boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, Feedforward, LinearizingFeedback
-from vsacli.control.simulation.start import InitialError, start_state
+from vsacli.control.simulation.start import start_state
 from vsacli.control.simulation.tabulated import TabulatedReference
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Trajectory
 
 SHIPPED = {
     "cubic springs": ("vsa_3r", "rest_to_rest"),
@@ -49,10 +43,10 @@ class Loop(NamedTuple):
 
     loop: ClosedLoop
     boundaries: list[Boundary]
-    start: FloatArray
+    start: np.ndarray
     times: tuple[float, float]
 
-    def states(self, count: int, seed: int = 0) -> Iterator[tuple[float, FloatArray]]:
+    def states(self, count: int, seed: int = 0) -> Iterator[tuple[float, np.ndarray]]:
         """Times and states near the start: within a spring's range, and of all signs of velocity."""
         rng = np.random.default_rng(seed)
         for _ in range(count):

@@ -8,17 +8,11 @@ import numpy as np
 
 from samples.robots import random_robot
 from samples.springs import SPRINGS
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.motor import Motor
+from vsacli import Antagonistic, Flag, Limits, Motion, Motor, Robot, motor_torques
 from vsacli.actuators.reach import margin
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag, has_flag
+from vsacli.base.flags import has_flag
 from vsacli.base.variables import Block
 from vsacli.control.codegen.robot_functions import command_structure
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.joint import Limits
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Motion
 
 SCALES = {"q": 1.0, "dq": 1.0, "ddq": 2.0, "d3q": 5.0, "d4q": 20.0, "dstiffness": 100.0, "ddstiffness": 500.0}
 """Half-widths of what is drawn, SI units."""
@@ -46,12 +40,12 @@ def with_springs(law: str) -> Robot:
     return dataclasses.replace(robot, name=f"two {law}", joints=joints)
 
 
-def commands(robot: Robot, samples: int, seed: int) -> dict[str, FloatArray]:
+def commands(robot: Robot, samples: int, seed: int) -> dict[str, np.ndarray]:
     """Random commands; stiffness from below to above what is reachable, the first ones on its border."""
     rng = np.random.default_rng(seed)
     shape = (samples, len(robot.joints))
     drawn = {name: rng.uniform(-scale, scale, shape) for name, scale in SCALES.items()}
-    block = compute_block(robot, motion_of({**drawn, "stiffness": np.ones(shape)}))
+    block = motor_torques(robot, motion_of({**drawn, "stiffness": np.ones(shape)}))
     lower = np.nan_to_num(block.stiffness_min)
     upper = np.minimum(np.nan_to_num(block.stiffness_max), 4 * lower)
     stiffness = lower + rng.uniform(-0.2, 1.2, shape) * (upper - lower)
@@ -61,19 +55,19 @@ def commands(robot: Robot, samples: int, seed: int) -> dict[str, FloatArray]:
     return {**drawn, "stiffness": stiffness}
 
 
-def reachable(robot: Robot) -> FloatArray:
+def reachable(robot: Robot) -> np.ndarray:
     """Random commands that can be executed, (commands, signals, joints)."""
     drawn = commands(robot, 1000, seed=1)
-    flags = compute_block(robot, motion_of(drawn)).flags
+    flags = motor_torques(robot, motion_of(drawn)).flags
     chosen = np.stack([drawn[array.name] for array in command_structure(robot).arrays], axis=1)
     return chosen[~has_flag(flags, Flag.INFEASIBLE | Flag.SINGULAR).any(axis=1)]
 
 
-def motion_of(arrays: dict[str, FloatArray]) -> Motion:
+def motion_of(arrays: dict[str, np.ndarray]) -> Motion:
     return Motion.of(np.zeros(len(arrays["q"])), arrays)
 
 
-def expected_of(block: Block, name: str) -> FloatArray:
+def expected_of(block: Block, name: str) -> np.ndarray:
     """What the tool computes of an array that the generated code gives."""
     if name == "margin":
         with np.errstate(invalid="ignore"):
@@ -81,7 +75,7 @@ def expected_of(block: Block, name: str) -> FloatArray:
     return np.asarray(getattr(block, name))
 
 
-def clear(margin: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+def clear(margin: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Where joints are away from the border, as an array of that shape; those without a margin are."""
     there = ~(margin <= CLEAR)
     return np.broadcast_to(there.reshape(there.shape + (1,) * (len(shape) - there.ndim)), shape)

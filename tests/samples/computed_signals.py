@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from samples.shipped import shipped_run
-from vsacli import inverse_dynamics
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Robot
+from vsacli import Robot, inverse_dynamics
 from vsacli.studies.identification.conditioning import ConditionedRecording, Filter
 
 
@@ -15,5 +15,5 @@ def computed_signals(robot: str, trajectory: str) -> tuple[Robot, ConditionedRec
     run = inverse_dynamics(loaded, motion)
     names = ("time", "q", "dq", "ddq", "theta", "dtheta", "ddtheta", "tau_motor")
     rate = (len(run.time) - 1) / float(run.time[-1])
-    arrays: list[FloatArray] = [getattr(run, name) for name in names]
+    arrays: list[np.ndarray] = [getattr(run, name) for name in names]
     return loaded, ConditionedRecording(*arrays, rate=rate, filter=Filter.low_pass(rate / 20, rate))

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
-from samples.drives import motion as arm_motion
+from samples.moves import move
 from samples.robots import vsa_3r
-from vsacli import Trajectory, inverse_dynamics
-from vsacli.analysis.result import Result
-from vsacli.base.arrays import FloatArray
+from vsacli import Result, Robot, Trajectory, inverse_dynamics
 from vsacli.dynamics.integrated_deflections import IntegratedDeflections, integrate_deflections
-from vsacli.robot.model import Robot
 
 ARM = dataclasses.replace(vsa_3r(), joints=vsa_3r().joints[:2])
 """Base and shoulder: the base carries nothing while the arm is still, the shoulder the weight of its link."""
@@ -32,12 +30,8 @@ def motion(
     start: tuple[float, float] = (850.0, 850.0), end: tuple[float, float] | None = None, rate: float = 100
 ) -> Trajectory:
     """Rest to rest of base and shoulder, in 2 s."""
-    whole = arm_motion((*start, 1.0), (*(end or start), 1.0), rate=rate)
-    position, stiffness = (
-        dataclasses.replace(profile, start=profile.start[:2], end=profile.end[:2])
-        for profile in (whole.position, whole.commanded["stiffness"])
-    )
-    return Trajectory(whole.times, position, {"stiffness": stiffness}, name="rest-to-rest")
+    ends = (0.0, 0.0), (math.pi / 2, math.pi / 4)
+    return move(2.0, rate, ends, stiffness=(start, end or start), name="rest-to-rest")
 
 
 def integrated(robot: Robot, trajectory: Trajectory, tolerance: float = 1e-12) -> Result:
@@ -62,16 +56,16 @@ class Dip:
     components: int = 2
 
     @property
-    def breakpoints(self) -> FloatArray:
+    def breakpoints(self) -> np.ndarray:
         return np.array([0.0, 2.0])
 
-    def at(self, time: FloatArray) -> FloatArray:
+    def at(self, time: np.ndarray) -> np.ndarray:
         away = time - self.bottom
         dip = [self.floor + self.bend * away**2, 2 * self.bend * away, np.full_like(time, 2 * self.bend)]
         steady = [np.full_like(time, 1000.0), np.zeros_like(time), np.zeros_like(time)]
         return np.stack([np.stack([first, other]) for first, other in zip(dip, steady, strict=True)])
 
-    def samples(self, _start: int, _stop: int, time: FloatArray, /) -> FloatArray:
+    def samples(self, _start: int, _stop: int, time: np.ndarray, /) -> np.ndarray:
         return self.at(time)
 
     @property

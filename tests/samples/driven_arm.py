@@ -7,16 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from samples.full_model import Drive, FullModel, PlanarArm
-from vsacli import inverse_dynamics
+from samples.moves import move
+from vsacli import (
+    Damper,
+    DenavitHartenberg,
+    Inertia,
+    Joint,
+    Link,
+    Result,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+)
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.damper import Damper
-from vsacli.analysis.result import Result
-from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 LINK = PlanarArm(lengths=[0.4], masses=[1.5], centers=[0.25], inertias=[0.03], damping=[0.2])
 """A pendulum."""
@@ -64,27 +67,10 @@ def motion_of(
     stiffness: list[tuple[float, float]], damping: Sequence[tuple[float, float]] = ()
 ) -> Trajectory:
     """Rest to rest; stiffness and damping of each joint from one to another, NaN where none is commanded."""
-    span, joints = (0.0, DURATION), len(stiffness)
-    commanded = {STIFFNESS: stiffness, DAMPING: damping}
-    position = RestToRest(
-        signal=POSITION,
-        span=span,
-        degree=11,
-        start=tuple(START[:joints]),
-        end=tuple((START + MOVE)[:joints]),
-    )
-    profiles = {
-        signal.key: RestToRest(
-            signal=signal,
-            span=span,
-            degree=7,
-            start=tuple(start for start, _ in ends),
-            end=tuple(end for _, end in ends),
-        )
-        for signal, ends in commanded.items()
-        if ends
-    }
-    return Trajectory(UniformTimes(DURATION, RATE), position, profiles, name="move")
+    joints, signals = len(stiffness), {"stiffness": stiffness, "damping": damping}
+    commanded = {key: tuple(zip(*values, strict=True)) for key, values in signals.items() if values}
+    ends = START[:joints], (START + MOVE)[:joints]
+    return move(DURATION, RATE, ends, degrees=(11, 7), **commanded)
 
 
 def assert_follows(

@@ -8,28 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from samples.moves import move
 from samples.robots import vsa_3r
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.law import Pair
-from vsacli.actuators.motor import Motor
+from vsacli import Antagonistic, Joint, Limits, Motor, Robot, Trajectory, laws
 from vsacli.actuators.transmission import Command
-from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.dynamics.drive import drive
-from vsacli.robot.joint import Joint, Limits
-from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
-ALIKE = Cubic(k=400, k_c=2000)
+ALIKE = laws.Cubic(k=400, k_c=2000)
 """Either spring of Table I."""
 
 
 @dataclass(frozen=True)
-class Stopped(Cubic):
+class Stopped(laws.Cubic):
     """A cubic spring that ends at a stop, at 30 N m to either side."""
 
     @property
@@ -41,11 +31,11 @@ class Stopped(Cubic):
     def torque_range(self) -> tuple[float, float]:
         return (-30.0, 30.0)
 
-    def closed_pair(self, _other: SpringLaw) -> Pair | None:
+    def closed_pair(self, _other: laws.SpringLaw) -> laws.Pair | None:
         return None
 
 
-def springs(first: SpringLaw, second: SpringLaw, branch: str = "positive") -> Antagonistic:
+def springs(first: laws.SpringLaw, second: laws.SpringLaw, branch: str = "positive") -> Antagonistic:
     motor = Motor(inertia=3, damping=0.1)
     return Antagonistic(motor=(motor, motor), spring=(first, second), branch=branch)
 
@@ -65,14 +55,14 @@ def with_branch(joint: Joint, branch: str) -> Joint:
     return dataclasses.replace(joint, actuator=dataclasses.replace(joint.actuator, branch=branch))
 
 
-def lower_by_branch(joint: Joint, tau_e: FloatArray) -> dict[str, FloatArray]:
+def lower_by_branch(joint: Joint, tau_e: np.ndarray) -> dict[str, np.ndarray]:
     return {
         branch: drive(with_branch(joint, branch), command(tau_e=tau_e)).stiffness_min
         for branch in ("positive", "negative")
     }
 
 
-def command(**given: FloatArray | float) -> Command:
+def command(**given: np.ndarray | float) -> Command:
     """Steps that rest under no load at 850 N m/rad, except for what is given."""
     values = {**dict.fromkeys(Command.names(["stiffness"]), 0.0), "stiffness": 850.0, **given}
     arrays = np.broadcast_arrays(
@@ -88,16 +78,6 @@ def motion(
     rate: float = 100,
 ) -> Trajectory:
     """Rest to rest from 0 to 90, 45, -60 deg."""
-    span = (0.0, duration)
-    return Trajectory(
-        UniformTimes(duration, rate),
-        RestToRest(
-            signal=POSITION, span=span, degree=7, start=(0,) * 3, end=(math.pi / 2, math.pi / 4, -math.pi / 3)
-        ),
-        {
-            "stiffness": RestToRest(
-                signal=STIFFNESS, span=span, degree=3, start=stiffness, end=end_stiffness or stiffness
-            )
-        },
-        name="rest-to-rest",
-    )
+    ends = (0,) * 3, (math.pi / 2, math.pi / 4, -math.pi / 3)
+    of_stiffness = stiffness, end_stiffness or stiffness
+    return move(duration, rate, ends, stiffness=of_stiffness, name="rest-to-rest")

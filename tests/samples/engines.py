@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
 from samples.robots import random_motion
 from samples.signals import by_name
-from vsacli.base.flags import Flag
+from vsacli import Flag, Motion, Robot, Wrench, motor_torques
 from vsacli.base.variables import Block
-from vsacli.base.wrench import Wrench
-from vsacli.dynamics.inverse import COMPUTED, compute_block
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Motion
+from vsacli.dynamics.inverse import COMPUTED
 
 AGREEMENT = 1e-12
 """Relative to a variable's peak, where the margin exceeds `CLEAR`: rounding of 1e-16 over that margin."""
@@ -30,7 +29,7 @@ def demands(robot: Robot, samples: int, seed: int = 1, wrench: Wrench | None = N
     motion = MOTION_SCALE * np.array(random_motion(robot, samples, seed))
     rates = rng.uniform(-500, 500, (2, *motion[0].shape))
     time = np.arange(float(samples))
-    reach = compute_block(
+    reach = motor_torques(
         robot, Motion(time, *motion, by_name(np.ones_like(motion[0]), *rates), wrench=wrench)
     )
     lower = np.nan_to_num(reach.stiffness_min, nan=1.0)
@@ -65,3 +64,11 @@ def assert_agree(found: Block, expected: Block, tolerances: Mapping[str, float] 
 def kinds_of_steps(block: Block) -> dict[Flag, int]:
     """How many joints' steps have each of the flags."""
     return {flag: int(np.count_nonzero(block.flags & flag)) for flag in Flag}
+
+
+def program(folder: Path, name: str, text: str) -> Path:
+    """Write a shell script to a folder, to be called as a command."""
+    path = folder / name
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return path

@@ -8,9 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vsacli import Trajectory, inverse_dynamics
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Robot
+from vsacli import Robot, Trajectory, inverse_dynamics
 from vsacli.studies.identification.conditioning import ConditionedRecording, bandwidth_of, conditioned
 
 POSITION_LINES, STIFFNESS_LINES = (0.15, 0.4, 0.7), (0.2, 0.55)
@@ -41,10 +39,10 @@ class Excitation(NamedTuple):
 class Recorded(NamedTuple):
     """What sensors say: (samples,), (samples, joints), (samples, joints, 2) twice."""
 
-    time: FloatArray
-    q: FloatArray
-    theta: FloatArray
-    tau_motor: FloatArray
+    time: np.ndarray
+    q: np.ndarray
+    theta: np.ndarray
+    tau_motor: np.ndarray
 
     @property
     def signals(self) -> ConditionedRecording:
@@ -67,7 +65,7 @@ class Recorded(NamedTuple):
         np.savetxt(path, rows, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
         return path
 
-    def _columns(self, robot: Robot) -> Iterator[tuple[str, FloatArray]]:
+    def _columns(self, robot: Robot) -> Iterator[tuple[str, np.ndarray]]:
         for index, joint in enumerate(robot.joints):
             yield f"{joint.name}.q", self.q[:, index]
             for motor in range(joint.actuator.motor_count):
@@ -90,12 +88,12 @@ def excited(robot: Robot, excitation: Excitation, seed: int = 0) -> Recorded:
 
 
 def _sines(
-    time: FloatArray,
+    time: np.ndarray,
     rng: np.random.Generator,
     middle: Sequence[float],
     reach: Sequence[float],
     lines: Sequence[float],
-) -> list[FloatArray]:
+) -> list[np.ndarray]:
     """Sums of sines of any phases with their first four derivatives, (samples, joints) each."""
     omega, count = 2 * np.pi * np.array(lines), (len(middle), len(lines))
     phase, size = rng.uniform(0, 2 * np.pi, count), rng.uniform(0.5, 1, count) / len(lines)

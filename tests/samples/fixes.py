@@ -9,31 +9,34 @@ from typing import Any
 
 import numpy as np
 
+from samples.moves import move
 from samples.robots import vsa_3r
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
-from vsacli.base.flags import Flag
+from vsacli import (
+    Antagonistic,
+    DenavitHartenberg,
+    Flag,
+    Inertia,
+    Joint,
+    Limits,
+    Link,
+    Motor,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+    laws,
+)
 from vsacli.base.outputs import Outputs
-from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.base.variables import Block
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
-from vsacli.robot.model import Robot
+from vsacli.base.signals import WRENCH
 from vsacli.studies.search import Fix, write_fixed
-from vsacli.trajectory.curves import ConstantProfile, RestToRest
+from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.profile import WrenchProfile
-from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 PAPER_END = (math.pi / 2, math.pi / 4, -math.pi / 3)
 BASE, SHOULDER, ELBOW = range(3)
 K, K_C = 400.0, 2000.0
 """Constants of the springs of Table I."""
 
-CUBIC = Cubic(k=K, k_c=K_C)
+CUBIC = laws.Cubic(k=K, k_c=K_C)
 
 
 def rest_to_rest(
@@ -45,14 +48,8 @@ def rest_to_rest(
     rate: float = 250.0,
 ) -> Trajectory:
     """A polynomial of degree 7 at constant stiffness."""
-    times = UniformTimes(duration, rate)
     values = stiffness if isinstance(stiffness, tuple) else (stiffness,) * len(end)
-    return Trajectory(
-        times,
-        RestToRest(signal=POSITION, span=times.span, degree=7, start=start, end=end),
-        {"stiffness": ConstantProfile(signal=STIFFNESS, span=times.span, value=values)},
-        name="test",
-    )
+    return move(duration, rate, (start, end), stiffness=(values, values), name="test")
 
 
 def changed(
@@ -73,7 +70,7 @@ def changed(
     return dataclasses.replace(robot, joints=tuple(joints))
 
 
-def pendulum(spring: SpringLaw = CUBIC, letter: str = "R", mass: float = 5.0) -> Robot:
+def pendulum(spring: laws.SpringLaw = CUBIC, letter: str = "R", mass: float = 5.0) -> Robot:
     """One joint: a point mass 0.5 m from a horizontal axis, or on a vertical slide."""
     turning = letter == "R"
     joint = Joint(
@@ -87,7 +84,7 @@ def pendulum(spring: SpringLaw = CUBIC, letter: str = "R", mass: float = 5.0) ->
     return Robot(name="pendulum", gravity=gravity, joints=(joint,))
 
 
-def lowest_stiffness(tau_e: FloatArray) -> FloatArray:
+def lowest_stiffness(tau_e: np.ndarray) -> np.ndarray:
     """Closed bound of two springs of Table I, solved by bisection on the deflection they share."""
     low, high = np.zeros_like(tau_e), np.full_like(tau_e, 1.0)
     for _ in range(60):
@@ -99,21 +96,16 @@ def lowest_stiffness(tau_e: FloatArray) -> FloatArray:
 
 def smallest_margin(robot: Robot, trajectory: Trajectory) -> float:
     """Over all steps and joints, from the closed bound."""
-    return min(
-        float(np.min((block.stiffness - lowest_stiffness(block.tau_e)) / block.stiffness))
-        for block in Run(robot, trajectory)
-    )
+    result = inverse_dynamics(robot, trajectory)
+    return float(np.min((result.stiffness - lowest_stiffness(result.tau_e)) / result.stiffness))
 
 
 def accepted(robot: Robot, trajectory: Trajectory, min_margin: float = 0.01) -> bool:
     """The rule, read off the corridor and the flags of a run."""
-    return all(_accepted(block, min_margin) for block in Run(robot, trajectory))
-
-
-def _accepted(block: Block, min_margin: float) -> bool:
-    room = np.minimum(block.stiffness - block.stiffness_min, block.stiffness_max - block.stiffness)
-    narrow = np.any(room / block.stiffness < min_margin)  # NaN where a joint has no corridor
-    return not narrow and not np.any(block.flags & ~np.uint32(Flag.NEAR_SINGULAR))
+    result = inverse_dynamics(robot, trajectory)
+    room = np.minimum(result.stiffness - result.stiffness_min, result.stiffness_max - result.stiffness)
+    narrow = np.any(room / result.stiffness < min_margin)  # NaN where a joint has no corridor
+    return not narrow and not np.any(result.flags & ~np.uint32(Flag.NEAR_SINGULAR))
 
 
 def pushed(trajectory: Trajectory, frame: str = "base") -> Trajectory:

@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from samples.marks import COMPILERS
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.project import Project, prefix_of
 from vsacli.control.codegen.texts import binding_text, filled, header_text, source_text
-from vsacli.robot.model import Robot
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
 """Every warning is an error."""
@@ -58,7 +57,7 @@ class Compiled:
         spec.loader.exec_module(self.module)
 
     def __call__(
-        self, function: Function, *arguments: Mapping[str, FloatArray] | float
+        self, function: Function, *arguments: Mapping[str, np.ndarray] | float
     ) -> tuple[Values, list[int]]:
         """The arrays of the result over samples, and what the function returned for each.
 

@@ -23,13 +23,7 @@ from scipy.signal import butter, cheby1, cheby2, ellip, sosfiltfilt, sosfreqz
 
 from samples.random_recordings import fourier_series
 from samples.recorded_torques import MOTOR, lifting
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.analysis.run import Run
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Motion, Trajectory
+from vsacli import Elastic, Motion, Motor, Rigid, Robot, Trajectory, inverse_dynamics, motor_torques
 
 FAMILIES = ("rounded", "pendulum", "controller", "ringing")
 
@@ -217,23 +211,19 @@ def torques(recording: HardRecording, rows: NDArray[np.float64]) -> NDArray[np.f
     names = ("q", "dq", "ddq", "d3q", "d4q", "stiffness", "dstiffness", "ddstiffness")
     unused = np.full((3, rows.shape[1]), np.nan)
     arrays = dict(zip(names, np.concatenate([rows, unused])[:, :, None], strict=True))
-    return np.asarray(compute_block(recording.robot, Motion.of(recording.time, arrays)).tau_motor[:, 0, 0])
+    return np.asarray(motor_torques(recording.robot, Motion.of(recording.time, arrays)).tau_motor[:, 0, 0])
 
 
 def judge_hard(recording: HardRecording) -> Judgment:
     """Compute motor torques along a recording, and compare them with the truth."""
     trajectory = Trajectory.from_samples(recording.time, recording.values[:, None])
-    run = Run(recording.robot, trajectory)
-    blocks = list(run)
+    result = inverse_dynamics(recording.robot, trajectory)
     time, true = recording.time, torques(recording, recording.truth)
     fits = [each.fit.unreliable for each in trajectory.estimates.values()]
     start, end = np.minimum(np.max(fits, axis=0), time[-1] / 4)
     inside = (time >= start) & (time <= time[-1] - end)
-    found, deviation = (
-        np.concatenate([getattr(block, name) for block in blocks])[:, 0, 0]
-        for name in ("tau_motor", "tau_motor_std")
-    )
-    report = run.report()
+    found, deviation = (getattr(result, name)[:, 0, 0] for name in ("tau_motor", "tau_motor_std"))
+    report = result.report
     bound = report.joints[0].uncertainty.variables["tau_motor"].bound
     error, stated = (_relative(rows, true, inside) for rows in (found - true, deviation))
     return Judgment(

@@ -19,7 +19,6 @@ import pytest
 
 from samples.generated_code import Compiled, write_files
 from samples.shipped import shipped_robot
-from vsacli.base.arrays import FloatArray
 from vsacli.base.wrench import WrenchFrame
 from vsacli.control.codegen.project import Project, generate, prefix_of
 from vsacli.control.codegen.self_test import Arrays
@@ -194,7 +193,7 @@ def host_project(
 
 def by_c(
     project: HostProject, name: str, arguments: Sequence[tuple[str, Arrays]]
-) -> tuple[Arrays, FloatArray]:
+) -> tuple[Arrays, np.ndarray]:
     """Results of a function in C for each sample, (samples, ...), and the flags."""
     records = [record_of(project, structure, arrays) for structure, arrays in arguments]
     results, flags = getattr(project.cpu, name)(*records)

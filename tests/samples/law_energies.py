@@ -9,7 +9,7 @@ import numpy as np
 import sympy
 
 from samples.springs import measured
-from vsacli.actuators.laws import Cubic, Exponential, FourBar, Polynomial, Quadratic, Sinh, SpringLaw
+from vsacli import laws
 
 Energy = Callable[[Any], Any]
 """Of the deflection, in sympy's functions."""
@@ -18,7 +18,7 @@ Energy = Callable[[Any], Any]
 class Sample(NamedTuple):
     """A law, and the energy of the spring that it describes."""
 
-    law: SpringLaw
+    law: laws.SpringLaw
     energy: Energy
 
 
@@ -29,14 +29,14 @@ def _four_bar(phi: Any) -> Any:
 _DEFLECTIONS = np.linspace(-0.6, 0.6, 25)
 
 SAMPLES = {
-    "cubic": Sample(Cubic(k=60, k_c=900), lambda phi: 30 * phi**2 + 225 * phi**4),
+    "cubic": Sample(laws.Cubic(k=60, k_c=900), lambda phi: 30 * phi**2 + 225 * phi**4),
     "polynomial": Sample(
-        Polynomial(c1=50, c3=300, c7=4e4), lambda phi: 25 * phi**2 + 75 * phi**4 + 5000 * phi**8
+        laws.Polynomial(c1=50, c3=300, c7=4e4), lambda phi: 25 * phi**2 + 75 * phi**4 + 5000 * phi**8
     ),
-    "sinh": Sample(Sinh(k=5, a=8), lambda phi: 5 * (sympy.cosh(8 * phi) - 1) / 8),
-    "exponential": Sample(Exponential(c=4, a=6), lambda phi: 4 * ((sympy.exp(6 * phi) - 1) / 6 - phi)),
-    "quadratic": Sample(Quadratic(k=300), lambda phi: 100 * phi**3),
-    "four_bar": Sample(FourBar(k=30, ratio=1.4), _four_bar),
+    "sinh": Sample(laws.Sinh(k=5, a=8), lambda phi: 5 * (sympy.cosh(8 * phi) - 1) / 8),
+    "exponential": Sample(laws.Exponential(c=4, a=6), lambda phi: 4 * ((sympy.exp(6 * phi) - 1) / 6 - phi)),
+    "quadratic": Sample(laws.Quadratic(k=300), lambda phi: 100 * phi**3),
+    "four_bar": Sample(laws.FourBar(k=30, ratio=1.4), _four_bar),
     "table": Sample(  # the curve through exact torques of a cubic is that cubic
         measured(_DEFLECTIONS, 60 * _DEFLECTIONS + 900 * _DEFLECTIONS**3),
         lambda phi: 30 * phi**2 + 225 * phi**4,

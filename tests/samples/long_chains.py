@@ -10,9 +10,7 @@ import numpy as np
 from samples.drives import springs
 from samples.robots import random_joint
 from samples.shipped import shipped_robot
-from vsacli.actuators.laws.sinh import Sinh
-from vsacli.robot.joint import Joint
-from vsacli.robot.model import Robot
+from vsacli import Joint, Robot, laws
 
 SHIPPED = ("mixed_3r", "rp_2", "measured_1r", "tendon_1r", "lwr_7r_vsa", "scara_4")
 """Rigid and elastic joints, prismatic ones, springs with tables, and limits among them."""
@@ -35,7 +33,7 @@ def _random_joint(rng: np.random.Generator, number: int) -> Joint:
     joint = random_joint(rng, "random", rng.choice(["R", "P"]))
     if number % 3:
         return joint
-    unlike = (Sinh(k=k, a=a) for k, a in rng.uniform(20, 30, (2, 2)).tolist())
+    unlike = (laws.Sinh(k=k, a=a) for k, a in rng.uniform(20, 30, (2, 2)).tolist())
     return replace(joint, actuator=springs(*unlike))
 
 

@@ -12,28 +12,14 @@ import sympy
 
 from samples.full_model import Drive, Potential, springs_of
 from samples.law_energies import SAMPLES, Energy
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.four_bar import FourBar
-from vsacli.actuators.laws.polynomial import Polynomial
-from vsacli.actuators.mechanisms.mechanism import Mechanism
-from vsacli.actuators.mechanisms.potentials.potential import BranchStart, PotentialRange
-from vsacli.actuators.mechanisms.potentials.potential import Potential as OwnPotential
-from vsacli.actuators.mechanisms.preloaded_cams.cam import Cam
-from vsacli.actuators.mechanisms.preloaded_cams.preloaded_cam import Maccepa
-from vsacli.actuators.mechanisms.ratios.ratio import Awas, Lever, Sine
-from vsacli.actuators.mechanisms.ratios.scales import MeasuredScale, PolynomialScale, Power
-from vsacli.actuators.mechanisms.ratios.variable_ratio import VariableRatio
-from vsacli.actuators.mechanisms.shifted_cams import ShiftedCams
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.serial import Serial
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli import Motor, Serial, laws, mechanisms
 from vsacli.documents.source import Source
 from vsacli.documents.table import CsvTable
 
 INERTIA, DAMPING = (0.3, 0.02), (0.1, 0.05)
 """Of motors 1 and 2."""
 
-OnBranch = Callable[[FloatArray, FloatArray], BoolArray]
+OnBranch = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -56,7 +42,7 @@ class Device:
         scanned_settings: theta_2 to scan where no end bounds it.
     """
 
-    mechanism: Mechanism
+    mechanism: mechanisms.Mechanism
     potential: Potential
     stiffness: tuple[float, float]
     deflections: tuple[float, float]
@@ -110,7 +96,7 @@ def _two_springs(k: float, k_c: float) -> Potential:
     return lambda q, *theta: sum(k / 2 * (each - q) ** 2 + k_c / 4 * (each - q) ** 4 for each in theta)
 
 
-def profile(phi: FloatArray, lift: FloatArray) -> CsvTable:
+def profile(phi: np.ndarray, lift: np.ndarray) -> CsvTable:
     """A table, as if read from a file."""
     return CsvTable(("deflection", "lift"), np.column_stack([phi, lift]), Source("profile.csv", "", None))
 
@@ -145,7 +131,7 @@ def _ratio(scale: Callable[[Any], Any], energy: Callable[[Any], Any]) -> Potenti
     return lambda q, theta_1, theta_2: scale(theta_2) * energy(theta_1 - q)
 
 
-def scale_table(settings: FloatArray, scale: Callable[[FloatArray], FloatArray]) -> CsvTable:
+def scale_table(settings: np.ndarray, scale: Callable[[np.ndarray], np.ndarray]) -> CsvTable:
     """A table, as if read from a file."""
     return CsvTable(
         ("setting", "scale"), np.column_stack([settings, scale(settings)]), Source("scale.csv", "", None)
@@ -162,7 +148,7 @@ def _shifted(energy: Energy) -> Potential:
 
 DEVICES = {
     "shifted_cams": Device(
-        mechanism=ShiftedCams(spring=(SAMPLES["cubic"].law,) * 2),
+        mechanism=mechanisms.ShiftedCams(spring=(SAMPLES["cubic"].law,) * 2),
         potential=_shifted(SAMPLES["cubic"].energy),
         stiffness=(290, 340),
         deflections=(-0.13, 0.13),
@@ -171,7 +157,7 @@ DEVICES = {
         scanned_settings=(-0.1, 1.0),
     ),
     "shifted_cams, the other branch": Device(
-        mechanism=ShiftedCams(spring=(SAMPLES["sinh"].law,) * 2, branch="negative"),
+        mechanism=mechanisms.ShiftedCams(spring=(SAMPLES["sinh"].law,) * 2, branch="negative"),
         potential=_shifted(SAMPLES["sinh"].energy),
         stiffness=(150, 110),
         deflections=(-0.2, 0.2),
@@ -181,14 +167,14 @@ DEVICES = {
         scanned_settings=(-0.5, 0.1),
     ),
     "awas": Device(
-        mechanism=Awas(k=50000, arm=(0.02, 0.12), lead=0.01),
+        mechanism=mechanisms.Awas(k=50000, arm=(0.02, 0.12), lead=0.01),
         potential=_awas(50000, 0.01),
         stiffness=(300, 700),
         deflections=(-0.78, 0.78),
         settings=(2, 12),
     ),
     "awas, lead against the motor": Device(
-        mechanism=Awas(k=30000, arm=(0.03, 0.15), lead=-0.02),
+        mechanism=mechanisms.Awas(k=30000, arm=(0.03, 0.15), lead=-0.02),
         potential=_awas(30000, -0.02),
         stiffness=(600, 200),
         deflections=(-0.78, 0.78),
@@ -196,7 +182,7 @@ DEVICES = {
         anchor=0,
     ),
     "maccepa": Device(
-        mechanism=Maccepa(k=150000, b=0.04, c=0.12, r=0.01, pretension=(0.005, 0.05)),
+        mechanism=mechanisms.Maccepa(k=150000, b=0.04, c=0.12, r=0.01, pretension=(0.005, 0.05)),
         potential=_maccepa(150000, 0.04, 0.12, 0.01),
         stiffness=(200, 350),
         deflections=(-0.2, 0.2),
@@ -204,7 +190,7 @@ DEVICES = {
         scanned=(-1.6, 1.6),
     ),
     "maccepa, long lever, drum against the motor": Device(
-        mechanism=Maccepa(k=100000, b=0.13, c=0.05, r=-0.02, pretension=(0.002, 0.05)),
+        mechanism=mechanisms.Maccepa(k=100000, b=0.13, c=0.05, r=-0.02, pretension=(0.002, 0.05)),
         potential=_maccepa(100000, 0.13, 0.05, -0.02),
         stiffness=(300, 180),
         deflections=(-0.2, 0.2),
@@ -213,11 +199,11 @@ DEVICES = {
         scanned=(-1.6, 1.6),
     ),
     "potential": Device(
-        mechanism=OwnPotential(
+        mechanism=mechanisms.Potential(
             energy="k/2*(r*theta_2)^2 * (phi - bow*sin(2*q))^2",
             constants=(("k", 50000), ("r", 0.01), ("bow", 0.1)),
-            start=BranchStart(theta_1=0, theta_2=10),
-            range=PotentialRange(phi=(-0.8, 0.8), theta_2=(4, 20)),
+            start=mechanisms.BranchStart(theta_1=0, theta_2=10),
+            range=mechanisms.PotentialRange(phi=(-0.8, 0.8), theta_2=(4, 20)),
         ),
         potential=_bowed(50000, 0.01, 0.1),
         stiffness=(300, 500),
@@ -225,11 +211,11 @@ DEVICES = {
         settings=(5, 15),
     ),
     "potential, two springs": Device(
-        mechanism=OwnPotential(
+        mechanism=mechanisms.Potential(
             energy="k/2*((theta_1 - q)^2 + (theta_2 - q)^2) + k_c/4*((theta_1 - q)^4 + (theta_2 - q)^4)",
             constants=(("k", 50), ("k_c", 1000)),
-            start=BranchStart(theta_1=0.2, theta_2=-0.2),
-            range=PotentialRange(phi=(-1, 1), theta_2=(-5, 5)),
+            start=mechanisms.BranchStart(theta_1=0.2, theta_2=-0.2),
+            range=mechanisms.PotentialRange(phi=(-1, 1), theta_2=(-5, 5)),
         ),
         potential=_two_springs(50, 1000),
         stiffness=(220, 300),
@@ -237,7 +223,7 @@ DEVICES = {
         settings=(-0.3, -0.1),
     ),
     "cam": Device(
-        mechanism=Cam(k=CAM_K, r=CAM_R, pretension=(0.005, 0.05), profile=_EVEN),
+        mechanism=mechanisms.Cam(k=CAM_K, r=CAM_R, pretension=(0.005, 0.05), profile=_EVEN),
         potential=_EVEN_POTENTIAL,
         stiffness=(200, 350),
         deflections=(-0.2, 0.2),
@@ -245,7 +231,7 @@ DEVICES = {
         scanned=(-0.8, 0.8),
     ),
     "cam, not symmetric": Device(
-        mechanism=Cam(k=CAM_K, r=CAM_R, pretension=(0.005, 0.05), profile=_UNEVEN),
+        mechanism=mechanisms.Cam(k=CAM_K, r=CAM_R, pretension=(0.005, 0.05), profile=_UNEVEN),
         potential=_UNEVEN_POTENTIAL,
         stiffness=(350, 250),
         deflections=(-0.1, 0.2),
@@ -255,14 +241,14 @@ DEVICES = {
         rest=0.05,
     ),
     "lever": Device(
-        mechanism=Lever(k=20000, length=0.1, pivot=(0.03, 0.08), lead=0.01),
+        mechanism=mechanisms.Lever(k=20000, length=0.1, pivot=(0.03, 0.08), lead=0.01),
         potential=_lever(20000, 0.1, 0.01),
         stiffness=(600, 900),
         deflections=(-0.78, 0.78),
         settings=(3, 8),
     ),
     "lever, lead against the motor": Device(
-        mechanism=Lever(k=50000, length=0.06, pivot=(0.01, 0.05), lead=-0.02),
+        mechanism=mechanisms.Lever(k=50000, length=0.06, pivot=(0.01, 0.05), lead=-0.02),
         potential=_lever(50000, 0.06, -0.02),
         stiffness=(900, 600),
         deflections=(-0.78, 0.78),
@@ -270,8 +256,10 @@ DEVICES = {
         anchor=0,
     ),
     "variable_ratio": Device(  # a jack spring: fewer active coils with theta_2
-        mechanism=VariableRatio(
-            setting=(1, 9), scale=Power(exponent=-1, lead=-1, offset=12), torque=Polynomial(c1=3000)
+        mechanism=mechanisms.VariableRatio(
+            setting=(1, 9),
+            scale=mechanisms.Power(exponent=-1, lead=-1, offset=12),
+            torque=laws.Polynomial(c1=3000),
         ),
         potential=_ratio(lambda s: 1 / (12 - s), lambda phi: 1500 * phi**2),
         stiffness=(400, 700),
@@ -281,8 +269,10 @@ DEVICES = {
         endless=True,
     ),
     "variable_ratio, leaf spring": Device(
-        mechanism=VariableRatio(
-            setting=(-6, 6), scale=Power(exponent=-3, lead=0.01, offset=0.1), torque=Polynomial(c1=0.5)
+        mechanism=mechanisms.VariableRatio(
+            setting=(-6, 6),
+            scale=mechanisms.Power(exponent=-3, lead=0.01, offset=0.1),
+            torque=laws.Polynomial(c1=0.5),
         ),
         potential=_ratio(lambda s: (0.1 + 0.01 * s) ** -3, lambda phi: 0.25 * phi**2),
         stiffness=(900, 600),
@@ -293,8 +283,10 @@ DEVICES = {
         endless=True,
     ),
     "variable_ratio, sine": Device(
-        mechanism=VariableRatio(
-            setting=(0, 4), scale=PolynomialScale(c0=1, c1=0.3, c3=0.05), torque=Sine(k=300, ratio=3)
+        mechanism=mechanisms.VariableRatio(
+            setting=(0, 4),
+            scale=mechanisms.PolynomialScale(c0=1, c1=0.3, c3=0.05),
+            torque=mechanisms.Sine(k=300, ratio=3),
         ),
         potential=_ratio(lambda s: 1 + 0.3 * s + 0.05 * s**3, lambda phi: 300 / 9 * (1 - sympy.cos(3 * phi))),
         stiffness=(500, 900),
@@ -302,12 +294,12 @@ DEVICES = {
         settings=(0, 4),
     ),
     "variable_ratio, measured scale": Device(  # a spline through the points of a cubic is that cubic
-        mechanism=VariableRatio(
+        mechanism=mechanisms.VariableRatio(
             setting=(0, 3),
-            scale=MeasuredScale(
+            scale=mechanisms.MeasuredScale(
                 file=scale_table(np.linspace(-0.1, 3.1, 7), lambda s: 3 - 0.5 * s - 0.02 * s**3)
             ),
-            torque=Cubic(k=300, k_c=500),
+            torque=laws.Cubic(k=300, k_c=500),
         ),
         potential=_ratio(lambda s: 3 - 0.5 * s - 0.02 * s**3, lambda phi: 150 * phi**2 + 125 * phi**4),
         stiffness=(800, 500),
@@ -317,8 +309,10 @@ DEVICES = {
         anchor=0,
     ),
     "variable_ratio, torque that turns": Device(
-        mechanism=VariableRatio(
-            setting=(0.5, 2), scale=Power(exponent=1), torque=Polynomial(c1=300, c9=300 / 0.4**8)
+        mechanism=mechanisms.VariableRatio(
+            setting=(0.5, 2),
+            scale=mechanisms.Power(exponent=1),
+            torque=laws.Polynomial(c1=300, c9=300 / 0.4**8),
         ),
         potential=_ratio(lambda s: s, lambda phi: 150 * phi**2 + 30 / 0.4**8 * phi**10),
         stiffness=(350, 500),
@@ -328,7 +322,9 @@ DEVICES = {
         falls=True,
     ),
     "variable_ratio, four bar": Device(
-        mechanism=VariableRatio(setting=(1, 4), scale=Power(exponent=2), torque=FourBar(k=20, ratio=4)),
+        mechanism=mechanisms.VariableRatio(
+            setting=(1, 4), scale=mechanisms.Power(exponent=2), torque=laws.FourBar(k=20, ratio=4)
+        ),
         potential=_ratio(lambda s: s**2, _four_bar(20, 4)),
         stiffness=(300, 500),
         deflections=(-0.26, 0.26),  # g'^2 = g g'' at 0.2644 rad

@@ -10,15 +10,13 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot, Trajectory
 from vsacli.base.signals import DAMPING
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WrenchFrame, frames_by_tool
-from vsacli.robot.model import Robot
 from vsacli.robot.models.exported_model import exported_tool_names
 from vsacli.robot.models.mjcf import mjcf_model
 from vsacli.robot.models.mjcf_drives import Start, motor_name
-from vsacli.trajectory.trajectory import Trajectory
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -51,9 +49,9 @@ def compiled(robot: Robot, start: Start | None = None) -> Iterator[Compiled]:
 class Coordinates(NamedTuple):
     """Positions, velocities, accelerations of the model's coordinates along a run, each (samples, nq)."""
 
-    positions: FloatArray
-    velocities: FloatArray
-    accelerations: FloatArray
+    positions: np.ndarray
+    velocities: np.ndarray
+    accelerations: np.ndarray
 
 
 def coordinates(robot: Robot, model: Any, result: Any) -> Coordinates:
@@ -70,7 +68,7 @@ def coordinates(robot: Robot, model: Any, result: Any) -> Coordinates:
     return rows
 
 
-def torques(robot: Robot, result: Any) -> FloatArray:
+def torques(robot: Robot, result: Any) -> np.ndarray:
     """(samples, motors) in the order of exported columns."""
     columns = [
         result.tau_motor[:, index, side]
@@ -80,7 +78,7 @@ def torques(robot: Robot, result: Any) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
-def controls(robot: Robot, result: Any) -> FloatArray:
+def controls(robot: Robot, result: Any) -> np.ndarray:
     """Torques of the motors, then the damping of each damper."""
     columns = list(torques(robot, result).T)
     for index, joint in enumerate(robot.joints):
@@ -90,8 +88,8 @@ def controls(robot: Robot, result: Any) -> FloatArray:
 
 
 def forces_of_tools(
-    robot: Robot, frame: WrenchFrame, wrench: FloatArray, model: Any, data: Any
-) -> FloatArray:
+    robot: Robot, frame: WrenchFrame, wrench: np.ndarray, model: Any, data: Any
+) -> np.ndarray:
     """Forces on MuJoCo's coordinates of the wrenches on the tools, six components each, in their frames."""
     total = np.zeros(model.nv)
     for name, of_tool, components in zip(
@@ -130,7 +128,7 @@ def inverse_error(robot: Robot, result: Any, frame: WrenchFrame = ()) -> float:
     return float(np.max(errors) / np.abs(result.tau_motor[np.isfinite(result.tau_motor)]).max())
 
 
-def driven(robot: Robot, result: Any, frame: WrenchFrame = ()) -> FloatArray:
+def driven(robot: Robot, result: Any, frame: WrenchFrame = ()) -> np.ndarray:
     """Positions of MuJoCo's coordinates less those of a run, (steps, nq).
 
     A step of RK4 goes over two samples, so that the torques of all its stages are known, and the wrenches on
@@ -158,8 +156,8 @@ def driven(robot: Robot, result: Any, frame: WrenchFrame = ()) -> FloatArray:
 
 
 def accelerations(
-    robot: Robot, state: Any, torque: FloatArray, damping: FloatArray | None
-) -> tuple[FloatArray, FloatArray]:
+    robot: Robot, state: Any, torque: np.ndarray, damping: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Of joints and of motors that move by themselves, NaN where there is none, at states (samples, ...)."""
     found_q, found_theta = np.full(state.q.shape, np.nan), np.full(state.theta.shape, np.nan)
     places = [
@@ -200,8 +198,8 @@ def _dampers(joint: Any) -> int:
 
 
 def settled_compliance(
-    robot: Robot, result: Any, wrench: FloatArray, step: float, tool: int = 0
-) -> FloatArray:
+    robot: Robot, result: Any, wrench: np.ndarray, step: float, tool: int = 0
+) -> np.ndarray:
     """Displacement and rotation of a tool per wrench in base axes, (6, 6), motors held as in sample 0.
 
     Half the difference of two equilibria with a further wrench of this step, N and N m, on the tool; the
@@ -215,7 +213,7 @@ def settled_compliance(
         sites = [model.site(name) for name in exported_tool_names(robot)]
         site = sites[tool]
 
-        def torques_at(positions: FloatArray, load: FloatArray) -> FloatArray:
+        def torques_at(positions: np.ndarray, load: np.ndarray) -> np.ndarray:
             data.qpos[:], data.qvel[:] = held, 0
             data.qpos[places] = positions
             mujoco.mj_kinematics(model, data)

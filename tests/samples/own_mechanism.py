@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from vsacli import mechanisms
-from vsacli.base.arrays import FloatArray
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,7 @@ class AdjustableArm(mechanisms.Mechanism):
     def setting_range(self) -> tuple[float, float]:
         return self.range
 
-    def partials(self, phi: FloatArray, s: FloatArray) -> mechanisms.Partials:
+    def partials(self, phi: np.ndarray, s: np.ndarray) -> mechanisms.Partials:
         k, zero = self.k, np.zeros_like(phi)
         return mechanisms.Partials(
             energy=k / 2 * (s * phi) ** 2, setting_torque=k * s * phi**2, setting_stiffness=k * phi**2,
@@ -38,7 +37,7 @@ class AdjustableArm(mechanisms.Mechanism):
             T_ppp=zero, T_pps=zero, T_pss=2 * k + zero,
         )  # fmt: skip
 
-    def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> mechanisms.PairSolution:
+    def solve(self, tau_e: np.ndarray, stiffness: np.ndarray, _q: np.ndarray) -> mechanisms.PairSolution:
         low, high = (np.full_like(tau_e, self.k * end**2) for end in self.range)
         demand = np.clip(stiffness, low, high)
         never = np.zeros_like(tau_e, dtype=bool)

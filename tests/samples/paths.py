@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from vsacli import Joint, Robot
 from vsacli.dynamics.elastic_torques import carriers, link_constants, tool_loads
 from vsacli.dynamics.recursion import recursion
 from vsacli.dynamics.recursion_inputs import JointState, RecursionInputs
-from vsacli.robot.joint import Joint
 from vsacli.robot.kinematics import base_gravity
-from vsacli.robot.model import Robot
 
 ComplexArray = npt.NDArray[np.complex128]
 

@@ -7,13 +7,7 @@ import dataclasses
 import numpy as np
 
 from samples.robots import random_robot
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.arrays import FloatArray
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.dynamics.forward import State
-from vsacli.robot.model import Robot
+from vsacli import Elastic, Motor, Rigid, Robot, State, link_torques
 
 
 def with_actuators(robot: Robot, actuators: dict[int, Elastic | Rigid]) -> Robot:
@@ -47,7 +41,7 @@ def random_state(robot: Robot, samples: int, seed: int) -> State:
     return State(q=q, dq=dq, theta=q[..., None] + phi, dtheta=rng.uniform(-3, 3, (*shape, 2)))
 
 
-def torques_of(robot: Robot, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+def torques_of(robot: Robot, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
     """tau_e by the inverse recursion, whose route to it is another one."""
     zero = np.zeros_like(q)
     return link_torques(robot, q, dq, ddq, zero, zero)[0]

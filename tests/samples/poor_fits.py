@@ -11,8 +11,7 @@ import numpy as np
 
 from samples.excited import Excitation, Recorded, excited
 from samples.shipped import shipped_robot
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Robot
+from vsacli import Robot
 
 LAWS: tuple[dict[str, Any], ...] = (
     {},
@@ -40,11 +39,11 @@ class Case(NamedTuple):
 
     robot: Robot
     record: Recorded
-    speed: FloatArray
-    deflection: FloatArray
+    speed: np.ndarray
+    deflection: np.ndarray
     random: np.random.Generator
 
-    def with_torque(self, further: FloatArray) -> Recorded:
+    def with_torque(self, further: np.ndarray) -> Recorded:
         """The record with a further torque of its motors, by the random noise of its sensors."""
         return self.noisy(self.record._replace(tau_motor=self.record.tau_motor + further))
 
@@ -82,30 +81,30 @@ def random_case(seed: int, *, joints: int = 1) -> Case:
     return Case(robot, record, speed, record.theta - record.q[..., None], random)
 
 
-def _quadratic(case: Case) -> FloatArray:
+def _quadratic(case: Case) -> np.ndarray:
     return np.asarray(case.random.uniform(1, 3) * case.speed * np.abs(case.speed))
 
 
-def _stribeck(case: Case) -> FloatArray:
+def _stribeck(case: Case) -> np.ndarray:
     slow = case.random.uniform(0.1, 0.3)
     size = case.random.uniform(1.5, 4)
     return np.asarray(size * np.sign(case.speed) * np.exp(-((case.speed / slow) ** 2)))
 
 
-def _stiffer(case: Case) -> FloatArray:
+def _stiffer(case: Case) -> np.ndarray:
     """From some deflection on, within the range that the motion uses."""
     size = np.abs(case.deflection)
     beyond = np.maximum(size - case.random.uniform(0.5, 0.8) * size.max(), 0.0)
     return np.asarray(case.random.uniform(300, 1000) * np.sign(case.deflection) * beyond)
 
 
-def _gain_of_motor(case: Case) -> FloatArray:
+def _gain_of_motor(case: Case) -> np.ndarray:
     gain = np.zeros(case.speed.shape)
     gain[..., case.random.integers(2)] = 0.03
     return np.asarray(gain * case.record.tau_motor)
 
 
-PLANTS: dict[str, Callable[[Case], FloatArray]] = {
+PLANTS: dict[str, Callable[[Case], np.ndarray]] = {
     "quadratic friction": _quadratic,
     "Stribeck's friction": _stribeck,
     "stiffer springs": _stiffer,

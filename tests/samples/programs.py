@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
 from vsacli.compute.tracing import Program, Symbol, Tape, TracedArray, cells_of
 
 Values = list[Any]
@@ -29,7 +28,7 @@ def traced(function: Callable[..., Any], count: int) -> Program:
     return tape.program([cell for result in results for cell in cells_of(result).ravel()])
 
 
-def carry_out(program: Program, inputs: Sequence[FloatArray]) -> Values:
+def carry_out(program: Program, inputs: Sequence[np.ndarray]) -> Values:
     """The outputs for rows of samples; constants among them are as they are."""
     found: dict[int, Any] = {symbol.index: row for symbol, row in zip(program.inputs, inputs, strict=True)}
 

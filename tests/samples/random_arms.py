@@ -5,16 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from samples.robots import inertia_from_tensor
+from vsacli import Antagonistic, DenavitHartenberg, Elastic, Friction, Joint, Link, Motor, Rigid, Robot, laws
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.friction import Friction
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.polynomial import Polynomial
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.robot.joint import DenavitHartenberg, Joint, Link
-from vsacli.robot.model import Robot
 from vsacli.robot.parameters import parameters
 
 KINDS = ("rigid", "elastic", "antagonistic")
@@ -68,11 +60,11 @@ def random_drive(kind: str, rng: np.random.Generator) -> Actuator:
     if kind == "rigid":
         return Rigid(motor=motor)
     if kind == "antagonistic":
-        spring = Cubic(k=rng.uniform(300, 500), k_c=rng.uniform(1500, 2500))
+        spring = laws.Cubic(k=rng.uniform(300, 500), k_c=rng.uniform(1500, 2500))
         return Antagonistic(motor=(motor, motor), spring=(spring, spring))
-    hardening = Cubic(k=rng.uniform(300, 600), k_c=rng.uniform(1500, 3000))
+    hardening = laws.Cubic(k=rng.uniform(300, 600), k_c=rng.uniform(1500, 3000))
     return Elastic(
-        motor=motor, spring=hardening if rng.random() < 0.5 else Polynomial(c1=rng.uniform(300, 900))
+        motor=motor, spring=hardening if rng.random() < 0.5 else laws.Polynomial(c1=rng.uniform(300, 900))
     )
 
 

@@ -11,17 +11,23 @@ from scipy.interpolate import make_interp_spline
 
 from samples.noisy_records import MOTIONS, Record, record
 from samples.random_recordings import Recording
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.analysis.run import Run
+from vsacli import (
+    Antagonistic,
+    DenavitHartenberg,
+    Elastic,
+    Inertia,
+    Joint,
+    Link,
+    Motion,
+    Motor,
+    Robot,
+    Trajectory,
+    inverse_dynamics,
+    laws,
+    motor_torques,
+)
 from vsacli.base.signals import STIFFNESS
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile
-from vsacli.trajectory.trajectory import Motion, Trajectory
 
 STIFFNESS_ASKED = 1200.0
 """Of the antagonistic arm, N m/rad."""
@@ -76,7 +82,7 @@ def lifting(actuator, *, horizontal: bool = False) -> Robot:
     return Robot(name="arm", gravity=gravity, joints=(joint,))
 
 
-MOTOR, SPRING = Motor(inertia=1.98, damping=1e-4), Cubic(k=400, k_c=2000)
+MOTOR, SPRING = Motor(inertia=1.98, damping=1e-4), laws.Cubic(k=400, k_c=2000)
 ARMS = {
     "antagonistic": lifting(Antagonistic(motor=(MOTOR, MOTOR), spring=(SPRING, SPRING))),
     "elastic": lifting(Elastic(motor=MOTOR, stiffness=1000.0)),
@@ -103,7 +109,7 @@ def robot_of(arm: Arm) -> Robot:
     motor = Motor(inertia=arm.motor_inertia, damping=1e-4)
     if not arm.antagonistic:
         return lifting(Elastic(motor=motor, stiffness=arm.k), horizontal=arm.horizontal)
-    spring = Cubic(k=arm.k, k_c=arm.k_c)
+    spring = laws.Cubic(k=arm.k, k_c=arm.k_c)
     return lifting(Antagonistic(motor=(motor, motor), spring=(spring, spring)), horizontal=arm.horizontal)
 
 
@@ -112,17 +118,15 @@ def judge(recording: Recording) -> Verdict:
     q, stiffness = recording.position.recorded[:, None], recording.stiffness
     firm = {} if stiffness is None else {"stiffness": stiffness.recorded[:, None]}
     trajectory = Trajectory.from_samples(recording.time, q, **firm)
-    run = Run(robot_of(recording.arm), trajectory)
-    blocks = list(run)
+    result = inverse_dynamics(robot_of(recording.arm), trajectory)
     true = motor_torque(recording.arm, *recording.truth).T
     starts, ends = zip(*(each.fit.unreliable for each in trajectory.estimates.values()), strict=True)
     time = recording.time
     inside = (time >= min(max(starts), time[-1] / 4)) & (time <= time[-1] - min(max(ends), time[-1] / 4))
     torque, deviation = (
-        np.concatenate([getattr(block, name) for block in blocks])[inside, 0, : true.shape[1]]
-        for name in ("tau_motor", "tau_motor_std")
+        getattr(result, name)[inside, 0, : true.shape[1]] for name in ("tau_motor", "tau_motor_std")
     )
-    return Verdict(run.report().verdict, _error(torque, deviation, true[inside]))
+    return Verdict(result.report.verdict, _error(torque, deviation, true[inside]))
 
 
 def outcomes(motion: str, color: str, seed: int, rate: int) -> Iterator[Outcome]:
@@ -136,15 +140,15 @@ def outcomes(motion: str, color: str, seed: int, rate: int) -> Iterator[Outcome]
     inside = (of.time >= start) & (of.time <= end)
     for name, robot in ARMS.items():
         chosen = {"stiffness": firm} if name == "antagonistic" else {}
-        run = Run(robot, Trajectory(recorded.times, recorded.position, chosen, name=motion))
-        blocks = list(run)
-        true = compute_block(robot, exact)
+        trajectory = Trajectory(recorded.times, recorded.position, chosen, name=motion)
+        result = inverse_dynamics(robot, trajectory)
+        true = motor_torques(robot, exact)
         motors = slice(robot.joints[0].actuator.motor_count)
         torque, deviation, fourth, of_fourth = (
-            np.concatenate([getattr(block, variable) for block in blocks])[inside, 0]
+            getattr(result, variable)[inside, 0]
             for variable in ("tau_motor", "tau_motor_std", "d4q", "d4q_std")
         )
-        report = run.report()
+        report = result.report
         yield Outcome(
             arm=name,
             verdict=report.verdict,

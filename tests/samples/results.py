@@ -14,17 +14,13 @@ from typing import Any
 import numpy as np
 
 from samples.command_line import WITHOUT_BYTECODE
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
+from vsacli import Antagonistic, DenavitHartenberg, Inertia, Joint, Limits, Link, Motor, Robot, laws
 from vsacli.base.flags import FLAG_BITS
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import WRENCH
 from vsacli.base.variables import OF_ANY_ROBOT, UNCERTAIN, VARIABLES, Block
 from vsacli.documents.source import Source
 from vsacli.results.store.writer import ResultWriter
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Limits, Link
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.trajectory.profile import WrenchProfile
 
@@ -48,7 +44,7 @@ class PlannedTrajectory:
 
 
 def joint(name: str, kind: str, index: int = 0) -> Joint:
-    side = Cubic(k=400.0 + index, k_c=2000.0)
+    side = laws.Cubic(k=400.0 + index, k_c=2000.0)
     return Joint(
         name=name,
         type=kind,

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from vsacli import Robot
 from vsacli.base import file_formats
 from vsacli.documents.fields import declared_fields
 from vsacli.documents.record_values import value_as_json
 from vsacli.documents.table import CsvTable
-from vsacli.robot.model import Robot
 
 
 def fields(record: Any) -> dict[str, Any]:

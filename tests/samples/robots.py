@@ -8,13 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws import SpringLaw
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.motor import Motor
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
+from vsacli import Antagonistic, DenavitHartenberg, Inertia, Joint, Link, Motor, Robot, laws
 
 JOINT_TYPES = {"R": "revolute", "P": "prismatic"}
 ODD_GRAVITY = (3.1, -6.4, -4.7)
@@ -23,10 +17,10 @@ ODD_GRAVITY = (3.1, -6.4, -4.7)
 RATE_SCALES = (math.pi, 5.0, 50.0, 500.0, 5000.0)
 """Half-widths of q .. d4q in `random_motion`: fast enough that velocity products outweigh gravity."""
 
-MotionArrays = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+MotionArrays = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-def inertia_from_tensor(tensor: FloatArray) -> Inertia:
+def inertia_from_tensor(tensor: np.ndarray) -> Inertia:
     """The record of a symmetric 3x3 tensor."""
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = tensor.tolist()
     return Inertia(xx=xx, yy=yy, zz=zz, xy=xy, xz=xz, yz=yz)
@@ -55,15 +49,15 @@ def random_dh(rng: np.random.Generator) -> DenavitHartenberg:
     return DenavitHartenberg(a=lengths[0], alpha=angles[0], d=lengths[1], theta=angles[1])
 
 
-def alike_springs() -> tuple[SpringLaw, SpringLaw]:
+def alike_springs() -> tuple[laws.SpringLaw, laws.SpringLaw]:
     """The springs of Table I."""
-    return (Cubic(k=400, k_c=2000), Cubic(k=400, k_c=2000))
+    return (laws.Cubic(k=400, k_c=2000), laws.Cubic(k=400, k_c=2000))
 
 
 def random_actuator(rng: np.random.Generator) -> Antagonistic:
     """Motors and cubic springs that differ between the two sides."""
     first, second = (Motor(inertia=rng.uniform(0.5, 4), damping=rng.uniform(0, 0.1)) for _ in range(2))
-    pull, push = (Cubic(k=rng.uniform(300, 600), k_c=rng.uniform(1500, 3000)) for _ in range(2))
+    pull, push = (laws.Cubic(k=rng.uniform(300, 600), k_c=rng.uniform(1500, 3000)) for _ in range(2))
     return Antagonistic(motor=(first, second), spring=(pull, push))
 
 
@@ -125,7 +119,7 @@ def random_motion(robot: Robot, samples: int, seed: int) -> MotionArrays:
     return q, dq, ddq, d3q, d4q
 
 
-def at_rest(robot: Robot, q: FloatArray) -> MotionArrays:
+def at_rest(robot: Robot, q: np.ndarray) -> MotionArrays:
     """The motion that stays at each row of q, shape (samples, joints)."""
     zero = np.zeros((len(q), len(robot.joints)))
     return q, zero, zero, zero, zero
@@ -142,7 +136,7 @@ def still_joint(name: str, letter: str = "R", dh: DenavitHartenberg | None = Non
     )
 
 
-def with_gravity(robot: Robot, gravity: Sequence[float] | FloatArray) -> Robot:
+def with_gravity(robot: Robot, gravity: Sequence[float] | np.ndarray) -> Robot:
     """The same robot elsewhere."""
     x, y, z = map(float, gravity)
     return dataclasses.replace(robot, gravity=(x, y, z))

@@ -27,7 +27,7 @@ PRETENSION = Signal(
 
 if __name__ == "__main__":
     COMMANDED[PRETENSION.key] = PRETENSION
-    from vsacli.actuators.antagonistic import Antagonistic
+    from vsacli import Antagonistic
     from vsacli.actuators.kinds import ACTUATORS
     from vsacli.cli.main import run
 

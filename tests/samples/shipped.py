@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from samples.command_line import REPOSITORY
-from vsacli import Trajectory, load_robot, load_trajectory
+from vsacli import Robot, Trajectory, load_robot, load_trajectory
 from vsacli.files.examples import examples
-from vsacli.robot.model import Robot
 
 EXAMPLES = examples()
 """All of them; each robot is read when it is needed first, and keeps what is computed of its springs."""

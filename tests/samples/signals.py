@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from vsacli.base.arrays import FloatArray
+import numpy as np
+
 from vsacli.base.signals import STIFFNESS
 
 
-def by_name(*stiffness: FloatArray) -> dict[str, FloatArray]:
+def by_name(*stiffness: np.ndarray) -> dict[str, np.ndarray]:
     """A stiffness and its two derivatives."""
     return dict(zip(STIFFNESS.names, stiffness, strict=True))

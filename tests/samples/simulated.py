@@ -7,27 +7,19 @@ import dataclasses
 import numpy as np
 from scipy.linalg import expm
 
+from samples.moves import move
 from samples.robots import vsa_3r
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
-from vsacli.control.gains import Gains
+from vsacli import Elastic, Gains, InitialError, Motor, Robot, State, Tolerances, Trajectory, motor_torques
+from vsacli.base.signals import WRENCH
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, LinearizingFeedback
 from vsacli.control.simulation.ending import Budget
 from vsacli.control.simulation.history import History, concatenate_histories, continuous, histories
-from vsacli.control.simulation.integrator import Integrator, Tolerances
+from vsacli.control.simulation.integrator import Integrator
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
-from vsacli.control.simulation.start import InitialError
 from vsacli.control.simulation.tabulated import TabulatedReference
-from vsacli.dynamics.forward import State
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.model import Robot
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.profile import WrenchProfile
-from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 
 def short_motion(
@@ -42,18 +34,12 @@ def short_motion(
     """Rest to rest, each joint by `size` to and fro in turn; `wrench` is the frame of one that sets in."""
     span = (0.0, duration)
     ends = tuple(size * (-1) ** joint for joint in range(joints))
-    position = RestToRest(signal=POSITION, span=span, degree=7, start=(0.1,) * joints, end=ends)
     low, high = ((end,) * joints for end in stiffness)
     force = RestToRest(
         signal=WRENCH, span=span, degree=3, start=(0,) * 6, end=(15.0, -10.0, 12.0, 1.0, 2.0, -1.5)
     )
-    return Trajectory(
-        UniformTimes(duration, rate),
-        position,
-        {"stiffness": RestToRest(signal=STIFFNESS, span=span, degree=3, start=low, end=high)},
-        wrench=None if wrench is None else WrenchProfile(force, wrench),
-        name="short",
-    )
+    push = None if wrench is None else WrenchProfile(force, wrench)
+    return move(duration, rate, ((0.1,) * joints, ends), stiffness=(low, high), wrench=push, name="short")
 
 
 def mixed_3r() -> tuple[Robot, Robot]:
@@ -73,7 +59,7 @@ def start_of(robot: Robot, paired: Robot, trajectory: Trajectory, error: Initial
     command = dataclasses.replace(
         command, q=command.q + error.q, commanded={**command.commanded, "stiffness": stiffness}
     )
-    block = compute_block(paired, command)
+    block = motor_torques(paired, command)
     theta, dtheta = block.theta[0].copy(), block.dtheta[0].copy()
     for index, joint in enumerate(robot.joints):
         if isinstance(joint.actuator, Elastic):
@@ -99,8 +85,8 @@ def linearized_run(
 
 
 def error_course(
-    poles: list[complex], first: float, times: FloatArray, *, integral: bool = False
-) -> FloatArray:
+    poles: list[complex], first: float, times: np.ndarray, *, integral: bool = False
+) -> np.ndarray:
     """Solution of the linear error dynamics (33) from (first, 0, 0, ...), with the integral zero at first."""
     companion = np.diag(np.ones(len(poles) - 1), 1)
     companion[-1] = -np.poly(poles).real[:0:-1]

@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.base.signals import POSITION
-from vsacli.robot.joint import DenavitHartenberg, Inertia, Joint, Link
-from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import RestToRest
-from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
+from samples.moves import move
+from vsacli import DenavitHartenberg, Elastic, Inertia, Joint, Link, Motor, Rigid, Robot, Trajectory
 
 LINK_INERTIA = 0.5
 """kg m^2 (kg)."""
@@ -36,5 +29,4 @@ def rigid_joint(motor_inertia: float, joint_type: str = "revolute") -> Robot:
 
 def step_of(size: float, duration: float = 1.0, rate: float = 50) -> Trajectory:
     """Rest to rest from 0.2 by a size."""
-    position = RestToRest(signal=POSITION, span=(0.0, duration), degree=9, start=(0.2,), end=(0.2 + size,))
-    return Trajectory(UniformTimes(duration, rate), position, {}, name="step")
+    return move(duration, rate, ((0.2,), (0.2 + size,)), degrees=(9, 3), name="step")

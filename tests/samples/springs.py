@@ -5,28 +5,17 @@ from __future__ import annotations
 import numpy as np
 from oracles import spring_scan as scan
 
-from vsacli.actuators.laws import (
-    Cubic,
-    Exponential,
-    FourBar,
-    PairSolution,
-    Polynomial,
-    Quadratic,
-    Sinh,
-    SpringLaw,
-)
-from vsacli.actuators.laws.table import MeasuredSpring
-from vsacli.base.arrays import FloatArray
+from vsacli import laws
 from vsacli.documents.source import Source
 from vsacli.documents.table import CsvTable
 
-Spring = tuple[SpringLaw, scan.Curve]
+Spring = tuple[laws.SpringLaw, scan.Curve]
 
 
-def measured(deflection: FloatArray, torque: FloatArray) -> MeasuredSpring:
+def measured(deflection: np.ndarray, torque: np.ndarray) -> laws.Table:
     """The spring of a table, as if read from a file."""
     rows = np.column_stack([deflection, torque])
-    return MeasuredSpring(file=CsvTable(("deflection", "torque"), rows, Source("spring.csv", "", None)))
+    return laws.Table(file=CsvTable(("deflection", "torque"), rows, Source("spring.csv", "", None)))
 
 
 def sampled(curve: scan.Curve, low: float, high: float, rows: int) -> Spring:
@@ -37,28 +26,28 @@ def sampled(curve: scan.Curve, low: float, high: float, rows: int) -> Spring:
 
 SPRINGS: dict[str, tuple[Spring, Spring]] = {
     "cubic": (
-        (Cubic(k=20, k_c=300), scan.polynomial(20, 300)),
-        (Cubic(k=45, k_c=150), scan.polynomial(45, 150)),
+        (laws.Cubic(k=20, k_c=300), scan.polynomial(20, 300)),
+        (laws.Cubic(k=45, k_c=150), scan.polynomial(45, 150)),
     ),
     "polynomial": (
-        (Polynomial(c1=15, c3=100, c5=900), scan.polynomial(15, 100, 900)),
-        (Polynomial(c1=30, c3=1, c9=9000), scan.polynomial(30, 1, 0, 0, 9000)),
+        (laws.Polynomial(c1=15, c3=100, c5=900), scan.polynomial(15, 100, 900)),
+        (laws.Polynomial(c1=30, c3=1, c9=9000), scan.polynomial(30, 1, 0, 0, 9000)),
     ),
     "sinh": (
-        (Sinh(k=1.5, a=8), scan.sinh(1.5, 8)),
-        (Sinh(k=3, a=5), scan.sinh(3, 5)),
+        (laws.Sinh(k=1.5, a=8), scan.sinh(1.5, 8)),
+        (laws.Sinh(k=3, a=5), scan.sinh(3, 5)),
     ),
     "exponential": (
-        (Exponential(c=0.8, a=6), scan.exponential(0.8, 6)),
-        (Exponential(c=2, a=4), scan.exponential(2, 4)),
+        (laws.Exponential(c=0.8, a=6), scan.exponential(0.8, 6)),
+        (laws.Exponential(c=2, a=4), scan.exponential(2, 4)),
     ),
     "quadratic": (
-        (Quadratic(k=90), scan.quadratic(90)),
-        (Quadratic(k=40), scan.quadratic(40)),
+        (laws.Quadratic(k=90), scan.quadratic(90)),
+        (laws.Quadratic(k=40), scan.quadratic(40)),
     ),
     "four_bar": (
-        (FourBar(k=40, ratio=2.2), scan.four_bar(40, 2.2)),
-        (FourBar(k=150, ratio=1.6), scan.four_bar(150, 1.6)),
+        (laws.FourBar(k=40, ratio=2.2), scan.four_bar(40, 2.2)),
+        (laws.FourBar(k=150, ratio=1.6), scan.four_bar(150, 1.6)),
     ),
     "table": (
         sampled(scan.polynomial(18, 200, 500), -0.6, 0.6, 41),
@@ -79,7 +68,10 @@ def on_side_2(spring: Spring) -> Spring:
 
 
 def residuals(
-    pair: tuple[SpringLaw, SpringLaw], found: PairSolution, tau_e: FloatArray, stiffness: FloatArray
+    pair: tuple[laws.SpringLaw, laws.SpringLaw],
+    found: laws.PairSolution,
+    tau_e: np.ndarray,
+    stiffness: np.ndarray,
 ) -> float:
     """Largest scaled residual of (14)."""
     phi = (found.phi_1, found.phi_2)
@@ -89,7 +81,7 @@ def residuals(
     return float(np.max([torque, np.abs(sigma_1 + sigma_2 - stiffness) / stiffness]))
 
 
-def stiffness_under(spring: Cubic, torque: FloatArray) -> FloatArray:
+def stiffness_under(spring: laws.Cubic, torque: np.ndarray) -> np.ndarray:
     """Stiffness of a cubic spring that carries a torque, by the formula for roots of cubics."""
     peak = np.sqrt(spring.k / (3 * spring.k_c))
     x = 2 * np.sinh(np.arcsinh(1.5 * torque / (spring.k * peak)) / 3)

@@ -16,17 +16,19 @@ import pytest
 
 from samples.robots import random_robot
 from samples.shipped import shipped_run
-from vsacli import Trajectory
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.damper import Damper
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.friction import Friction
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.mechanisms.ratios.ratio import Awas
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.rigid import Rigid
-from vsacli.actuators.serial import Serial
-from vsacli.robot.model import Robot
+from vsacli import (
+    Antagonistic,
+    Damper,
+    Elastic,
+    Friction,
+    Motor,
+    Rigid,
+    Robot,
+    Serial,
+    Trajectory,
+    laws,
+    mechanisms,
+)
 
 Run = tuple[Robot, Trajectory]
 
@@ -299,8 +301,8 @@ def _pair(coupled: bool) -> Antagonistic:
         Motor(inertia=2e-4, damping=1e-4, friction=Friction(**geared), **electrical),  # type: ignore[arg-type]
         _motor(0.6, friction=sharp if coupled else friction),
     )
-    springs = (Cubic(k=400, k_c=2000), Cubic(k=500, k_c=2500))
-    return Antagonistic(motor=motors, spring=springs, coupling=Cubic(k=60, k_c=200) if coupled else None)
+    springs = (laws.Cubic(k=400, k_c=2000), laws.Cubic(k=500, k_c=2500))
+    return Antagonistic(motor=motors, spring=springs, coupling=laws.Cubic(k=60, k_c=200) if coupled else None)
 
 
 def _motion(robot: Robot, stiffness: tuple[float, float]) -> Trajectory:
@@ -331,7 +333,7 @@ def _pairs() -> Run:
 def _serial() -> Run:
     motors = _motor(0.3), _motor(0.02)
     robot = random_robot("R", 4)
-    awas = Awas(k=50000, arm=(0.02, 0.12), lead=0.01)
+    awas = mechanisms.Awas(k=50000, arm=(0.02, 0.12), lead=0.01)
     actuator = Serial(motor=motors, coupled_inertia=0.03, mechanism=awas)
     robot = replace(robot, joints=(replace(robot.joints[0], actuator=actuator),), gravity=(0.0, -2.0, 1.0))
     return robot, _motion(robot, (400.0, 800.0))
@@ -340,7 +342,7 @@ def _serial() -> Run:
 def _springs() -> Run:
     robot = random_robot("RRR", 5)
     actuators = (
-        Elastic(motor=_motor(0.5), spring=Cubic(k=400, k_c=20000)),
+        Elastic(motor=_motor(0.5), spring=laws.Cubic(k=400, k_c=20000)),
         Elastic(motor=_motor(0.5), stiffness=900.0),
         Rigid(motor=_motor(0.5)),
     )

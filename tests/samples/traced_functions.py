@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from vsacli.base.arrays import FloatArray
 from vsacli.compute.control_flow import cell_of, look_up, repeat, where_needed
 
 SPECIAL = [0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, 1e308, 1.0, -1.0]
@@ -56,7 +55,7 @@ ELEMENTWISE: dict[str, Callable[[Any, Any], Any]] = {
 }
 
 
-def operands() -> tuple[FloatArray, FloatArray]:
+def operands() -> tuple[np.ndarray, np.ndarray]:
     """Every pair of special values, and some random ones of any size."""
     rng = np.random.default_rng(0)
     x, y = (grid.ravel() for grid in np.meshgrid(SPECIAL, SPECIAL))

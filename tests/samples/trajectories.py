@@ -7,10 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from vsacli import load_robot, load_trajectory
-from vsacli.base.errors import InputError
-from vsacli.robot.model import Robot
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli import InputError, Robot, Trajectory, load_robot, load_trajectory
 
 ROOT = Path(__file__).parents[2]
 HEAD = "format: vsacli-trajectory/1\nname: move\n"

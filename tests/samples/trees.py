@@ -19,17 +19,24 @@ from samples.robots import ODD_GRAVITY, random_actuator, random_joint
 from samples.springs import SPRINGS
 from samples.term_mutations import mutated_run
 from samples.wrenches import SCALES
-from vsacli import Trajectory, inverse_dynamics, load_robot
+from vsacli import (
+    Antagonistic,
+    Joint,
+    Motor,
+    Pose,
+    Robot,
+    Tool,
+    Trajectory,
+    Wrench,
+    inverse_dynamics,
+    load_robot,
+)
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.motor import Motor
 from vsacli.base import file_formats
-from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH, Signal
-from vsacli.base.wrench import Wrench, WrenchFrame, frames_by_tool
+from vsacli.base.wrench import WrenchFrame, frames_by_tool
 from vsacli.dynamics.inverse import adapt_trajectory
-from vsacli.robot.joint import FRAME_0, Joint, Pose, Tool
-from vsacli.robot.model import Robot
+from vsacli.robot.joint import FRAME_0
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.profile import WrenchProfile
 from vsacli.trajectory.times import UniformTimes
@@ -210,9 +217,9 @@ class TreeMotion(NamedTuple):
     Between them everything moves along polynomials, for a second.
     """
 
-    q: dict[str, FloatArray]
-    stiffness: dict[str, FloatArray]
-    wrenches: dict[str, FloatArray]
+    q: dict[str, np.ndarray]
+    stiffness: dict[str, np.ndarray]
+    wrenches: dict[str, np.ndarray]
     frames: dict[str, str | None]
 
     def trajectory(self, robot: Robot) -> Trajectory:
@@ -231,7 +238,7 @@ class TreeMotion(NamedTuple):
         return adapt_trajectory(robot, declared)
 
 
-def _polynomial(signal: Signal, degree: int, ends: Sequence[FloatArray]) -> RestToRest:
+def _polynomial(signal: Signal, degree: int, ends: Sequence[np.ndarray]) -> RestToRest:
     start, end = (tuple(each) for each in np.array(ends).T.tolist())
     return RestToRest(signal=signal, span=(0, 1), degree=degree, start=start, end=end)
 
@@ -254,7 +261,7 @@ def tree_run(seed: int, joints: int | None = None) -> tuple[Robot, TreeMotion]:
     return robot, _motion(robot, np.where(least > 0, least, 300) * factor, seed)
 
 
-def _motion(robot: Robot, stiffness: FloatArray, seed: int) -> TreeMotion:
+def _motion(robot: Robot, stiffness: np.ndarray, seed: int) -> TreeMotion:
     rng, joints = np.random.default_rng(seed), robot.joint_names
     commanded = ["stiffness" in joint.commanded for joint in robot.joints]
     levels = np.where(commanded, stiffness, math.nan)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from samples.robots import random_inertia
-from vsacli.base.arrays import FloatArray
 
 TYPES = {"R": "revolute", "C": "continuous", "P": "prismatic", "F": "fixed"}
 INERTIAL = (
@@ -85,15 +84,15 @@ def _random_inertial(rng: np.random.Generator) -> str:
     return f'<inertial>{origin}<mass value="{rng.uniform(0.5, 8)!r}"/><inertia {moments}/></inertial>'
 
 
-def _random_angles(rng: np.random.Generator) -> FloatArray:
+def _random_angles(rng: np.random.Generator) -> np.ndarray:
     return rng.uniform(-3, 3, 3) if rng.random() < 0.5 else rng.integers(-2, 3, 3) * (np.pi / 2)
 
 
-def _random_axis(rng: np.random.Generator) -> FloatArray:
+def _random_axis(rng: np.random.Generator) -> np.ndarray:
     return rng.uniform(-1, 1, 3) if rng.random() < 0.4 else np.roll([0.0, 0.0, 1.0], rng.integers(3))
 
 
-def _words(numbers: FloatArray) -> str:
+def _words(numbers: np.ndarray) -> str:
     return " ".join(repr(float(number)) for number in numbers)
 
 

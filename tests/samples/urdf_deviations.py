@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from oracles.urdf_pinocchio import NOWHERE, Held, UrdfOracle
 
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.kinematics import forward_kinematics
+from vsacli import forward_kinematics, link_torques
 from vsacli.robot.urdf import Conversion
 
 

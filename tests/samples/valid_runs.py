@@ -12,16 +12,18 @@ from samples.mechanisms import DEVICES
 from samples.robots import random_robot
 from samples.springs import SPRINGS
 from samples.term_mutations import mutated_run
-from vsacli import Trajectory, inverse_dynamics
-from vsacli.actuators.antagonistic import Antagonistic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.mechanisms.potentials.potential import BranchStart, Potential, PotentialRange
-from vsacli.actuators.mechanisms.ratios.ratio import Awas
-from vsacli.actuators.motor import Motor
-from vsacli.actuators.serial import Serial
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.joint import Inertia, Joint
-from vsacli.robot.model import Robot
+from vsacli import (
+    Antagonistic,
+    Inertia,
+    Joint,
+    Motor,
+    Robot,
+    Serial,
+    Trajectory,
+    inverse_dynamics,
+    laws,
+    mechanisms,
+)
 
 Run = tuple[Robot, Trajectory]
 
@@ -35,7 +37,7 @@ def valid_run(seed: int) -> Run:
 
 
 def _trajectory(
-    rng: np.random.Generator, robot: Robot, q: float, stiffness: FloatArray | float
+    rng: np.random.Generator, robot: Robot, q: float, stiffness: np.ndarray | float
 ) -> Trajectory:
     """Sines of a size, in a hundredth of a second to minutes; the stiffness varies by a tenth."""
     joints = len(robot.joints)
@@ -76,7 +78,7 @@ def _scaled(joint: Joint, length: float, mass: float) -> Joint:
     }
     torque = mass * length**2 if joint.is_revolute else mass
     motor = Motor(inertia=torque, damping=0.1 * torque)
-    spring = Cubic(k=100 * torque, k_c=500 * torque)
+    spring = laws.Cubic(k=100 * torque, k_c=500 * torque)
     return replace(
         joint,
         dh=replace(dh, a=dh.a * length, d=dh.d * length),
@@ -130,11 +132,11 @@ def _stiff_potential(rng: np.random.Generator) -> Run:
     """Springs of 1e3 to 1e9 N m/rad whose formula computes their deflection as a difference."""
     stiffness = 10 ** rng.uniform(3, 9)
     energy = rng.choice(["sin(phi)^2", "(1 - cos(2*phi))/2", "sin(theta_1 - q)^2", "phi^2"])
-    mechanism = Potential(
+    mechanism = mechanisms.Potential(
         energy=f"k*(r*theta_2)^2*{energy}",
         constants=(("k", stiffness / (2 * 0.07**2)), ("r", 0.01)),
-        start=BranchStart(theta_1=0, theta_2=7),
-        range=PotentialRange(phi=(-0.7, 0.7), theta_2=(2, 14)),
+        start=mechanisms.BranchStart(theta_1=0, theta_2=7),
+        range=mechanisms.PotentialRange(phi=(-0.7, 0.7), theta_2=(2, 14)),
     )
     motor = Motor(inertia=0.3, damping=0.1)
     robot = _single(rng, Serial(motor=(motor, motor), mechanism=mechanism), rng.uniform(1, 100))
@@ -144,7 +146,7 @@ def _stiff_potential(rng: np.random.Generator) -> Run:
 def _hardly_stiff(rng: np.random.Generator) -> Run:
     """AwAS turned so far that its stiffness 2 K cos(2 phi) is next to zero under load."""
     torque = rng.uniform(1, 30)
-    mechanism = Awas(k=1e5, arm=(1e-4, 1.0), lead=0.01)
+    mechanism = mechanisms.Awas(k=1e5, arm=(1e-4, 1.0), lead=0.01)
     motor = Motor(inertia=0.3, damping=0.1)
     robot = _single(rng, Serial(motor=(motor, motor), mechanism=mechanism), torque)
     return robot, _trajectory(rng, robot, 0.2, torque * 10 ** rng.uniform(-7, -1))

@@ -6,9 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from vsacli.base.wrench import Wrench
-from vsacli.robot.joint import Pose
-from vsacli.robot.model import Robot
+from vsacli import Pose, Robot, Wrench
 
 SCALES = (50.0, 250.0, 1250.0)
 """Half-widths of the components and their derivatives: as much as the links' own weight, and as fast."""

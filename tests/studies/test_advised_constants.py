@@ -9,45 +9,44 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 from samples.command_line import ROBOT
+from samples.moves import move
 from samples.shipped import shipped_robot
 
-from vsacli import fixes, load_robot, load_trajectory
-from vsacli.analysis.run import Run
-from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.inverse import compute_block
-from vsacli.robot.joint import Joint
-from vsacli.robot.model import Robot
-from vsacli.trajectory.curves import ConstantProfile, RestToRest
-from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli import (
+    Joint,
+    Robot,
+    Trajectory,
+    fixes,
+    inverse_dynamics,
+    load_robot,
+    load_trajectory,
+    motor_torques,
+)
 
 MIN_MARGIN = 0.01
 ADVICE = re.compile(r"a stiffness of at (least|most) (\S+)")
 
-Motion = Callable[[FloatArray], Trajectory]
+Motion = Callable[[np.ndarray], Trajectory]
 """A motion with a constant stiffness of each joint, (joints,)."""
 
 
-def random_motion(seed: int) -> tuple[Robot, Motion, FloatArray]:
+def random_motion(seed: int) -> tuple[Robot, Motion, np.ndarray]:
     """A robot on a random motion, and a stiffness too low at rest, or too high for its motors (odd seeds)."""
     rng = np.random.default_rng(seed)
     robot = shipped_robot(("vsa_3r", "vsa_3r", "rp_2", "vsa_3r")[seed % 4])
     reach = [0.3 if joint.type == "prismatic" else 1.0 for joint in robot.joints]
     start, end = (tuple((rng.uniform(-1, 1, len(reach)) * reach).tolist()) for _ in range(2))
     duration, rate = float(rng.uniform(0.8, 3)), int(rng.integers(50, 400))
-    position = RestToRest(signal=POSITION, span=(0.0, duration), degree=9, start=start, end=end)
 
-    def motion(stiffness: FloatArray) -> Trajectory:
-        level = ConstantProfile(signal=STIFFNESS, span=position.span, value=tuple(stiffness.tolist()))
-        return Trajectory(UniformTimes(duration, rate), position, {"stiffness": level}, name="random")
+    def motion(stiffness: np.ndarray) -> Trajectory:
+        return move(duration, rate, (start, end), degrees=(9, 3), stiffness=(stiffness, stiffness))
 
-    rest = compute_block(robot, motion(np.full(len(reach), 1e5)).at(np.array([0.0])))
+    rest = motor_torques(robot, motion(np.full(len(reach), 1e5)).at(np.array([0.0])))
     lowest = rest.stiffness_min[0]
     if seed % 2 == 0:
         return robot, motion, np.round(lowest * rng.uniform(0.85, 1.01, len(reach)), 2)
     stiffness = np.round(1.5 * lowest, 2)
-    torque = np.abs(compute_block(robot, motion(stiffness).at(np.array([0.0]))).tau_motor[0]).max(axis=-1)
+    torque = np.abs(motor_torques(robot, motion(stiffness).at(np.array([0.0]))).tau_motor[0]).max(axis=-1)
     joints = tuple(map(_weakened, robot.joints, (0.85 * torque).tolist()))
     return dataclasses.replace(robot, joints=joints), motion, stiffness
 
@@ -66,10 +65,7 @@ def advised(robot: Robot, trajectory: Trajectory) -> Iterator[tuple[int, str]]:
 
 def fixed(robot: Robot, trajectory: Trajectory, index: int) -> bool:
     """Whether a joint has its margin and keeps its limits, at samples and between them."""
-    run = Run(robot, trajectory, min_margin=MIN_MARGIN)
-    for _ in run:
-        pass
-    joint = run.report().joints[index]
+    joint = inverse_dynamics(robot, trajectory).report.joints[index]
     return joint.margin >= MIN_MARGIN and not any(map(joint.shows, ("infeasible", "singular", "over_limit")))
 
 

@@ -12,8 +12,7 @@ from samples.marks import slow
 from samples.robots import random_link, random_motion, random_robot
 from samples.shipped import shipped_robot
 
-from vsacli.robot.joint import Pose
-from vsacli.robot.model import Robot
+from vsacli import Pose, Robot
 from vsacli.studies.identification.regressor import (
     all_parameters,
     link_of,

@@ -10,9 +10,7 @@ import pytest
 from samples.fixes import BASE, accepted, changed, rest_to_rest
 from samples.robots import vsa_3r
 
-from vsacli import fixes
-from vsacli.analysis.run import Run
-from vsacli.robot.joint import Limits
+from vsacli import Limits, fixes, inverse_dynamics
 from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.combined import (
     LARGEST_FACTOR,
@@ -36,8 +34,8 @@ def test_smallest_combination_is_that_of_a_dense_scan():
     found = search().smallest()
     sizes = []
     for factor in np.arange(1.0, 1.5, 0.005).tolist():
-        (block,) = Run(vsa_3r(), FAST.stretched(factor), block_samples=10_000)
-        needed = np.max(block.stiffness_min, axis=0) / 0.99 - 850.0
+        slower = inverse_dynamics(vsa_3r(), FAST.stretched(factor))
+        needed = np.max(slower.stiffness_min, axis=0) / 0.99 - 850.0
         sizes.append(math.hypot(factor - 1, *np.maximum(needed, 0.0) / 850.0))
     assert found.size == pytest.approx(min(sizes), rel=2e-3)  # flat at its minimum; strides of 0.5 %
     assert found.size < min(sizes[0], smallest_slow_down_of(FAST) - 1)
@@ -105,16 +103,12 @@ def unlike():
     """Soft springs, a little different, at the elbow."""
     springs = [{"type": "cubic", "k": 4, "k_c": 20}, {"type": "cubic", "k": 4.4, "k_c": 20}]
     robot = vsa_3r().replace("joints.elbow.actuator.spring", springs)
-    lowest = {
-        branch: max(
-            float(block.stiffness_min[:, 2].max())
-            for block in Run(robot.replace("joints.elbow.actuator.branch", branch), rest_to_rest(4.0))
-        )
-        for branch in ("positive", "negative")
-    }
+    robots = {each: robot.replace("joints.elbow.actuator.branch", each) for each in ("positive", "negative")}
+    results = {branch: inverse_dynamics(each, rest_to_rest(4.0)) for branch, each in robots.items()}
+    lowest = {branch: float(each.stiffness_min[:, 2].max()) for branch, each in results.items()}
     worse = max(lowest, key=lowest.get)
     trajectory = rest_to_rest(4.0, (850.0, 850.0, sum(lowest.values()) / 2))
-    return robot.replace("joints.elbow.actuator.branch", worse), trajectory
+    return robots[worse], trajectory
 
 
 @pytest.mark.slow

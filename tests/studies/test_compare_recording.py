@@ -15,8 +15,7 @@ import pytest
 from samples.command_line import ROBOT, edited
 from samples.pages import Page
 
-from vsacli import compare
-from vsacli.base.errors import InputError
+from vsacli import InputError, compare
 from vsacli.cli.main import run
 
 BEGIN = 0.5137

@@ -12,9 +12,7 @@ from samples.robots import random_link, random_robot
 from samples.shipped import shipped_robot
 from scipy.optimize import minimize
 
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.joint import Inertia, Link
-from vsacli.robot.model import Robot
+from vsacli import Inertia, Link, Robot
 from vsacli.studies.identification.consistent_links import LinkEstimate, consistent_links
 from vsacli.studies.identification.regressor import all_parameters
 
@@ -67,7 +65,7 @@ def test_where_nothing_was_found_links_stay() -> None:
     assert not bodies.links
 
 
-def moments(parameters: FloatArray) -> FloatArray:
+def moments(parameters: np.ndarray) -> np.ndarray:
     """Second moments of mass, written out by their definition."""
     m, x, y, z, xx, yy, zz, xy, xz, yz = parameters
     return np.array(
@@ -88,7 +86,7 @@ def test_they_are_the_nearest_ones() -> None:
     start, first = all_parameters(robot), all_parameters(other)
     unseen = np.linalg.svd(found.shares)[2][len(found.values) :]
 
-    def entropy(x: FloatArray) -> float:
+    def entropy(x: np.ndarray) -> float:
         matrix, before = moments(x), moments(start)
         if np.linalg.eigvalsh(matrix)[0] <= 0:
             return 1e6

@@ -8,21 +8,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from samples.excitations import shorten_searches
 from samples.shipped import shipped_robot, shipped_run
 
-from vsacli import inverse_dynamics, load_trajectory
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.robot.joint import Limits
-from vsacli.robot.model import Robot
-from vsacli.studies.identification.excitation import (
+from vsacli import (
     Excitation,
-    ImpossibleError,
+    InputError,
+    Limits,
+    Robot,
     excitation_text,
-    fisher,
-    plan,
+    inverse_dynamics,
+    load_trajectory,
     plan_excitation,
 )
+from vsacli.studies.identification.excitation import ImpossibleError
 from vsacli.studies.identification.excitation.family import MARGIN
 
 BETWEEN = 0.01
@@ -33,9 +32,7 @@ BETWEEN = 0.01
 @pytest.fixture(autouse=True, scope="module")
 def _short_searches() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(plan, "STARTS", 9)
-        patch.setattr(plan, "STEPS", 30)
-        patch.setattr(fisher, "RECORDS", 1)
+        shorten_searches(patch, steps=30)
         yield
 
 
@@ -116,7 +113,7 @@ def test_the_same_seed_finds_the_same(planned: Excitation) -> None:
     assert excitation_text(other) != excitation_text(planned)
 
 
-def scaled_condition(columns: list[FloatArray]) -> float:
+def scaled_condition(columns: list[np.ndarray]) -> float:
     """By singular values."""
     matrix = np.stack([column.ravel() / np.linalg.norm(column) for column in columns], axis=1)
     singular = np.linalg.svd(matrix, compute_uv=False)

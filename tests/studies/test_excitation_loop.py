@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 from samples.command_line import Outcome
+from samples.excitations import shorten_searches
 from samples.robot_files import write_robot
 from samples.shipped import shipped_robot
 
-from vsacli import identify
+from vsacli import identify, plan_excitation
 from vsacli.robot.parameters import parameters
-from vsacli.studies.identification.excitation import Noise, fisher, plan, plan_excitation
+from vsacli.studies.identification.excitation import Noise
 from vsacli.studies.identification.excitation.fisher import executed, noisy_record
 from vsacli.studies.identification.identification import WORDS, solutions
 from vsacli.studies.identification.identification_report import numbers_of
@@ -58,9 +59,7 @@ LOOSE = ("damping", "friction", "mechanism", "coupled_inertia")
 
 @pytest.fixture(autouse=True)
 def _short_searches(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plan, "STARTS", 9)
-    monkeypatch.setattr(plan, "STEPS", 40)
-    monkeypatch.setattr(fisher, "RECORDS", 1)
+    shorten_searches(monkeypatch, steps=40)
 
 
 @pytest.mark.cases(1)
@@ -96,7 +95,7 @@ SEEDS = 20
 @pytest.mark.slow
 def test_numbers_scatter_by_what_was_predicted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Twenty records with noise of their own. Numbers that are held at zero half of the time do not count."""
-    monkeypatch.setattr(fisher, "RECORDS", 3)
+    shorten_searches(monkeypatch, steps=40, records=3)
     robot, noise, random = shipped_robot("rp_2"), Noise(2e-5, 0.5), np.random.default_rng(1)
     planned = plan_excitation(robot, duration=8, noise=noise)
     joints, block = range(len(robot.joints)), executed(robot, planned.trajectory)

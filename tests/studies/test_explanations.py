@@ -14,10 +14,9 @@ from samples.excited import Excitation, excited
 from samples.poor_fits import PLANTS, random_case, write
 from samples.shipped import shipped_robot
 
-from vsacli import identify
+from vsacli import Identification, identify
 from vsacli.studies.identification.estimation import Equations
 from vsacli.studies.identification.explanations import addition
-from vsacli.studies.identification.identification_report import Identification
 
 FIRST = 2000
 """Seed of the first record."""

@@ -9,9 +9,7 @@ import pytest
 from samples.excited import Excitation, Recorded, excited
 from samples.random_arms import KINDS, misjudged, random_arm
 
-from vsacli import Identification, identify
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Robot
+from vsacli import Identification, Robot, identify
 
 TORQUE_NOISE = 0.005
 """Noise of torques relative to the largest one of the arm."""
@@ -29,7 +27,7 @@ def motion_of(robot: Robot, rng: np.random.Generator) -> Excitation:
     )
 
 
-def largest_errors(robot: Robot, fitted: Robot, motion: Excitation, seed: int) -> FloatArray:
+def largest_errors(robot: Robot, fitted: Robot, motion: Excitation, seed: int) -> np.ndarray:
     """Largest error of each motor's torque along a motion, by inverse dynamics of both robots."""
     runs: list[Recorded] = [excited(each, motion, seed) for each in (robot, fitted)]
     errors = np.abs(runs[1].tau_motor - runs[0].tau_motor).max(axis=0)
@@ -38,7 +36,7 @@ def largest_errors(robot: Robot, fitted: Robot, motion: Excitation, seed: int) -
     )
 
 
-def identification_of(seed: int, folder: Path) -> tuple[Identification, FloatArray, FloatArray]:
+def identification_of(seed: int, folder: Path) -> tuple[Identification, np.ndarray, np.ndarray]:
     """Errors of torques in stated deviations: along the recording of a random arm, and in another motion."""
     rng = np.random.default_rng(seed)
     robot = random_arm(KINDS[seed % 3], 1 + seed // 3 % 3, rng)

@@ -10,8 +10,7 @@ import pytest
 from samples.command_line import REPOSITORY
 from samples.fixes import written
 
-from vsacli import Trajectory, load_robot, load_trajectory
-from vsacli.base.errors import InputError
+from vsacli import InputError, Trajectory, load_robot, load_trajectory
 from vsacli.studies.search import Fix
 from vsacli.studies.search.changed_motion import with_raised_stiffness
 from vsacli.studies.search.fix_report import OtherBranch

@@ -11,10 +11,7 @@ import pytest
 from samples.infeasible_tasks import random_task
 from samples.marks import slow_but
 
-from vsacli import load_robot, load_trajectory
-from vsacli.base.flags import Flag
-from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.trajectory import Motion
+from vsacli import Flag, Motion, load_robot, load_trajectory, motor_torques
 
 MARGIN = 0.01
 FINER = 10
@@ -54,7 +51,7 @@ QUICK = (0,)
 
 def fine_joints(robot, motion):
     """Whether each joint has margin and limits all the time, from the corridor and the flags of a block."""
-    block = compute_block(robot, motion)
+    block = motor_torques(robot, motion)
     room = np.minimum(block.stiffness - block.stiffness_min, block.stiffness_max - block.stiffness)
     narrow = room / block.stiffness < MARGIN - ROUNDING
     bad = narrow | ((block.flags & ~np.uint32(Flag.NEAR_SINGULAR)) != 0)

@@ -22,19 +22,11 @@ from samples.fixes import (
 from samples.marks import slow
 from samples.robots import vsa_3r
 
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.laws.cubic import Cubic
-from vsacli.actuators.laws.sinh import Sinh
-from vsacli.actuators.laws.tendons import Exponential
-from vsacli.actuators.motor import Motor
-from vsacli.analysis.run import Run
-from vsacli.robot.joint import Limits
-from vsacli.studies.search import fixes
+from vsacli import Elastic, Limits, Motor, Trajectory, fixes, inverse_dynamics, laws
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.cutting_planes import smallest_offset
 from vsacli.studies.search.fix_report import NotPossible, StiffnessOffset
 from vsacli.studies.search.loads import joint_loads
-from vsacli.trajectory.trajectory import Trajectory
 
 MARGIN = 0.01
 GIVEN = ("dq", "ddq", "d3q", "d4q", "dstiffness", "ddstiffness")
@@ -56,8 +48,7 @@ def reason(robot, trajectory):
 
 
 def peak_load(robot, trajectory):
-    (block,) = Run(robot, trajectory)
-    return np.abs(block.tau_e).max(axis=0)
+    return np.abs(inverse_dynamics(robot, trajectory).tau_e).max(axis=0)
 
 
 @pytest.mark.cases(1)
@@ -144,8 +135,8 @@ def test_steps_between_the_watched_ones_count():
     "spring",
     [
         (CUBIC, dataclasses.replace(CUBIC, k=380.0, k_c=2500.0)),
-        (Sinh(k=80, a=5), Sinh(k=70, a=5.5)),
-        (Exponential(c=80, a=5), Exponential(c=80, a=5)),
+        (laws.Sinh(k=80, a=5), laws.Sinh(k=70, a=5.5)),
+        (laws.Exponential(c=80, a=5), laws.Exponential(c=80, a=5)),
     ],
     ids=["cubics", "sinh", "tendons"],
 )
@@ -242,7 +233,7 @@ def test_motor_velocity_that_no_stiffness_brings_down():
 
 
 @dataclasses.dataclass(frozen=True)
-class ShortCubic(Cubic):
+class ShortCubic(laws.Cubic):
     """The spring of Table I, known up to 0.2 rad only."""
 
     @property

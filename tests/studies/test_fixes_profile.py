@@ -21,12 +21,8 @@ from samples.marks import slow
 from samples.robots import vsa_3r
 from scipy.integrate import trapezoid
 
-from vsacli.actuators.laws.sinh import Sinh
-from vsacli.analysis.run import Run, inverse_dynamics
+from vsacli import Limits, Trajectory, fixes, inverse_dynamics, laws, link_torques
 from vsacli.base.signals import POSITION, STIFFNESS
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.joint import Limits
-from vsacli.studies.search import fixes
 from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.fix_report import NotPossible
 from vsacli.studies.search.nearest_profile import Bounds, NoSplineError, nearest_spline
@@ -34,7 +30,6 @@ from vsacli.studies.search.task import AS_IT_IS, Task
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 MARGIN = 0.01
 
@@ -219,8 +214,7 @@ def test_profile_holds_between_the_steps():
 def test_motor_limit_asks_for_a_smoother_or_wider_profile():
     trajectory = rest_to_rest(0.5)
     fastest, free = profile(vsa_3r(), trajectory)
-    (block,) = Run(vsa_3r(), fastest)
-    peak = float(np.abs(block.tau_motor[:, BASE]).max())
+    peak = float(np.abs(inverse_dynamics(vsa_3r(), fastest).tau_motor[:, BASE]).max())
     robot = changed(BASE, motor={"max_torque": 0.8 * peak})
     fixed, found = profile(robot, trajectory)
     assert accepted(robot, fixed, MARGIN)
@@ -228,7 +222,7 @@ def test_motor_limit_asks_for_a_smoother_or_wider_profile():
 
 
 def test_springs_that_differ_on_a_prismatic_joint():
-    robot = changed(0, robot=pendulum(letter="P"), spring=(CUBIC, Sinh(k=80, a=5)))
+    robot = changed(0, robot=pendulum(letter="P"), spring=(CUBIC, laws.Sinh(k=80, a=5)))
     fixed, found = profile(robot, rest_to_rest(0.2, 850.0, start=(0.0,), end=(0.3,)))
     assert accepted(robot, fixed, MARGIN)
     assert found.sentence.startswith("reshape the stiffness of lift by up to +")

@@ -9,9 +9,7 @@ import pytest
 from samples.fixes import pushed, rest_to_rest, written
 from samples.robots import vsa_3r
 
-from vsacli import load_trajectory
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.base.errors import InputError, StorageError
+from vsacli import InputError, StorageError, Trajectory, inverse_dynamics, load_trajectory
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import POSITION, WRENCH
 from vsacli.studies.search import Fix, check_fixed_target
@@ -22,7 +20,6 @@ from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.curves.steps import profile_of_levels
 from vsacli.trajectory.curves.via_points import ViaPoints
 from vsacli.trajectory.profile import WrenchProfile
-from vsacli.trajectory.trajectory import Trajectory
 
 
 def still_and_soft():

@@ -10,8 +10,7 @@ import pytest
 from samples.fixes import pendulum, written
 from samples.marks import slow
 
-from vsacli import Robot, Trajectory, fixes, inverse_dynamics, load_trajectory
-from vsacli.robot.joint import Limits
+from vsacli import Limits, Robot, Trajectory, fixes, inverse_dynamics, load_trajectory
 from vsacli.studies.search import Fix
 from vsacli.studies.search.changed_motion import with_changed_stiffness
 from vsacli.trajectory.times import ResampledTimes

@@ -20,12 +20,10 @@ from samples.fixes import (
 )
 from samples.robots import vsa_3r
 
-from vsacli.actuators.laws.sinh import Sinh
-from vsacli.robot.joint import Limits
+from vsacli import Limits, Trajectory, laws
 from vsacli.studies.search.acceptance import Acceptance, ImpossibleError
 from vsacli.studies.search.combined import Factors, smallest_slow_down
 from vsacli.studies.search.task import Task
-from vsacli.trajectory.trajectory import Trajectory
 
 
 def step_of(trajectory):
@@ -90,7 +88,7 @@ def test_motor_limits_are_kept(motor):
 
 
 def test_springs_that_differ_and_prismatic_joints():
-    springs = dataclasses.replace(CUBIC, k=380.0), Sinh(k=80, a=5)
+    springs = dataclasses.replace(CUBIC, k=380.0), laws.Sinh(k=80, a=5)
     robot = changed(0, robot=pendulum(letter="P"), spring=springs)
     trajectory = rest_to_rest(0.2, 850.0, start=(0.0,), end=(0.3,))
     check_smallest(robot, trajectory, slow_down(robot, trajectory))

@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vsacli.base.arrays import FloatArray
 from vsacli.studies.identification.conditioning import conditioned
 
 OMEGA = 2 * np.pi * np.array([0.3, 0.7, 1.1])
 AMPLITUDE = np.array([0.5, 0.3, 0.2])
 
 
-def motion(time: FloatArray, order: int) -> FloatArray:
+def motion(time: np.ndarray, order: int) -> np.ndarray:
     """A sum of sines, or its second derivative."""
-    values: FloatArray = (AMPLITUDE * (-(OMEGA**2)) ** (order // 2) * np.sin(OMEGA * time[:, None])).sum(
+    values: np.ndarray = (AMPLITUDE * (-(OMEGA**2)) ** (order // 2) * np.sin(OMEGA * time[:, None])).sum(
         axis=1
     )
     return values

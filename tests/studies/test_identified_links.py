@@ -15,17 +15,16 @@ from samples.shipped import shipped_robot
 
 from vsacli import (
     Identification,
+    InputError,
     Result,
     Robot,
+    Tool,
     Trajectory,
     identify,
     inverse_dynamics,
     load_robot,
     load_trajectory,
 )
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
-from vsacli.robot.joint import Tool
 from vsacli.studies.identification import fitted_text
 from vsacli.studies.identification.conditioning import ConditionedRecording, conditioned
 from vsacli.studies.identification.consistent_links import doubts_of, found_links
@@ -96,7 +95,7 @@ def solved(robot: Robot, signals: ConditionedRecording) -> list[Solution]:
     return [*motors, solution(link_system(robot, GROUPS, motors), [signals])]
 
 
-def errors_of_base(links: Solution) -> FloatArray:
+def errors_of_base(links: Solution) -> np.ndarray:
     """Of base parameters, in standard errors."""
     count = sum(map(bool, links.system.sums))
     return ((links.fit.values - links.system.before[list(links.free)]) / links.fit.standard_errors)[:count]
@@ -166,7 +165,7 @@ def test_a_robot_file_with_the_links_found_reads_back_as_these(tmp_path: Path) -
             assert found_ == pytest.approx(wanted, rel=1e-5, abs=1e-6)  # seven digits
 
 
-def written(robot: Robot, run: Result, joints: Sequence[str], folder: Path, **further: FloatArray) -> Path:
+def written(robot: Robot, run: Result, joints: Sequence[str], folder: Path, **further: np.ndarray) -> Path:
     """A record of some joints as a file, with further columns."""
     columns = {"time": run.time}
     for name in joints:

@@ -14,9 +14,7 @@ from samples.command_line import Outcome
 from samples.excited import Excitation, Recorded, excited
 from samples.shipped import shipped_robot
 
-from vsacli import identify, load_robot
-from vsacli.base.errors import InputError
-from vsacli.robot.model import Robot
+from vsacli import InputError, Robot, identify, load_robot
 
 Command = Callable[..., Outcome]
 

@@ -11,9 +11,7 @@ from samples.excited import TORQUE_NOISE, Excitation, Recorded, excited
 from samples.marks import slow_but
 from samples.shipped import shipped_robot, shipped_run
 
-from vsacli import identify, inverse_dynamics
-from vsacli.base.errors import InputError
-from vsacli.robot.model import Robot
+from vsacli import InputError, Robot, identify, inverse_dynamics
 from vsacli.studies.identification.fitted_system import solution
 from vsacli.studies.identification.motor_equations import GROUPS, motor_systems, with_friction
 

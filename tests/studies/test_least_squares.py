@@ -7,50 +7,49 @@ from functools import cache
 import numpy as np
 import pytest
 
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.studies.identification.estimation import Equations, LeastSquaresFit, gauss_newton, least_squares
 
 TRUTH = np.array([3.0, -1.0, 0.5, 20.0])
 DRAWS = 200
-Noise = Callable[[np.random.Generator, int], FloatArray]
+Noise = Callable[[np.random.Generator, int], np.ndarray]
 
 
-def columns(samples: int) -> FloatArray:
+def columns(samples: int) -> np.ndarray:
     """Of the kinds that motors and links have: slow waves, faster ones, a constant, all of different size."""
     time = np.linspace(0, 1, samples)
     waves = [np.sin(2 * np.pi * 5 * time), np.cos(2 * np.pi * 7 * time + 1), np.sin(2 * np.pi * 31 * time)]
     return np.stack([*waves, 1e-3 + 0 * time], axis=1) * [1.0, 10.0, 0.1, 1.0]
 
 
-def record(measured: FloatArray, slopes: FloatArray, present: FloatArray, group: str = "link") -> Equations:
+def record(measured: np.ndarray, slopes: np.ndarray, present: np.ndarray, group: str = "link") -> Equations:
     rows = len(measured)
     return Equations(measured, slopes @ present, slopes, np.array([group] * rows), np.arange(rows))
 
 
-def white(random: np.random.Generator, samples: int) -> FloatArray:
+def white(random: np.random.Generator, samples: int) -> np.ndarray:
     return random.normal(size=samples)
 
 
-def red(random: np.random.Generator, samples: int) -> FloatArray:
+def red(random: np.random.Generator, samples: int) -> np.ndarray:
     """First order, correlated over some ten samples."""
     from scipy.signal import lfilter
 
     return np.asarray(lfilter([1], [1, -0.8], random.normal(size=samples + 200))[200:])
 
 
-def blue(random: np.random.Generator, samples: int) -> FloatArray:
+def blue(random: np.random.Generator, samples: int) -> np.ndarray:
     """Differences of white noise, as of a derivative."""
     return np.diff(random.normal(size=samples + 1))
 
 
-def derivative(random: np.random.Generator, samples: int) -> FloatArray:
+def derivative(random: np.random.Generator, samples: int) -> np.ndarray:
     """Noise of a torque, and as much of an acceleration."""
     of_acceleration = low_passed(random, samples)
     return white(random, samples) + of_acceleration / np.std(of_acceleration)
 
 
-def low_passed(random: np.random.Generator, samples: int) -> FloatArray:
+def low_passed(random: np.random.Generator, samples: int) -> np.ndarray:
     """The second derivative of white noise behind a low-pass, decimated to about twice its bandwidth."""
     from scipy.signal import butter, sosfiltfilt
 
@@ -182,7 +181,7 @@ def test_numbers_that_were_found_before_add_their_uncertainty() -> None:
     assert fit.standard_errors == pytest.approx(0.01 * np.abs(TRUTH), rel=1e-6)
 
 
-def noisy_columns(random: np.random.Generator, true: FloatArray, noise: float) -> Equations:
+def noisy_columns(random: np.random.Generator, true: np.ndarray, noise: float) -> Equations:
     """Equations whose columns are known by a measurement, with a second draw of its noise."""
     first, second = noise * random.normal(size=(2, *true.shape))
     measured, present = true @ TRUTH + 0.1 * white(random, len(true)), np.zeros(4)
@@ -224,11 +223,11 @@ def test_too_few_equations_are_refused() -> None:
         least_squares([record(slopes @ TRUTH, slopes, np.zeros(4))], np.zeros(4))
 
 
-def sinh_spring(phi: FloatArray, k: float, c: float) -> FloatArray:
+def sinh_spring(phi: np.ndarray, k: float, c: float) -> np.ndarray:
     return np.asarray(k / c * np.sinh(c * phi))
 
 
-def sinh_equations(measured: FloatArray, phi: FloatArray, unknowns: FloatArray) -> list[Equations]:
+def sinh_equations(measured: np.ndarray, phi: np.ndarray, unknowns: np.ndarray) -> list[Equations]:
     k, c = unknowns
     if k <= 0 or c <= 0:
         return [Equations(measured, np.full_like(phi, np.nan), np.ones((len(phi), 2)), *labels(phi))]
@@ -237,7 +236,7 @@ def sinh_equations(measured: FloatArray, phi: FloatArray, unknowns: FloatArray) 
     return [Equations(measured, sinh_spring(phi, k, c), slopes, *labels(phi))]
 
 
-def labels(phi: FloatArray) -> tuple[FloatArray, FloatArray]:
+def labels(phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.array(["motor"] * len(phi)), np.arange(len(phi))
 
 
@@ -256,7 +255,7 @@ def test_gauss_newton_finds_springs_that_are_not_linear(start: tuple[float, floa
 def test_gauss_newton_says_when_it_does_not_arrive() -> None:
     """arctan(u) = 2 has no solution: there is always a step that gains a little, further out."""
 
-    def equations(unknowns: FloatArray) -> list[Equations]:
+    def equations(unknowns: np.ndarray) -> list[Equations]:
         (u,), rows = unknowns, np.ones(20)
         random = np.random.default_rng(8).normal(size=20)
         measured = 2 + 1e-3 * random

@@ -13,8 +13,7 @@ from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
 from samples.fixes import CUBIC, K_C, K, pendulum, rest_to_rest
 from samples.marks import slow
 
-from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory, optimize
-from vsacli.actuators.friction import Friction
+from vsacli import Friction, InputError, inverse_dynamics, load_robot, load_trajectory, optimize
 from vsacli.base.signals import STIFFNESS
 from vsacli.dynamics.drive import drive
 from vsacli.studies.search.acceptance import Acceptance, admissible_stiffness

@@ -9,13 +9,11 @@ import pytest
 from numpy.polynomial import Polynomial
 from samples.command_line import REPOSITORY, ROBOT
 
-from vsacli import Friction, Wrench, link_torques, load_robot
-from vsacli.actuators.damper import Damper
+from vsacli import Damper, Friction, Motion, Wrench, link_torques, load_robot
 from vsacli.base.signals import DAMPING, POSITION
 from vsacli.base.wrench import WRENCH_NAMES
 from vsacli.compute.duals import seeds, tangents_of, value_of
 from vsacli.studies.search.path_commands import PathCommands, Speeds
-from vsacli.trajectory.trajectory import Motion
 
 TIMES = np.linspace(0.0, 1.0, 7)
 DIFFERENCE = 1e-6

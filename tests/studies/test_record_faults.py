@@ -14,9 +14,7 @@ from samples.excited import Excitation, Recorded, excited
 from samples.marks import slow_but
 from samples.shipped import shipped_robot
 
-from vsacli import InputError, identify
-from vsacli.base.arrays import FloatArray
-from vsacli.robot.model import Robot
+from vsacli import InputError, Robot, identify
 
 MOTION = Excitation(position=[0, 0, 0], reach=[0.4] * 3, stiffness=[1400] * 3, swing=[300] * 3, duration=12)
 
@@ -167,7 +165,7 @@ def test_a_recording_of_another_robot_is_unreliable(arm: Robot, record: Recorded
     )
 
 
-def frozen_in_motion(theta: FloatArray) -> None:
+def frozen_in_motion(theta: np.ndarray) -> None:
     """A hundred rows of motor 1 of the shoulder stand still where it is fastest."""
     rows = 100
     moved = theta[rows:, SHOULDER, 0] - theta[:-rows, SHOULDER, 0]
@@ -279,7 +277,7 @@ def test_a_clean_record_is_not_doubted(arm: Robot, record: Recorded, tmp_path: P
         assert abs(number.value - number.before) < 4 * number.standard_error
 
 
-def read_by_encoders(positions: FloatArray) -> FloatArray:
+def read_by_encoders(positions: np.ndarray) -> np.ndarray:
     step = 2 * np.pi / 2**14
     return np.asarray(step * np.round(positions / step))
 

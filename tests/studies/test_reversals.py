@@ -11,8 +11,7 @@ from samples.command_line import REPOSITORY
 from samples.marks import slow_but
 from samples.shipped import shipped_robot, shipped_run
 
-from vsacli import Trajectory, load_trajectory, sensitivity
-from vsacli.robot.model import Robot
+from vsacli import Robot, Trajectory, load_trajectory, sensitivity
 from vsacli.studies.sensitivities.band import Reversals
 
 FORWARD, BACKWARD = 1.2, 0.7

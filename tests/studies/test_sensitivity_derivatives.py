@@ -12,15 +12,23 @@ from samples.mechanisms import DEVICES
 from samples.serial_links import serial_links
 from samples.springs import SPRINGS
 
-from vsacli import Antagonistic, Elastic, Motor, load_robot, load_trajectory, sensitivity
-from vsacli.actuators.friction import Friction
+from vsacli import (
+    Antagonistic,
+    Elastic,
+    Friction,
+    Motor,
+    Serial,
+    link_torques,
+    load_robot,
+    load_trajectory,
+    sensitivity,
+)
 from vsacli.actuators.reach import margin
-from vsacli.actuators.serial import Serial
 from vsacli.actuators.transmission import Command
 from vsacli.base.signals import commanded_names
 from vsacli.compute.vector import SymmetricTensor, Vector
 from vsacli.dynamics.drive import driven_by
-from vsacli.dynamics.elastic_torques import joint_state, link_constants, link_torques
+from vsacli.dynamics.elastic_torques import joint_state, link_constants
 from vsacli.dynamics.recursion import recursion
 from vsacli.robot.kinematics import base_gravity
 from vsacli.robot.parameters import parameters

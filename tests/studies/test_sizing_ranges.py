@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vsacli.base.arrays import FloatArray
 from vsacli.studies.sizing import CatalogMotor
 from vsacli.studies.sizing.catalog import Shaft
 from vsacli.studies.sizing.demand import MotorDemand
@@ -21,7 +20,7 @@ AT_END = 1e-6
 
 
 def demand_of(
-    velocity: FloatArray, acceleration: FloatArray, load: FloatArray, weight: FloatArray
+    velocity: np.ndarray, acceleration: np.ndarray, load: np.ndarray, weight: np.ndarray
 ) -> MotorDemand:
     """Of a motor at a revolute joint, at steps of one motion, each (samples,)."""
     moved = velocity, acceleration, load, load

@@ -9,8 +9,7 @@ import pytest
 from samples.marks import needs_compiler
 from samples.studies import DRAWN, column, study
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory, run_study
-from vsacli.analysis.report import Report
+from vsacli import Report, inverse_dynamics, load_robot, load_trajectory, run_study
 from vsacli.studies.sweeps.study import Study, load_study
 
 MIXED = """

@@ -10,7 +10,7 @@ import pytest
 from samples.command_line import edited
 from samples.studies import HEAD, study
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.studies.sweeps.study import load_study
 
 ELBOW = "joints.elbow.link.mass"

@@ -9,13 +9,10 @@ import pytest
 from samples.robots import random_motion
 from samples.trees import random_tree, random_wrenches, tree_cases, without_resistance
 
-from vsacli.base.arrays import FloatArray
-from vsacli.dynamics.elastic_torques import link_torques
-from vsacli.robot.model import Robot
+from vsacli import Motion, Robot, link_torques
 from vsacli.robot.parameters import Parameter, parameters
 from vsacli.studies.identification.regressor import all_parameters, regressor
 from vsacli.studies.sensitivities.slopes import torque_slopes
-from vsacli.trajectory.trajectory import Motion
 
 ROUNDING = 1e-12
 """Of the peak of each joint; sums of some thousand terms."""
@@ -83,7 +80,7 @@ def drawn(rng: np.random.Generator, items: Sequence[Parameter], count: int) -> l
     return [items[place] for place in rng.permutation(len(items))[:count]]
 
 
-def torques(robot: Robot, motion: Motion) -> FloatArray:
+def torques(robot: Robot, motion: Motion) -> np.ndarray:
     """(joints, orders, samples)."""
     found = link_torques(robot, motion.q, motion.dq, motion.ddq, motion.d3q, motion.d4q, motion.wrench)
     return np.stack([found.tau_e, found.dtau_e, found.ddtau_e]).transpose(2, 0, 1)

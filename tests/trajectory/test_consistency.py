@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from samples.marks import slow
 
+from vsacli import Trajectory
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.arrays import samples_of_arrays
 from vsacli.trajectory.recorded.samples import SampledProfile, SignalSamples
-from vsacli.trajectory.trajectory import Trajectory
 
 TIME = np.arange(4001) / 1000
 RATES = np.array([3.0, 5.0])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import sympy
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.curves import DEGREES, ConstantProfile, RestToRest
 

@@ -30,8 +30,7 @@ from samples.trajectories import (
     problems,
 )
 
-from vsacli import inverse_dynamics, load_robot, load_trajectory
-from vsacli.base.errors import InputError
+from vsacli import InputError, inverse_dynamics, load_robot, load_trajectory
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 

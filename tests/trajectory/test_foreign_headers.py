@@ -8,8 +8,7 @@ from jsonschema import ValidationError, validate
 from samples.exports import EXPORTS, FIRST, motion, plain
 from samples.shipped import shipped_robot
 
-from vsacli import inverse_dynamics, load_trajectory
-from vsacli.base.errors import InputError
+from vsacli import InputError, inverse_dynamics, load_trajectory
 from vsacli.files.file_kinds import DOCUMENTS
 
 ROBOT = shipped_robot("planar_2r")

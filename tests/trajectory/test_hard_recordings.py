@@ -8,13 +8,11 @@ from samples.random_recordings import fourier_series
 from samples.recorded_torques import MOTOR, lifting
 from scipy.signal import butter, ellip, sosfiltfilt, sosfreqz
 
-from vsacli.actuators.elastic import Elastic
-from vsacli.actuators.rigid import Rigid
-from vsacli.analysis.run import Run
+from vsacli import Elastic, Rigid, Trajectory, inverse_dynamics
 from vsacli.trajectory.fits import LEAST_SQUARES, SMOOTH, fit_samples
-from vsacli.trajectory.fits.noise import left_out_motion, white_noise_level
-from vsacli.trajectory.fits.spectrum import ringing_ends
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli.trajectory.fits.left_over import left_out_motion
+from vsacli.trajectory.fits.noise import white_noise_level
+from vsacli.trajectory.fits.ringing import ringing_ends
 
 TIME = np.arange(901) / 100
 STEP = 0.01
@@ -93,9 +91,8 @@ def test_a_bound_is_not_far_above_what_two_resolutions_differ_by():
         q = np.cumsum(q - q.mean()) / 94
     q += 1e-4 * rng.standard_normal(len(time))
     trajectory = Trajectory.from_samples(time, q[:, None])
-    run = Run(lifting(Elastic(motor=MOTOR, stiffness=1500.0)), trajectory)
-    list(run)
-    assert run.report().joints[0].uncertainty.variables["tau_motor"].bound < 0.5
+    report = inverse_dynamics(lifting(Elastic(motor=MOTOR, stiffness=1500.0)), trajectory).report
+    assert report.joints[0].uncertainty.variables["tau_motor"].bound < 0.5
 
 
 @pytest.mark.cases(1)
@@ -173,9 +170,8 @@ def test_a_rigid_robot_is_not_warned_about_derivatives_that_it_does_not_use():
         "rigid": Rigid(motor=MOTOR),
         "elastic": Elastic(motor=MOTOR, stiffness=2.0),
     }.items():
-        run = Run(lifting(actuator), Trajectory.from_samples(TIME, q, fit=SMOOTH))
-        list(run)
-        warnings[name] = " ".join(run.report().warnings)
+        result = inverse_dynamics(lifting(actuator), Trajectory.from_samples(TIME, q, fit=SMOOTH))
+        warnings[name] = " ".join(result.report.warnings)
     assert "d4q of" not in warnings["rigid"]
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from samples.clean_records import MOTIONS, SENSORS, clean_records
 
-from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION, STIFFNESS, WRENCH
 from vsacli.trajectory.recorded.health import check_health, unit_doubts
 from vsacli.trajectory.recorded.problems import SampleProblem
@@ -26,20 +25,20 @@ TIME = np.arange(5001) / RATE
 DEVIATION = 1e-5
 
 
-def record(time: FloatArray, *rows: FloatArray, signal=POSITION) -> SignalSamples:
+def record(time: np.ndarray, *rows: np.ndarray, signal=POSITION) -> SignalSamples:
     labels = tuple(map(str, range(len(rows))))
     return SignalSamples.recorded(signal, time, np.array(rows), (None,) * (signal.orders - 1), labels)
 
 
-def found(time: FloatArray, *rows: FloatArray, signal=POSITION) -> list[SampleProblem]:
+def found(time: np.ndarray, *rows: np.ndarray, signal=POSITION) -> list[SampleProblem]:
     return check_health(time, [record(time, *rows, signal=signal)]).problems
 
 
-def messages(time: FloatArray, *rows: FloatArray, signal=POSITION) -> list[str]:
+def messages(time: np.ndarray, *rows: np.ndarray, signal=POSITION) -> list[str]:
     return list(map(str, found(time, *rows, signal=signal)))
 
 
-def noisy(seed: int = 0, time: FloatArray = TIME) -> FloatArray:
+def noisy(seed: int = 0, time: np.ndarray = TIME) -> np.ndarray:
     noise = np.random.default_rng(seed).normal(0, DEVIATION, len(time))
     return 0.5 * np.sin(2 * np.pi * 0.4 * time) + noise
 
@@ -285,21 +284,21 @@ def test_stamps_that_jitter():
 
 # Every fault on every sensor
 
-Spoil = Callable[[np.random.Generator, FloatArray, float], int]
+Spoil = Callable[[np.random.Generator, np.ndarray, float], int]
 
 
-def outlier(rng: np.random.Generator, q: FloatArray, size: float) -> int:
+def outlier(rng: np.random.Generator, q: np.ndarray, size: float) -> int:
     sample = int(rng.integers(20, len(q) - 20))
     q[sample] += size * rng.choice([-1, 1])
     return sample
 
 
-def first_sample(_rng: np.random.Generator, q: FloatArray, size: float) -> int:
+def first_sample(_rng: np.random.Generator, q: np.ndarray, size: float) -> int:
     q[0] += size
     return 0
 
 
-def frozen(_rng: np.random.Generator, q: FloatArray, _size: float) -> int:
+def frozen(_rng: np.random.Generator, q: np.ndarray, _size: float) -> int:
     sample = int(np.argmax(np.abs(q[40:-40] - q[:-80]))) + 20
     q[sample : sample + 11] = q[sample]
     return sample

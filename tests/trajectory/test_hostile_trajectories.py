@@ -11,9 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from samples.trajectories import ROOT
 
-from vsacli import load_robot, load_trajectory
-from vsacli.base.errors import InputError
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli import InputError, Trajectory, load_robot, load_trajectory
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 

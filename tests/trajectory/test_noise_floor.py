@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -63,17 +64,23 @@ def test_noise_alone_needs_no_fine_resolution(name: str, monkeypatch: pytest.Mon
     assert max(spans) <= 1024  # of 2048, which takes as long as all others together
 
 
+@pytest.fixture
+def search_to_the_end(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """Let no search end early from now on."""
+    return lambda: monkeypatch.setattr(resolution, "enough_spans", lambda *_: np.inf)
+
+
 @pytest.mark.slow
 @pytest.mark.cases(2)
 @pytest.mark.parametrize("case", list(product(["white", "random walk"], MOTIONS)), ids=" - ".join)
 def test_what_is_resolved_is_the_same_without_an_early_end(
-    case: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+    case: tuple[str, str], search_to_the_end: Callable[[], None]
 ):
     noise, name = case
     step = 0.05 if noise == "random walk" else 1.0
     row = normal(10 * MOTIONS[name] + step * NOISES[noise])
     early = find_resolution(TIME, row, 7, 4, KnownNoise())
-    monkeypatch.setattr(resolution, "enough_spans", lambda *_: np.inf)
+    search_to_the_end()
     late = find_resolution(TIME, row, 7, 4, KnownNoise())
     assert early is not None
     assert late is not None
@@ -87,12 +94,12 @@ def test_what_is_resolved_is_the_same_without_an_early_end(
 @pytest.mark.cases(2)
 @pytest.mark.parametrize("seed", range(0, 120, 3))
 def test_drawn_recordings_are_fitted_the_same_without_an_early_end(
-    seed: int, monkeypatch: pytest.MonkeyPatch
+    seed: int, search_to_the_end: Callable[[], None]
 ):
     drawn = draw(seed)
     rows = drawn.position.recorded[None]
     early = fit_samples(drawn.time, rows, 7, 4, None)
-    monkeypatch.setattr(resolution, "enough_spans", lambda *_: np.inf)
+    search_to_the_end()
     late = fit_samples(drawn.time, rows, 7, 4, None)
     one, two = early.parts[0], late.parts[0]
     if two.smoothing is None or two.smoothing.resolved:

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
 from vsacli.trajectory.curves.steps import Jump, PiecewiseProfile, profile_of_levels

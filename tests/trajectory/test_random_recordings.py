@@ -11,8 +11,7 @@ from samples.random_recordings import NOISES, SHAPES, draw
 from samples.recorded_torques import robot_of
 from scipy.signal import bessel, butter, cheby1, cheby2, firwin, lfilter, sosfilt
 
-from vsacli.dynamics.inverse import compute_block
-from vsacli.trajectory.trajectory import Motion
+from vsacli import Motion, motor_torques
 
 SEEDS = range(0, 24, 2)
 
@@ -24,7 +23,7 @@ def test_torques_in_closed_form_are_those_of_the_recursion(seed):
     commanded = np.full((3, len(recording.time)), np.nan) if stiffness is None else stiffness
     names = ("q", "dq", "ddq", "d3q", "d4q", "stiffness", "dstiffness", "ddstiffness")
     arrays = {name: row[:, None] for name, row in zip(names, (*q, *commanded), strict=True)}
-    found = compute_block(robot_of(recording.arm), Motion.of(recording.time, arrays)).tau_motor[:, 0]
+    found = motor_torques(robot_of(recording.arm), Motion.of(recording.time, arrays)).tau_motor[:, 0]
     expected = motor_torque(recording.arm, q, stiffness).T
     # rounding: at most 1e-15 of the largest was seen
     np.testing.assert_allclose(found[:, : expected.shape[1]], expected, atol=1e-13 * np.abs(expected).max())

@@ -5,15 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vsacli.analysis.run import inverse_dynamics
-from vsacli.base.errors import InputError
+from vsacli import InputError, Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.base.signals import POSITION
 from vsacli.robot.commanded_joints import CommandedJoints
-from vsacli.robot.file import load_robot
-from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.fits import FitChoice
 from vsacli.trajectory.recorded.recording import read_recorded_signals, recorded_trajectory
-from vsacli.trajectory.trajectory import Trajectory
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, FitChoice
 from vsacli.trajectory.recorded.arrays import checked_array, samples_of_arrays

@@ -10,7 +10,7 @@ import pytest
 import sympy
 from samples.marks import slow
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.curves.sinusoids import Sinusoids
 

@@ -22,11 +22,11 @@ from samples.noisy_records import (
 )
 from scipy.interpolate import BSpline
 
+from vsacli import Trajectory
 from vsacli.trajectory.fits import INTERPOLATE, LEAST_SQUARES, SMOOTH, fit_samples, resolution
 from vsacli.trajectory.fits.bins import BinMoments, Bins, uniform_basis
 from vsacli.trajectory.fits.noise import Lines, filtered_noise, spectral_lines
 from vsacli.trajectory.fits.penalized import Model
-from vsacli.trajectory.trajectory import Trajectory
 
 EPS = np.finfo(float).eps
 

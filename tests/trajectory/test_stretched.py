@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from samples.fixes import pendulum
 
-from vsacli import load_trajectory
-from vsacli.base.errors import InputError
+from vsacli import InputError, Trajectory, load_trajectory
 from vsacli.base.signals import DAMPING, POSITION, STIFFNESS
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 NAMES = [*POSITION.names, *STIFFNESS.names]
 ORDERS = {name: order for signal in (POSITION, STIFFNESS) for order, name in enumerate(signal.names)}

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.trajectory.times import RecordedTimes, ResampledTimes, UniformTimes
 
 

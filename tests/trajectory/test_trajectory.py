@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vsacli.base.errors import InputError
+from vsacli import InputError, Trajectory
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.documents.source import Source
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
@@ -15,7 +15,6 @@ from vsacli.trajectory.curves.steps import PiecewiseProfile
 from vsacli.trajectory.recorded.arrays import samples_of_arrays
 from vsacli.trajectory.recorded.samples import SampledProfile
 from vsacli.trajectory.times import RecordedTimes, UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
 
 EPS = np.finfo(float).eps
 NAMES = [*POSITION.names, *STIFFNESS.names]
@@ -287,7 +286,7 @@ import numpy as np
 from vsacli.trajectory.curves import ConstantProfile
 from vsacli.base.signals import POSITION
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Trajectory
+from vsacli import Trajectory
 times = UniformTimes(7.0, 1.0)
 still = ConstantProfile(signal=POSITION, span=times.span, value=(0.0,))
 closed = Trajectory(times, still, {}, name="still")

@@ -6,9 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vsacli.base.errors import InputError
-from vsacli.robot.file import load_robot
-from vsacli.trajectory.file import load_trajectory
+from vsacli import InputError, load_robot, load_trajectory
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 

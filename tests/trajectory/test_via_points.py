@@ -9,7 +9,7 @@ import pytest
 from oracles.via_spline import spline_pieces, spline_value
 from scipy.integrate import trapezoid
 
-from vsacli.base.errors import InputError
+from vsacli import InputError
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.via_points import ViaPoints, passing_shares

@@ -13,9 +13,7 @@ import xarray
 from samples.command_line import ROBOT as ARM_FILE
 from samples.robots import vsa_3r
 
-from vsacli import Trajectory, inverse_dynamics, load_robot, load_trajectory
-from vsacli.base.arrays import FloatArray
-from vsacli.base.errors import InputError
+from vsacli import InputError, Trajectory, inverse_dynamics, load_robot, load_trajectory
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES
 from vsacli.results.charts.stored import StoredCharts
 from vsacli.results.store.reader import open_stored
@@ -46,14 +44,14 @@ def load(tmp_path, monkeypatch):
     return load_text
 
 
-def write_table(path: str, columns: dict[str, FloatArray]) -> None:
+def write_table(path: str, columns: dict[str, np.ndarray]) -> None:
     rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     text = "".join(",".join(map(repr, row)) + "\n" for row in rows)
     with open(path, "w") as file:
         file.write(",".join(columns) + "\n" + text)
 
 
-def push_table(*names: str) -> dict[str, FloatArray]:
+def push_table(*names: str) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(1)
     return {"time": np.linspace(0, 2, 21), **{name: rng.uniform(-9, 9, 21) for name in names}}
 

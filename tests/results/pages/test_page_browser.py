@@ -20,12 +20,9 @@ from samples.measured_pages import wicked_page
 from samples.studies import study
 from samples.torso import torso_result
 
-from vsacli.base.arrays import FloatArray
+from vsacli import Robot, forward_kinematics, load_robot
 from vsacli.cli.main import run
 from vsacli.results.charts.arm_chart import ArmPoints
-from vsacli.robot.file import load_robot
-from vsacli.robot.kinematics import forward_kinematics
-from vsacli.robot.model import Robot
 
 pytestmark = [pytest.mark.slow, needs("chromium", "chromium"), needs("chromedriver", "chromium-driver")]
 
@@ -231,7 +228,7 @@ def test_a_tree_moves_with_its_tools(browser: Browser, tmp_path: Path) -> None:
     assert not browser.complaints()
 
 
-def stored_positions(path: Path) -> FloatArray:
+def stored_positions(path: Path) -> np.ndarray:
     with h5py.File(path) as file:
         return np.asarray(file["q"][...])
 
@@ -240,7 +237,7 @@ SINGLE = 4e-7
 """Error of a point of an arm of about 1 m, m, with positions of up to 3 rad in single precision."""
 
 
-def assert_points(browser: Browser, robot: Robot, q: FloatArray) -> None:
+def assert_points(browser: Browser, robot: Robot, q: np.ndarray) -> None:
     """Compare the points at the instants of a motion with those of the package, all in the base frame."""
     points = ArmPoints.of(robot, q)
     passed = browser.run("return vsacli.robot.arms[0].passed")

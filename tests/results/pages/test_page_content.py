@@ -20,6 +20,7 @@ from samples.marks import slow_but
 from samples.pages import Page
 from samples.wicked import TEXTS, clean
 
+from vsacli import load_robot
 from vsacli.base.flags import FLAG_BITS
 from vsacli.base.simulation_variables import SIMULATED_NAMES, SIMULATION_VARIABLES
 from vsacli.base.variables import VARIABLES
@@ -29,7 +30,6 @@ from vsacli.results.charts.reduction import FULL_DETAIL
 from vsacli.results.charts.stored import BOUNDS
 from vsacli.results.pages.result_page import sections_of
 from vsacli.results.store.reader import StoredResult, open_stored
-from vsacli.robot.file import load_robot
 
 SINGLE = 2**-23
 """Half of the spacing of single precision, twice: numbers are rounded once, and times once more."""

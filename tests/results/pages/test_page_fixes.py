@@ -13,7 +13,7 @@ from samples.command_line import REPOSITORY, ROBOT, contents
 from samples.pages import Page
 from samples.wicked import TEXTS, clean
 
-from vsacli.base.version import __version__
+from vsacli import __version__
 
 HEADING = "Fixes"
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from samples.cortex_m7 import link, run
-from vsacli.base.arrays import FloatArray
 
 REPEATS = 100
 COUNTING = ("-icount", "shift=0")
@@ -56,7 +55,7 @@ int main(void)
 """
 
 
-def taken(folder: Path, prefix: str, commands: FloatArray) -> tuple[FloatArray, FloatArray]:
+def taken(folder: Path, prefix: str, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Instructions, and bytes of stack, of a call for each command, (commands,).
 
     Args:
