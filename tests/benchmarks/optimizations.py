@@ -18,6 +18,7 @@ from timing import Seconds, cpu_seconds, medians
 
 from vsacli import Robot, Trajectory, load_robot, load_trajectory, optimize
 from vsacli.base.arrays import evenly
+from vsacli.dynamics.losses import trapezoidal
 from vsacli.studies.search.acceptance import Acceptance, checked_range
 from vsacli.studies.search.loads import joint_loads, periods, rests
 from vsacli.studies.search.splines import SplineSpace

@@ -22,7 +22,6 @@ from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.variants import Variants
 from vsacli.robot.parameters import parameters
 from vsacli.trajectory.times import UniformTimes
-from vsacli.trajectory.trajectory import Motion
 
 VARIANTS, SAMPLES = 300, 201
 SINGLE = 10

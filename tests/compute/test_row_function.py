@@ -9,7 +9,6 @@ import pytest
 from samples.shipped import shipped_robot
 
 from vsacli import Robot
-from vsacli.compute.aligned_rows import LINE, address, aligned_rows
 from vsacli.compute.control_flow import where_needed
 from vsacli.compute.engine import NUMPY, choose
 from vsacli.compute.engine.choice import TRACE_FROM

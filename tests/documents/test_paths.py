@@ -13,7 +13,7 @@ from samples.command_line import REPOSITORY
 from vsacli import Antagonistic, InputError, Robot, laws, load_robot
 from vsacli.base.signals import POSITION
 from vsacli.documents.paths import find, replace
-from vsacli.trajectory.curves.types import Use
+from vsacli.trajectory.curves.closed_form import Use
 from vsacli.trajectory.curves.via_points import Via
 
 ROBOT = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")

@@ -10,9 +10,8 @@ from scipy.signal import butter, ellip, sosfiltfilt, sosfreqz
 
 from vsacli import Elastic, Rigid, Trajectory, inverse_dynamics
 from vsacli.trajectory.fits import LEAST_SQUARES, SMOOTH, fit_samples
-from vsacli.trajectory.fits.left_over import left_out_motion
-from vsacli.trajectory.fits.noise import white_noise_level
-from vsacli.trajectory.fits.ringing import ringing_ends
+from vsacli.trajectory.fits.noise import left_out_motion, white_noise_level
+from vsacli.trajectory.fits.spectrum import ringing_ends
 
 TIME = np.arange(901) / 100
 STEP = 0.01
