@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vsacli.robot.model import Robot
+from vsacli import Robot
 from vsacli.studies.identification.regressor import (
     SYMBOLS,
     BaseParameters,
