@@ -177,8 +177,8 @@ class Acceptance:
         flags = values["flags"]
         refused: BoolArray = (short < self.min_margin) | has_flag(flags, Flag.INFEASIBLE)
         refused |= self._near_limits(joint, values)
-        if self.recorded is not None:  # allowances take long, and matter only where nothing else refuses
-            flags = self.recorded.flags(self.robot, joint, values, instants, ~refused)
+        if self.recorded is not None:
+            flags = self.recorded.flags(self.robot, joint, values, instants)
         return refused | has_flag(flags, LIMITS)
 
     def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
