@@ -180,9 +180,8 @@ class Library:
         samples = len(rows[0])
         outputs = _aligned_rows(self._outputs, samples)
         sources = np.array([row.ctypes.data for row in rows], dtype=np.uintp)
-        targets = outputs.ctypes.data + np.arange(self._outputs, dtype=np.uintp) * np.uintp(
-            outputs.strides[0]
-        )
+        offsets = np.arange(self._outputs, dtype=np.uintp) * np.uintp(outputs.strides[0])
+        targets = outputs.ctypes.data + offsets
         given = sources.ctypes.data, targets.ctypes.data
         count = min(threads, max(1, samples // SAMPLES_PER_THREAD))
         own, *others = _parts(samples, count)
