@@ -52,9 +52,6 @@ SECTIONS = 16
 SHARE = 0.01
 """Relative stride of a scan."""
 
-ROWS_AT_ONCE = 10_000
-"""Samples evaluated in one call, which costs hardly more than that of a few."""
-
 LARGEST_RATIO = 100
 """Largest ratio by which an offset may change the stiffness of a joint if nothing else bounds it."""
 
@@ -95,24 +92,22 @@ def first_accepted(accepts: Callable[[Sequence[int]], Iterable[bool]], numbers: 
 
 
 def smallest_accepted(
-    refuse: Callable[[Sequence[int], IndexArray], Iterator[BoolArray]], samples: int, numbers: Sequence[int]
+    refuse: Callable[[int, IndexArray], BoolArray], samples: int, numbers: Sequence[int]
 ) -> int | None:
     """Return the smallest number that all samples accept, or None.
 
     Args:
-        refuse: yields masks of the samples with given indices that refuse some numbers, each (numbers,
-            samples), together for all numbers in turn.
+        refuse: returns a mask of the samples with given indices that refuse a number.
         samples: number of samples.
         numbers: ascending numbers to scan, see `first_accepted`.
     """
     few = evenly(samples, FEWEST)
 
     def accepts(tried: Sequence[int]) -> Iterator[bool]:
-        for masks in refuse(tried, few):
-            yield from np.all(~masks, axis=1)
+        return (not refuse(number, few).any() for number in tried)
 
     while (number := first_accepted(accepts, numbers)) is not None:
-        (refused,) = np.nonzero(next(refuse([number], np.arange(samples)))[0])
+        (refused,) = np.nonzero(refuse(number, np.arange(samples)))
         if not refused.size:
             break
         few = np.union1d(few, refused[evenly(len(refused), FEWEST)])
@@ -194,20 +189,18 @@ def _smallest_of_sign(
     exponent = math.floor(math.log10(softest)) - OFFSET_DIGITS
     unit, ratio = 10.0**exponent, LARGEST_RATIO - 1 if sign > 0 else 1 - 1 / LARGEST_RATIO
 
-    def refuse(numbers: Sequence[int], steps: IndexArray) -> Iterator[BoolArray]:
-        several = max(1, ROWS_AT_ONCE // len(steps))
-        for start in range(0, len(numbers), several):
-            tried = np.multiply(sign, numbers[start : start + several])
-            values = [float(f"{number}e{exponent}") for number in tried]  # nearest to the decimal fraction
-            raised = load.at(np.tile(steps, len(values))).changed(np.repeat(values, len(steps)))
-            yield acceptance.refused_steps(joint, raised).reshape(len(values), -1)
+    def offset(number: int) -> float:
+        return float(f"{sign * number}e{exponent}")  # nearest to the decimal fraction
+
+    def refuse(number: int, steps: IndexArray) -> BoolArray:
+        return acceptance.refused_steps(joint, load.at(steps).changed(offset(number)))
 
     first = math.ceil(max(bounds[0], 0.0) / unit - GRID_ROUNDING)
     last = math.floor(min(bounds[1], ratio * softest) / unit + GRID_ROUNDING)
     number = smallest_accepted(
         refuse, len(load.time), scanned_numbers(first, last, SHARE, sign * softest / unit)
     )
-    return None if number is None else float(f"{sign * number}e{exponent}")
+    return None if number is None else offset(number)
 
 
 def transitions_between_levels(trajectory: Trajectory) -> list[RestToRest]:
@@ -240,11 +233,10 @@ def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple
     def length(number: int) -> float:
         return min(float(f"{number}e{exponent}"), longest)
 
-    def refuse(numbers: Sequence[int], places: IndexArray) -> Iterator[BoolArray]:
-        for number in numbers:
-            longer = _with_transitions(trajectory, changes, limits, length(number))
-            part = TaskSamples.between(longer, instants[places])
-            yield np.any(acceptance.refused(part), axis=1)[np.newaxis]
+    def refuse(number: int, places: IndexArray) -> BoolArray:
+        longer = _with_transitions(trajectory, changes, limits, length(number))
+        refused: BoolArray = np.any(acceptance.refused(TaskSamples.between(longer, instants[places])), axis=1)
+        return refused
 
     number = smallest_accepted(refuse, len(instants), scanned_numbers(first + 1, last, SHARE))
     if number is None:
@@ -305,6 +297,7 @@ class FewSamples:
         self._acceptance, self.samples, self._impossible = acceptance, samples, impossible
         self._path = PathCommands(acceptance.robot, samples.motion)
         self.required = cache(self._compute_required)
+        self._constants: dict[tuple[int, str, float], float] = {}
 
     def with_further(self, samples: TaskSamples) -> FewSamples:
         """Return these samples with further ones."""
@@ -348,15 +341,14 @@ class FewSamples:
     def constant(self, index: int, branch: str, factors: tuple[float, ...], place: int) -> float:
         """Return the smallest constant that fixes a joint at one of the factors; infinite if none does."""
         key, count = (index, branch, factors[place]), len(self.samples.factor)
-        if key in self._impossible:
-            return math.inf
-        required = self.required(index, branch, factors)
-        load = required.load.at(slice(place * count, (place + 1) * count))
-        try:
-            return smallest_offset(self._acceptance, required.joint, load)
-        except ImpossibleError:
-            self._impossible.add(key)
-            return math.inf
+        if key not in self._constants and key not in self._impossible:
+            required = self.required(index, branch, factors)
+            load = required.load.at(slice(place * count, (place + 1) * count))
+            try:
+                self._constants[key] = smallest_offset(self._acceptance, required.joint, load)
+            except ImpossibleError:
+                self._impossible.add(key)
+        return self._constants.get(key, math.inf)
 
 
 def _mirror_images(one: Actuator, other: Actuator, command: Command) -> bool:

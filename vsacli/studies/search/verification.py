@@ -1,4 +1,4 @@
-"""Confirmation of motions: runs of all of them in batches, and a grid between the samples of each."""
+"""Confirmation of motions: a run of each, and a grid between its samples."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 from vsacli.analysis.batch import Batch
 from vsacli.analysis.joint_report import JointReport
 from vsacli.analysis.report import Report
-from vsacli.analysis.variant_groups import PreparedRun, batches
+from vsacli.analysis.variant_groups import PreparedRun
 from vsacli.base.arrays import FloatArray, evenly
 from vsacli.dynamics.inverse import usual_block
+from vsacli.dynamics.variants import Variants
 from vsacli.studies.search.acceptance import Acceptance
 from vsacli.studies.search.fix_report import Fix
 from vsacli.studies.search.loads import TaskSamples
@@ -45,27 +46,19 @@ class Verification(NamedTuple):
     refused: FloatArray | None
 
 
-def verify(
-    acceptance: Acceptance, runs: Sequence[PreparedRun], factors: Sequence[float] = (1.0,)
-) -> list[Verification]:
-    """Run motions, those of equally many samples together, and check them by a rule.
+def verify(acceptance: Acceptance, run: PreparedRun, factor: float = 1.0) -> Verification:
+    """Run a motion, and check it by a rule.
 
     Args:
         acceptance: acceptance rule.
-        runs: robots and motions.
-        factors: factor by which each motion is stretched, compared with the unchanged task.
+        run: robot and motion.
+        factor: factor by which the motion is stretched, compared with the unchanged task.
     """
-    verified: dict[int, Verification] = {}
-    for variants, members in batches(runs, ()):
-        trajectories = [runs[index].trajectory for index in members]
-        batch = Batch(variants, trajectories, min_margin=acceptance.min_margin)
-        for _ in batch:
-            pass
-        for variant, index in enumerate(members):
-            report = batch.findings(variant)
-            refused = _refused_instants(acceptance, runs[index], factors[index], report)
-            verified[index] = Verification(report.joints, refused)
-    return [verified[index] for index in range(len(runs))]
+    batch = Batch(Variants.of_one(run.robot), [run.trajectory], min_margin=acceptance.min_margin)
+    for _ in batch:
+        pass
+    report = batch.findings()
+    return Verification(report.joints, _refused_instants(acceptance, run, factor, report))
 
 
 def _refused_instants(
@@ -109,7 +102,6 @@ def _refused_between(acceptance: Acceptance, run: PreparedRun, factor: float) ->
 
 def verify_fixes(acceptance: Acceptance, fixes: Sequence[Fix]) -> Iterator[tuple[Fix, FloatArray | None]]:
     """Yield fixes with the findings of their runs, and the instants that refuse them; see `Verification`."""
-    runs = [PreparedRun(fix.robot, fix.trajectory) for fix in fixes]
-    verified = verify(acceptance, runs, [1 + fix.longer for fix in fixes])
-    for fix, verification in zip(fixes, verified, strict=True):
-        yield replace(fix, joints=verification.joints), verification.refused
+    for fix in fixes:
+        joints, refused = verify(acceptance, PreparedRun(fix.robot, fix.trajectory), 1 + fix.longer)
+        yield replace(fix, joints=joints), refused
