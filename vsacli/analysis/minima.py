@@ -209,7 +209,7 @@ class SampledFunctions(NamedTuple):
     @property
     def stop(self) -> int:
         """Index of the time after the last one."""
-        return self.first + self.time.shape[1]
+        return self.first + int(self.time.shape[1])
 
     def last(self, count: int) -> SampledFunctions:
         """Return the last `count` times."""
