@@ -40,7 +40,9 @@ def test_minima_between_three_samples(shape: str) -> None:
         return function(times - PLACES[which][:, None])
 
     time = np.array([-1.0, 0.0, 1.0])
-    given = find_brackets(SampledFunctions(0, time, function(time - PLACES[:, None])))
+    given = find_brackets(
+        SampledFunctions(0, np.tile(time, (len(PLACES), 1)), function(time - PLACES[:, None]))
+    )
     found = narrow_brackets(given, evaluate, np.zeros(len(PLACES)))
     beside = 3 * (shape == "jump")  # whose lower side may show at the next sample
     assert len(found.function) == len(PLACES) - beside
@@ -61,7 +63,7 @@ def test_what_is_known_is_not_computed() -> None:
 
 def test_local_minima_of_rows() -> None:
     values = np.array([[3, 2, 2, 4, 1, 5], [0, 1, 2, 1, 1, 1], [np.inf, 1, np.inf, 4, 5, np.inf]])
-    found = find_brackets(SampledFunctions(0, np.arange(6.0), values))
+    found = find_brackets(SampledFunctions(0, np.tile(np.arange(6.0), (len(values), 1)), values))
     assert list(zip(found.function.tolist(), found.time[:, 1].tolist(), strict=True)) == [
         (0, 2.0), (0, 4.0), (2, 1.0), (2, 3.0),
     ]  # fmt: skip

@@ -201,9 +201,8 @@ class MinimaSearch:
         return by_variant.swapaxes(0, 1).reshape(len(self._sides.quantity), by_variant.shape[-1])
 
     def _times_by_side(self, time: FloatArray) -> FloatArray:
-        """Return the times of samples for `SampledFunctions`, a row if they are those of all variants."""
-        times = time.reshape(self._variants, -1)
-        return times[0] if (times == times[0]).all() else np.repeat(times, self._sides.count, axis=0)
+        """Return the times of samples for the sides of all variants, (sides of all, samples)."""
+        return np.repeat(time.reshape(self._variants, -1), self._sides.count, axis=0)
 
     def _scan(self, block: Block) -> None:
         """Search whole runs of few samples, at the same number of times from each sample to the next."""

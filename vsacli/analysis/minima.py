@@ -198,7 +198,7 @@ class SampledFunctions(NamedTuple):
 
     Attributes:
         first: Index of the first time.
-        time: Times, ascending, (times,), or those of each function, (functions, times).
+        time: Times of each function, ascending, (functions, times).
         value: Values at these times, (functions, times).
     """
 
@@ -209,31 +209,28 @@ class SampledFunctions(NamedTuple):
     @property
     def stop(self) -> int:
         """Index of the time after the last one."""
-        return self.first + int(self.time.shape[-1])
+        return self.first + int(self.time.shape[1])
 
     def last(self, count: int) -> SampledFunctions:
         """Return the last `count` times."""
         dropped = max(0, self.time.shape[-1] - count)
-        return SampledFunctions(self.first + dropped, self.time[..., dropped:], self.value[:, dropped:])
+        return SampledFunctions(self.first + dropped, self.time[:, dropped:], self.value[:, dropped:])
 
     def followed_by(self, time: FloatArray, value: FloatArray) -> SampledFunctions:
         """Return these times followed by others."""
-        times = np.concatenate((self.time, time), axis=-1)
-        return SampledFunctions(self.first, times, np.hstack((self.value, value)))
+        return SampledFunctions(self.first, np.hstack((self.time, time)), np.hstack((self.value, value)))
 
     def opened(self) -> SampledFunctions:
         """Return these with the first time twice, so that it has a neighbor on either side."""
-        first = SampledFunctions(self.first - 1, self.time[..., :1], self.value[:, :1])
+        first = SampledFunctions(self.first - 1, self.time[:, :1], self.value[:, :1])
         return first.followed_by(*self[1:])
 
     def closed(self) -> SampledFunctions:
         """Return these with the last time twice, slightly higher: the end of a fall is a minimum."""
-        return self.followed_by(self.time[..., -1:], np.nextafter(self.value[:, -1:], np.inf))
+        return self.followed_by(self.time[:, -1:], np.nextafter(self.value[:, -1:], np.inf))
 
     def places(self, function: IndexArray, time: FloatArray) -> IndexArray:
         """Return where times, (n,), of functions are among the times of these functions, from the left."""
-        if self.time.ndim == 1:
-            return np.searchsorted(self.time, time)
         places = np.empty(len(time), dtype=np.intp)
         for number in set(function.tolist()):
             of_number = function == number
@@ -242,7 +239,7 @@ class SampledFunctions(NamedTuple):
 
     def times(self, function: IndexArray, place: IndexArray) -> FloatArray:
         """Return the times of functions at places, (n,)."""
-        return self.time[place] if self.time.ndim == 1 else self.time[function, place]
+        return self.time[function, place]
 
 
 class Brackets(NamedTuple):

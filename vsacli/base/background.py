@@ -18,7 +18,8 @@ def ahead(function: Callable[[_Item], _Result], items: Iterable[_Item]) -> Itera
     """Yield results of a function, each computed in a thread while the caller uses the previous one.
 
     The items are produced in the caller's thread: two threads that both execute Python code would wait for
-    one another. An exception of the function is raised here, in place of its result.
+    one another. An exception of the function is raised here, in place of its result. Without this, 10^6
+    samples of a 3R in two threads take 1.2 times as long.
     """
     coming: deque[Future[_Result]] = deque()
     with ThreadPoolExecutor(1, "vsacli-ahead") as thread:

@@ -104,7 +104,10 @@ def state_derivative(
 
 @lru_cache(KEPT_PROGRAMS)
 def plant_of(robot: Robot, frame: WrenchFrame | None = None) -> Plant:
-    """Return the plant of a robot, prepared once for many calls; see `Plant`."""
+    """Return the plant of a robot, prepared once for many calls; see `Plant`.
+
+    Prepared for each call, `state_derivative` of a 7R takes 3 times as long.
+    """
     return Plant(robot, frame)
 
 

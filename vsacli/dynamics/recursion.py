@@ -11,8 +11,7 @@ Every quantity of frame k is a derivative taken in the base frame, written in co
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
 from vsacli.compute.control_flow import call
@@ -122,16 +121,10 @@ def base_frame(gravity: Vector) -> FrameMotion:
     return FrameMotion(_Angular(ZERO, ZERO, ZERO, ZERO), a=ZERO - gravity, j=ZERO, s=ZERO)
 
 
-def forward(
-    inputs: RecursionInputs, known: Mapping[int, MovingBody] = MappingProxyType({})
-) -> list[MovingBody]:
-    """Run (36)-(51) from the base to the tips, except for links whose motion is known, by index."""
+def forward(inputs: RecursionInputs) -> list[MovingBody]:
+    """Run (36)-(51) from the base to the tips."""
     base, bodies = base_frame(inputs.gravity), list[MovingBody]()
-    joints = zip(inputs.links, inputs.states, inputs.carriers, strict=True)
-    for index, (link, state, (parent, seat)) in enumerate(joints):
-        if index in known:
-            bodies.append(known[index])
-            continue
+    for link, state, (parent, seat) in zip(inputs.links, inputs.states, inputs.carriers, strict=True):
         frame = bodies[parent].frame if parent >= 0 else base
         # `call` computes e.g. _forward(link, state, frame); it lets links of equal structure share one body.
         if seat is not None:

@@ -169,6 +169,8 @@ def trajectory_file_class(
 ) -> type[TrajectoryFile]:
     """Return the class of trajectory files for joints that need these signals.
 
+    With another class for each file, `load_trajectory` of a 7R takes 1.7 times as long.
+
     Args:
         taken: keys of the signals that command some joint. They are required, except those of devices.
         rigid: whether all joints are rigid.

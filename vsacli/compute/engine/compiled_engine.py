@@ -69,7 +69,7 @@ def _trial(kernel: Kernel) -> Trial:
 
 @lru_cache(maxsize=32)
 def kernel_code(kernel: Kernel) -> Code:
-    """Return the C code of a kernel.
+    """Return the C code of a kernel; with other code for each run, those of a 3R take 4 times as long.
 
     Raises:
         NotImplementedError: The kernel cannot be traced.

@@ -107,6 +107,7 @@ def _command(wanted: str) -> tuple[str, ...]:
 
 @lru_cache(maxsize=4)
 def _examined(command: tuple[str, ...], _path: str) -> Compiler:
+    """Return a compiler; asked anew, five runs of a 3R with 20,000 samples take 1.6 times as long."""
     macros = _output(command, NATIVE, "-dM", "-E", "-x", "c", os.devnull)
     if any(f"#define {lie}\n" in f"{macros}\n" for lie in LIES):
         raise CompilerError(
@@ -179,9 +180,8 @@ class Library:
         samples = len(rows[0])
         outputs = _aligned_rows(self._outputs, samples)
         sources = np.array([row.ctypes.data for row in rows], dtype=np.uintp)
-        targets = outputs.ctypes.data + np.arange(self._outputs, dtype=np.uintp) * np.uintp(
-            outputs.strides[0]
-        )
+        offsets = np.arange(self._outputs, dtype=np.uintp) * np.uintp(outputs.strides[0])
+        targets = outputs.ctypes.data + offsets
         given = sources.ctypes.data, targets.ctypes.data
         count = min(threads, max(1, samples // SAMPLES_PER_THREAD))
         own, *others = _parts(samples, count)

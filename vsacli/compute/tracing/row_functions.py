@@ -175,6 +175,8 @@ class _Call(NamedTuple):
 class CallingRowFunction:
     """A program of calls on rows of any length; otherwise as `RowFunction`.
 
+    Untraced, 10^5 samples of 20 joints take 1.7 times as long.
+
     Raises:
         NotImplementedError: The program has loops, branches or tables.
     """

@@ -35,7 +35,8 @@ CHUNK_CACHE_SLOTS = 11
 """Slots of HDF5's chunk cache for a dataset: few, since rows are written in order."""
 
 BEHIND_FROM = 2**24
-"""Bytes written directly, in some 10 ms, before a thread is worth its start."""
+"""Bytes written directly, in some 10 ms, before a thread is worth its start. Without the thread, 10^6 samples
+of a 3R with compiled code take at least 1.26 times as long."""
 
 BEHIND = 2**25
 """Bytes that may wait to be written: slightly more than a block of seven joints with all variables."""
@@ -244,6 +245,8 @@ def chunk_rows(samples: int, row_bytes: int) -> int:
 
 class ChunkFiller:
     """Appends samples to a dataset, chunk by chunk.
+
+    With blocks assigned to the dataset, 400,000 samples of a 3R with compiled code take 1.2 times as long.
 
     Args:
         dataset: dataset whose first axis is time, with chunks as wide as its rows, and no filter but gzip.

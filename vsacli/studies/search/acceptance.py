@@ -1,7 +1,7 @@
 """The constraints of every search: margin and limits at each sample, judged exactly as a run judges them.
 
 `Acceptance` is the rule. `admissible_stiffness` is the range that margin, stiffness limits and deflection
-limits leave to a joint. `verify` confirms motions by runs in batches, and on a grid between their samples.
+limits leave to a joint. `verify` confirms a motion by a run, and on a grid between its samples.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.analysis.batch import Batch
 from vsacli.analysis.joint_report import JointReport
 from vsacli.analysis.report import Report
-from vsacli.analysis.variant_groups import PreparedRun, batches
+from vsacli.analysis.variant_groups import PreparedRun
 from vsacli.base import units
 from vsacli.base.arrays import FLAG_TYPE, BoolArray, FlagArray, FloatArray, evenly
 from vsacli.base.errors import VsacliError
@@ -27,6 +27,7 @@ from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.dynamics.drive import drive
 from vsacli.dynamics.inverse import compute_block, usual_block
 from vsacli.dynamics.limits import MARGIN, Finding, limit_checks, limit_flags, worst_excess
+from vsacli.dynamics.variants import Variants
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.fix_report import Fix
@@ -181,8 +182,8 @@ class Acceptance:
         flags = values["flags"]
         refused: BoolArray = (short < self.min_margin) | has_flag(flags, Flag.INFEASIBLE)
         refused |= self._near_limits(joint, values)
-        if self.recorded is not None:  # allowances take long, and matter only where nothing else refuses
-            flags = self.recorded.flags(self.robot, joint, values, instants, ~refused)
+        if self.recorded is not None:
+            flags = self.recorded.flags(self.robot, joint, values, instants)
         return refused | has_flag(flags, LIMITS)
 
     def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
@@ -342,27 +343,19 @@ class Verification(NamedTuple):
     refused: FloatArray | None
 
 
-def verify(
-    acceptance: Acceptance, runs: Sequence[PreparedRun], factors: Sequence[float] = (1.0,)
-) -> list[Verification]:
-    """Run motions, those of equally many samples together, and check them by a rule.
+def verify(acceptance: Acceptance, run: PreparedRun, factor: float = 1.0) -> Verification:
+    """Run a motion, and check it by a rule.
 
     Args:
         acceptance: acceptance rule.
-        runs: robots and motions.
-        factors: factor by which each motion is stretched, compared with the unchanged task.
+        run: robot and motion.
+        factor: factor by which the motion is stretched, compared with the unchanged task.
     """
-    verified: dict[int, Verification] = {}
-    for variants, members in batches(runs, ()):
-        trajectories = [runs[index].trajectory for index in members]
-        batch = Batch(variants, trajectories, min_margin=acceptance.min_margin)
-        for _ in batch:
-            pass
-        for variant, index in enumerate(members):
-            report = batch.findings(variant)
-            refused = _refused_instants(acceptance, runs[index], factors[index], report)
-            verified[index] = Verification(report.joints, refused)
-    return [verified[index] for index in range(len(runs))]
+    batch = Batch(Variants.of_one(run.robot), [run.trajectory], min_margin=acceptance.min_margin)
+    for _ in batch:
+        pass
+    report = batch.findings()
+    return Verification(report.joints, _refused_instants(acceptance, run, factor, report))
 
 
 def _refused_instants(
@@ -406,7 +399,6 @@ def _refused_between(acceptance: Acceptance, run: PreparedRun, factor: float) ->
 
 def verify_fixes(acceptance: Acceptance, fixes: Sequence[Fix]) -> Iterator[tuple[Fix, FloatArray | None]]:
     """Yield fixes with the findings of their runs, and the instants that refuse them; see `Verification`."""
-    runs = [PreparedRun(fix.robot, fix.trajectory) for fix in fixes]
-    verified = verify(acceptance, runs, [1 + fix.longer for fix in fixes])
-    for fix, verification in zip(fixes, verified, strict=True):
-        yield replace(fix, joints=verification.joints), verification.refused
+    for fix in fixes:
+        joints, refused = verify(acceptance, PreparedRun(fix.robot, fix.trajectory), 1 + fix.longer)
+        yield replace(fix, joints=joints), refused

@@ -87,8 +87,7 @@ def falls_short(what: Optimum, trajectory: Trajectory) -> FloatArray | None:
     None means that it keeps them; an empty array means that only the self-check fails.
     """
     run = PreparedRun(what.robot, trajectory)
-    (verification,) = verify(Acceptance(what.robot, what.min_margin), [run])
-    return verification.refused
+    return verify(Acceptance(what.robot, what.min_margin), run).refused
 
 
 HALVES = 2

@@ -191,7 +191,11 @@ class CombinedSearch:
             numbers = np.union1d(finer, around).tolist()
 
     def _best(self, scan: _Scan) -> tuple[int, Combination | None]:
-        """Return the place of the smallest combination of a scan, and this combination."""
+        """Return the place of the smallest combination of a scan, and this combination.
+
+        Sizes of a scan are lower bounds, without which fixes of a 3R with too low a stiffness take 4.4 times
+        as long.
+        """
         best, at = None, 0
         for place in np.argsort(scan.sizes, kind="stable").tolist():
             if best is not None and scan.sizes[place] >= best.size:

@@ -75,7 +75,7 @@ def fixes(
     task = Task(Acceptance(robot, min_margin, RecordedLimits(trajectory)), trajectory)
     damped = damped_joints(robot, trajectory)
     if damped or not task.refused_loads:
-        (as_it_is,) = verify(task.acceptance, [PreparedRun(robot, trajectory)])
+        as_it_is = verify(task.acceptance, PreparedRun(robot, trajectory))
         if as_it_is.refused is None:
             return Fixes(min_margin)
         if damped:

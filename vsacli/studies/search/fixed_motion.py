@@ -68,7 +68,6 @@ class FixedMotion:
         self.stiffness = float(np.median(load.command.commanded[STIFFNESS.key]))
         self.smoothings = SMOOTHINGS if _has_sharp_friction(joint) else criterion.smoothings
         self._speed = math.sqrt(float(np.mean(load.command.dq**2))) or 1.0
-        self._smoothed: dict[float, tuple[Joint, Joint]] = {}
         self._limits = [check for check in limit_checks(joint) if check.variable in OF_MOTORS]
 
     @property
@@ -97,9 +96,10 @@ class FixedMotion:
     def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> JointVariables:
         """Return the variables of the motors for a stiffness and its derivatives."""
         load = self.load.at(instants).command
-        plain, carrying = self._joints(self.scale.smoothing)
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
-        joint = carrying if isinstance(rows[0], Dual) else plain
+        joint = self._smoothed_joint()
+        if isinstance(rows[0], Dual):
+            joint = made_to_carry(joint, STIFFNESS.orders, moving_corridor=False)
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
             return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
 
@@ -117,14 +117,11 @@ class FixedMotion:
             costs[number] = self.criterion.of(self.joint, JointVariables.of(own), time)
         return np.where(np.isnan(costs), np.inf, costs)
 
-    def _joints(self, smoothing: float) -> tuple[Joint, Joint]:
-        """Return the joint with its sharp friction smoothed, and a copy that carries derivatives."""
-        if smoothing not in self._smoothed:
-            width = smoothing * self._speed
-            joint = _with_friction_of(self.joint, width) if _has_sharp_friction(self.joint) else self.joint
-            carrying = made_to_carry(joint, STIFFNESS.orders, moving_corridor=False)
-            self._smoothed[smoothing] = joint, carrying
-        return self._smoothed[smoothing]
+    def _smoothed_joint(self) -> Joint:
+        """Return the joint with its sharp friction smoothed."""
+        if not _has_sharp_friction(self.joint):
+            return self.joint
+        return _with_friction_of(self.joint, self.scale.smoothing * self._speed)
 
 
 def _has_sharp_friction(joint: Joint) -> bool:

@@ -99,7 +99,8 @@ class _Prepared(NamedTuple):
 class Computer:
     """Computation of the runs of a study, those that differ in numbers alone together.
 
-    A trajectory is read again only if it, or the robot's joints, differ from those of the previous run.
+    A trajectory is read again only if it, or the robot's joints, differ from those of the previous run. Read
+    for each run, 300 runs of a 3R take 3 times as long; computed one by one, 11 times.
     """
 
     def __init__(self, study: Study) -> None:

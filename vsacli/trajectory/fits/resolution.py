@@ -190,7 +190,8 @@ velocity smoothed over 50 ms were missed by 0.03 rad, and motor torques were off
 
 ASKED_AT = 256
 """Number of spans at which a search that has accepted nothing asks whether finer ones can show anything. Most
-searches have ended before; the question takes as long as the resolution of 32 spans."""
+searches have ended before; the question takes as long as the resolution of 32 spans. Without it, a fit to
+10,000 samples of white noise takes 4 times as long."""
 
 MISSED = 0.3
 """Largest residual over the recording's standard deviation. A larger one is motion that only the finest

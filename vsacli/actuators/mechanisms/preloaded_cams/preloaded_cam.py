@@ -90,7 +90,10 @@ class PreloadedCam(Mechanism):
 
 @lru_cache(maxsize=1024)
 def _solver(cam: PreloadedCam) -> CamSolver:
-    """Return the solver of a cam; equal cams share one, with the map of the branch."""
+    """Return the solver of a cam; equal cams share one, with the map of the branch.
+
+    Otherwise the run of the bundled MACCEPA takes 3 times as long.
+    """
     low, high = cam.deflection_range
     domain = low - cam.rest, high - cam.rest
     branch = map_branch(cam.lift, domain, cam.k, cam.pretension)
