@@ -6,13 +6,13 @@ left out: a smooth curve through their neighbors replaces them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import POSITION
+from vsacli.base.signals import POSITION, Signal
 from vsacli.base.units import Quantity, WrenchQuantity, time_text
 from vsacli.trajectory.recorded.faults import (
     Faults,
@@ -44,7 +44,10 @@ class CheckedSignals(NamedTuple):
 
 
 def check_health(
-    stamps: FloatArray, records: Sequence[SignalSamples], types: Sequence[str] = ()
+    stamps: FloatArray,
+    records: Sequence[SignalSamples],
+    types: Sequence[str] = (),
+    interpolated: Collection[Signal] = (),
 ) -> CheckedSignals:
     """Find probable faults of a usable recording, and leave outliers out.
 
@@ -52,11 +55,16 @@ def check_health(
         stamps: recorded stamps, (samples,), s.
         records: signals that are used, without problems.
         types: joint types, "revolute" or "prismatic", for units; empty if unknown.
+        interpolated: signals whose spline passes all samples; those with all derivatives are computed, as
+            the tables of fixes and optima are, and are not checked.
     """
     if len(stamps) <= ORDER:
         return CheckedSignals(list(records), [])
     checked = CheckedSignals([], list(stamp_faults(stamps)))
     for record in records:
+        if record.complete and record.signal in interpolated:
+            checked.records.append(record)
+            continue
         columns = {name: rows.copy() for name, rows in record.columns.items()}
         names = record.signal.names
         # a stiffness with its derivatives is computed, not measured: outliers are kinks of its profile
