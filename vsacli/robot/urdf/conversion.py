@@ -9,8 +9,8 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -81,6 +81,7 @@ class Conversion:
         snaps: axes that were made parallel.
         residual: deviation of the robot's tools from the URDF's tips.
         file_warnings: words of the file that are ignored, and implausible orientations, by line.
+        devices: device whose actuator a joint has instead of a placeholder, by name of the joint.
     """
 
     file: str
@@ -91,11 +92,21 @@ class Conversion:
     snaps: tuple[Snap, ...]
     residual: KinematicResidual
     file_warnings: tuple[Problem, ...] = ()
+    devices: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def one_motor_each(self) -> bool:
-        """Whether a single motor drives each joint, so that effort limits and gears of the URDF apply."""
-        return all(joint.actuator.motor_count == 1 for joint in self.robot.joints)
+    def with_devices(self, devices: Mapping[str, tuple[str, Joint]]) -> Conversion:
+        """Return the conversion with joints driven by devices: their actuator, damper and damping.
+
+        Args:
+            devices: name of a device, and a joint that it drives, by name of the joint here.
+        """
+        joints = []
+        for joint in self.robot.joints:
+            _, driven = devices.get(joint.name, ("", joint))
+            drive = {"actuator": driven.actuator, "damper": driven.damper, "damping": driven.damping}
+            joints.append(replace(joint, **drive))
+        names = {joint: device for joint, (device, _) in devices.items()}
+        return replace(self, robot=replace(self.robot, joints=tuple(joints)), devices=names)
 
     def __str__(self) -> str:
         """Return the Denavit-Hartenberg table, its accuracy, warnings, and notes."""
@@ -153,6 +164,9 @@ class Conversion:
                 yield f"several links end beyond {tip.link}, where the tool is: {others}; {another}"
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
+        if self.devices:
+            driven = (f"{joint} {device}" for joint, device in self.devices.items())
+            yield f"actuators of devices, with their damping: {', '.join(driven)}"
         yield from self._of_motors()
         left_out: dict[str, list[str]] = {}
         for joint, phrase, value in self._left_out():
@@ -169,15 +183,20 @@ class Conversion:
 
     def _of_motors(self) -> Iterator[str]:
         """Yield notes on effort limits and gears, which apply to a single motor."""
-        joints = [joint.urdf for joint in self.tree.joints]
-        motor_data = {
-            "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
-            "gear reductions": [f"{joint.name} {joint.gear_ratio:g}" for joint in joints if joint.gear_ratio],
-        }
-        taken = "taken over" if self.one_motor_each else "not taken over, since two motors share a joint"
-        for quantity, names in motor_data.items():
-            if names:
-                yield f"{quantity} {taken}: {', '.join(names)}"
+        counts = [joint.actuator.motor_count for joint in self.robot.joints]
+        for count, taken in ((1, "taken over"), (2, "not taken over, since two motors share a joint")):
+            joints = [
+                each.urdf for each, motors in zip(self.tree.joints, counts, strict=True) if motors == count
+            ]
+            motor_data = {
+                "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
+                "gear reductions": [
+                    f"{joint.name} {joint.gear_ratio:g}" for joint in joints if joint.gear_ratio
+                ],
+            }
+            for quantity, names in motor_data.items():
+                if names:
+                    yield f"{quantity} {taken}: {', '.join(names)}"
 
 
 def _describe_held_joints(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:

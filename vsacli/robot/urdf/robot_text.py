@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from vsacli.base import file_formats
@@ -17,6 +18,7 @@ from vsacli.documents.fields import (
     OneOf,
     PairOf,
     RecordOf,
+    TablePath,
     ValueKind,
     WordChoice,
     declared_fields,
@@ -82,8 +84,13 @@ def _joint_lines(conversion: Conversion, index: int) -> Iterator[str]:
     yield "    actuator:"
     yield f"      type: {joint.actuator_type}"
     for name, text in _format_fields(joint.actuator).items():
-        comment = f"# placeholder: {_origin_of(name, conversion, index)}"
-        yield _append_comment(f"      {name}: {text}", comment)
+        device = conversion.devices.get(joint.name)
+        origin_of_field = (
+            f"of the device {device}" if device else f"placeholder: {_origin_of(name, conversion, index)}"
+        )
+        yield _append_comment(f"      {name}: {text}", f"# {origin_of_field}")
+    if joint.damper is not None:
+        yield f"    damper: {_format_mapping(_format_fields(joint.damper))}"
     if joint.limits != Limits():
         yield _append_comment(f"    limits: {_format_limits(joint.limits)}", "# of the joint's motion")
 
@@ -117,7 +124,8 @@ def _origin_of(field: str, conversion: Conversion, index: int) -> str:
     motor_data = " and ".join(_describe_urdf_motor(joint.urdf))
     if field != "motor" or not motor_data:
         return origin
-    return f"{origin}; {'with' if conversion.one_motor_each else 'the URDF has'} {motor_data}"
+    one_motor = conversion.robot.joints[index].actuator.motor_count == 1
+    return f"{origin}; {'with' if one_motor else 'the URDF has'} {motor_data}"
 
 
 def _describe_urdf_motor(joint: UrdfJoint) -> Iterator[str]:
@@ -151,6 +159,8 @@ def _format_field(kind: ValueKind, content: Any) -> str:
             return _format_number(content)
         case WordChoice():
             return str(content)
+        case TablePath():
+            return json.dumps(Path(content.source.path).name)
         case Interval() | NumberList():
             return _format_numbers(content)
     return json.dumps(content)
