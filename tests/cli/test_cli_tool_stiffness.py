@@ -8,7 +8,7 @@ import shlex
 import numpy as np
 import pytest
 import yaml
-from samples.command_line import REPOSITORY
+from samples.command_line import REPOSITORY, ROBOT
 from samples.studies import column
 from samples.torso import ACTUATOR, SWING, torso_text
 
@@ -399,3 +399,17 @@ def test_analyses_that_do_not_judge_tools_say_so(vsacli, own_folder):
         assert "min_stiffness of index_tip is not judged here" in vsacli(command, "hand.yaml", motion).out
         plain = vsacli(command, REPOSITORY / "robots" / "hand_3x2r.yaml", motion).out
         assert "min_stiffness" not in plain
+
+
+def test_what_infeasible_samples_lack_is_said(vsacli, too_soft, motion):
+    """Minima and sums skip these samples in silence otherwise, and look like those of the motion."""
+    for path, tools, efforts in (
+        (motion, "smallest stiffness of tools: end_effector", "co-contraction: up to"),
+        (
+            too_soft,
+            "smallest stiffness of tools over feasible samples: end_effector",
+            "co-contraction of joints computed throughout: up to",
+        ),
+    ):
+        out = vsacli("invdyn", ROBOT, path, "--set", "rate=50", *ASKED, "-o", f"{path.stem}.h5").out
+        assert (tools in out, efforts in out) == (True, True), out

@@ -17,7 +17,8 @@ from vsacli.dynamics.energy import JointEnergy
 def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str]:
     """Yield the total energies, if all joints have them, and the joints with the largest ones."""
     energies = [energy for _, _, energy in joints]
-    if not any(math.isnan(energy.spent) for energy in energies):
+    incomplete = any(math.isnan(energy.spent) for energy in energies)
+    if not incomplete:
         spent, recovered = (
             short_number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
         )
@@ -32,7 +33,8 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
         name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
         unit = TORQUE.unit(joint_type)
         effort, load = f"{short_number(most.co_contraction)} {unit}", f"{short_number(most.load)} {unit}"
-        yield f"co-contraction: up to {effort} rms per motor ({name}); its load requires {load}"
+        among = " of joints computed throughout" if incomplete else ""
+        yield f"co-contraction{among}: up to {effort} rms per motor ({name}); its load requires {load}"
 
 
 def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:

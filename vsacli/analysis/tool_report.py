@@ -58,8 +58,13 @@ def unjudged_tools_text(limited_tools: Sequence[str]) -> str:
     return f"min_stiffness of {joined(limited_tools)} is not judged here; check-feasibility does so"
 
 
-def tool_stiffness_lines(tools: Sequence[ToolReport]) -> Iterator[str]:
-    """Yield how stiff each tool is at least, where, and in which direction."""
+def tool_stiffness_lines(tools: Sequence[ToolReport], *, infeasible: bool = False) -> Iterator[str]:
+    """Yield how stiff each tool is at least, where, and in which direction.
+
+    Args:
+        tools: findings at the tools.
+        infeasible: whether samples are infeasible, at which a stiffness need not exist.
+    """
     unit = LINEAR_STIFFNESS.unit("")
     entries = [
         f"{tool.name} does not yield"
@@ -70,4 +75,5 @@ def tool_stiffness_lines(tools: Sequence[ToolReport]) -> Iterator[str]:
         if tool.rigid or math.isfinite(tool.stiffness)
     ]
     if entries:
-        yield wrap_joint_entries("smallest stiffness of tools: ", entries)
+        among = " over feasible samples" if infeasible else ""
+        yield wrap_joint_entries(f"smallest stiffness of tools{among}: ", entries)
