@@ -54,6 +54,10 @@ MOST_APART = 7
 """Largest number of joints that are described one by one."""
 
 
+FAR_END = 100.0
+"""Smallest upper end of an attainable range, relative to its lower end and to the commanded stiffness, that
+counts as none: limits of motors and deflections bind before, such as at 519 of 8.95e10 N m/rad."""
+
 WHOLE = 1e3
 """Number from which on no decimals are shown."""
 
@@ -79,7 +83,7 @@ def joint_rows(joints: Sequence[JointReport]) -> list[tuple[str, ...]]:
     )
     columns: tuple[Callable[[JointReport], tuple[float, ...]], ...] = (
         lambda joint: (joint.peak_tau_e, *joint.peak_tau_motor),
-        lambda joint: joint.attainable,
+        _bounding_range,
     )
     huge = [any(EXPONENT <= value < math.inf for joint in joints for value in of(joint)) for of in columns]
     return [header, *(_joint_row(joint, *huge) for joint in joints)]
@@ -92,7 +96,10 @@ def _joint_row(joint: JointReport, huge: bool, huge_range: bool) -> tuple[str, .
         " / ".join(short_number(peak, huge=huge) for peak in values_of_motors(joint, joint.peak_tau_motor)),
         _stiffness_range(joint.commanded_min, joint.commanded_max),
         *(
-            (_attainable_range(*joint.attainable, huge_range), short_percent(joint.margin).removesuffix(" %"))
+            (
+                _attainable_range(*_bounding_range(joint), huge_range),
+                short_percent(joint.margin).removesuffix(" %"),
+            )
             if "stiffness" in actuator_kind(joint).commanded
             else ("-", "-")
         ),
@@ -108,6 +115,13 @@ def actuator_kind(joint: JointReport) -> type[Actuator]:
 def values_of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
     """Return the values of a pair for the motors that the joint has."""
     return pair[: actuator_kind(joint).motor_count]
+
+
+def _bounding_range(joint: JointReport) -> tuple[float, float]:
+    """Return the attainable range; without an upper end so far away that it bounds no stiffness."""
+    lower, upper = joint.attainable
+    far = upper > FAR_END * max(lower, joint.commanded_max)
+    return lower, math.inf if far else upper
 
 
 def _attainable_range(lower: float, upper: float, huge: bool) -> str:
