@@ -182,10 +182,14 @@ class Items(ValueKind):
 
 
 class ItemsByName(Items):
-    """A mapping from names to records, read as a tuple of records whose field `name` is the key of each."""
+    """A mapping from names to records, read as a tuple of records whose field `name` is the key of each.
 
-    def __init__(self, item: ValueKind) -> None:
+    `noun` is the thing that the names are of, for messages.
+    """
+
+    def __init__(self, item: ValueKind, noun: str) -> None:
         super().__init__(item, unique="name")
+        self.noun = noun
 
 
 class OneOrMore(Items):
