@@ -356,7 +356,8 @@ def test_an_optimization_refuses_a_limit_that_it_does_not_keep(vsacli, torso):
     found = vsacli("optimize", *torso, "--set", "tools.left_hand.min_stiffness=300")
     assert found.code == 2
     assert "do not keep the min_stiffness of tools (left_hand)" in found.err
-    assert "check-feasibility --fixes" in found.err
+    assert "a lower bound by limits.stiffness, which is kept" in found.err
+    assert "check-feasibility --fixes of the optimized motion may help as well" in found.err
 
 
 @pytest.mark.slow

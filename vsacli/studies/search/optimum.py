@@ -128,6 +128,7 @@ class Optimum(Published):
         trajectory: best trajectory; None if nothing was found.
         pace: pace dt/ds along the path, a spline whose argument is s; None if the timing is unchanged.
         warnings: sentences about implausible values of robot and commanded trajectory.
+        admissible: whether the commanded motion keeps the margin and all limits, as the optimum does.
     """
 
     robot: Robot = field(repr=False)
@@ -144,6 +145,7 @@ class Optimum(Published):
     trajectory: Trajectory | None = field(default=None, repr=False)
     pace: BSpline[np.float64] | None = field(default=None, repr=False)
     warnings: tuple[str, ...] = ()
+    admissible: bool = True
 
     format: ClassVar[str] = "vsacli-optimum/2"
     shape: ClassVar = {
@@ -206,7 +208,9 @@ class Optimum(Published):
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""
-        warnings = list(warnings_and_notes(self.warnings, ()))
+        margin = f"{100 * self.min_margin:.4g} %"
+        beyond = f"as commanded, the motion breaks a limit or the margin of {margin}, which the optimum keeps"
+        warnings = list(warnings_and_notes(self.warnings, () if self.admissible else (beyond,)))
         if self.trajectory is None:
             return ReportText(self.title, [*self.reasons, *warnings])
         if self.timing is not None:
