@@ -31,9 +31,8 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
     paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
     if paired:
         name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
-        unit = TORQUE.unit(joint_type)
+        unit, among = TORQUE.unit(joint_type), " of joints computed throughout" if incomplete else ""
         effort, load = f"{short_number(most.co_contraction)} {unit}", f"{short_number(most.load)} {unit}"
-        among = " of joints computed throughout" if incomplete else ""
         yield f"co-contraction{among}: up to {effort} rms per motor ({name}); its load requires {load}"
 
 
@@ -120,8 +119,7 @@ def values_of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[flo
 def _bounding_range(joint: JointReport) -> tuple[float, float]:
     """Return the attainable range; without an upper end so far away that it bounds no stiffness."""
     lower, upper = joint.attainable
-    far = upper > FAR_END * max(lower, joint.commanded_max)
-    return lower, math.inf if far else upper
+    return lower, math.inf if upper > FAR_END * max(lower, joint.commanded_max) else upper
 
 
 def _attainable_range(lower: float, upper: float, huge: bool) -> str:

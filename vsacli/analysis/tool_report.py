@@ -75,5 +75,6 @@ def tool_stiffness_lines(tools: Sequence[ToolReport], *, infeasible: bool = Fals
         if tool.rigid or math.isfinite(tool.stiffness)
     ]
     if entries:
-        among = " over feasible samples" if infeasible else ""
-        yield wrap_joint_entries(f"smallest stiffness of tools{among}: ", entries)
+        yield wrap_joint_entries(
+            f"smallest stiffness of tools{' over feasible samples' if infeasible else ''}: ", entries
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,12 +11,13 @@ import click
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.base.errors import InputError, InvalidRecordError
 from vsacli.base.outputs import Outputs
+from vsacli.base.texts import joined
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import Number, Numbers, Words
-from vsacli.files.device_actuators import DEVICES, check_drives
+from vsacli.files.device_actuators import DEVICES, OF_DEVICE, check_drives
 
 if TYPE_CHECKING:
     from vsacli.robot.urdf import Conversion
@@ -27,10 +29,9 @@ class _DrivesType(Words):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """See `click.ParamType.convert`."""
         joint, equals, word = value.rpartition("=")
-        device = word.lower().replace("-", "_")
         if joint and word in ACTUATORS:
             self.fail(f"placeholders have one kind; expected {joint}=DEVICE, found {value!r}", param, ctx)
-        return f"{joint}{equals}{super().convert(device if device in DEVICES else word, param, ctx)}"
+        return f"{joint}{equals}{super().convert(word.lower().replace('-', '_'), param, ctx)}"
 
 
 def _check_placeholders(
@@ -41,13 +42,14 @@ def _check_placeholders(
     Raises:
         click.UsageError: with the option, and the one that has an effect.
     """
-    if motor_inertia is not None and actuator in DEVICES:
-        raise click.UsageError(f"--motor-inertia is of placeholders, but {actuator} has motors of its own")
-    if spring is not None and actuator != "antagonistic":
-        raise click.UsageError(f"--spring needs --actuator antagonistic, not {actuator}")
-    if stiffness is not None and actuator not in ("elastic", "serial"):
-        hint = "; for antagonistic joints give --spring" if actuator == "antagonistic" else ""
-        raise click.UsageError(f"--stiffness needs --actuator elastic or serial, not {actuator}{hint}")
+    for option, value, kinds in (
+        ("--spring", spring, ("antagonistic",)),
+        ("--stiffness", stiffness, ("elastic", "serial")),
+        ("--motor-inertia", motor_inertia, tuple(ACTUATORS)),
+    ):
+        if value is not None and actuator not in kinds:
+            hint = "; for antagonistic joints give --spring" if actuator == "antagonistic" else ""
+            raise click.UsageError(f"{option} needs --actuator {joined(kinds, 'or')}, not {actuator}{hint}")
 
 
 def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[str, ...]) -> dict[str, str]:
@@ -171,13 +173,12 @@ def import_urdf(
     if srdf is not None and (base or tip):
         raise click.UsageError("--srdf names base and tips; leave out --base and --tip")
     words = dict(word.rpartition("=")[::2] for word in actuator)
-    if len(words) < len(actuator):
-        raise click.UsageError("--actuator names the actuator of a joint, or of every joint, twice")
     word = words.pop("", "antagonistic")
     _check_placeholders(word, motor_inertia, stiffness, spring)
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
-    kind = word if word in ACTUATORS else "antagonistic"
-    placeholders = conversions.Placeholders(kind, motor_inertia, stiffness, spring)
+    placeholders = conversions.Placeholders(
+        word if word in ACTUATORS else "antagonistic", motor_inertia, stiffness, spring
+    )
     with Outputs(overwrite=overwrite, inputs=[urdf, *filter(None, [srdf])]) as outputs:
         with naming_kind("URDF", urdf, ("urdf",)):
             file = outputs.file(path)
@@ -207,14 +208,18 @@ def _with_devices(conversion: Conversion, every: str, devices: dict[str, str]) -
     from vsacli.base.did_you_mean import did_you_mean
     from vsacli.files.examples import examples
 
-    for unknown in devices.keys() - {*conversion.robot.joint_names}:
-        hint = did_you_mean(unknown, conversion.robot.joint_names)
-        raise InputError.one(f"{unknown!r} is not a joint of the robot{hint}")
-    words = {joint.name: devices.get(joint.name, every) for joint in conversion.robot.joints}
-    words = {name: word for name, word in words.items() if word in DEVICES}
-    for joint in conversion.robot.joints:
-        if joint.name in words:
+    robot = conversion.robot
+    for unknown in devices.keys() - {*robot.joint_names}:
+        raise InputError.one(f"the robot has no joint {unknown!r}{did_you_mean(unknown, robot.joint_names)}")
+    bundled = {
+        word: examples([DEVICES[word]])[0].robot.joints[-1]
+        for word in {every, *devices.values()} & {*DEVICES}
+    }
+    joints, words = [], {}
+    for joint in robot.joints:
+        if (word := devices.get(joint.name, every)) in DEVICES:
+            words[joint.name] = word
             with naming_option(joint.name):
-                check_drives(words[joint.name], joint.type)
-    bundled = {word: examples([DEVICES[word]])[0].robot.joints[-1] for word in {*words.values()}}
-    return conversion.with_devices({name: (word, bundled[word]) for name, word in words.items()})
+                check_drives(word, joint.type)
+        joints.append(replace(joint, **{key: getattr(bundled.get(word, joint), key) for key in OF_DEVICE}))
+    return replace(conversion, robot=replace(robot, joints=tuple(joints)), devices=words)

@@ -37,11 +37,8 @@ PER_CENT = re.compile(r"(?P<number>.*\S)\s*%")
 _DEGREES = re.compile(rf"(?P<sign>[+-]?)\s*(?P<value>{NUMBER}|\(.*\))\s*deg", re.ASCII)
 _WITH_UNIT = re.compile(rf"(?P<number>[+-]?(?!0\d){NUMBER})\s*(?P<unit>[^\W\d_].*)", re.ASCII)
 _WORD = re.compile(r"[^\W\d]\w*")
-_OF_COMPONENTS = re.compile(r"([^,()]+) \(\w+\)")
-"""Units such as those of `N (forces), N m (moments)`."""
-
-GRAVITY = 9.80665
-"""Standard gravity, m/s^2, for the weight of a mass that is given as a force."""
+_OF_COMPONENTS = re.compile(r"([^,()]+) \(\w+\)")  # as in `N (forces), N m (moments)`
+GRAVITY = 9.80665  # standard gravity, m/s^2, for the weight of a mass that is given as a force
 
 _REFUSED_FORMS = {
     r"[+-]?\.?(nan|inf|infinity)": "only finite numbers can be used",
@@ -137,11 +134,13 @@ def _describe_written_unit(text: str, unit: str) -> str:
     several = map(size_of_unit, _OF_COMPONENTS.findall(unit)) if expected_unit is None else [expected_unit]
     dimensions = [each.dimensions for each in several if each is not None]  # none of "SI units"
     if dimensions and written_unit.dimensions not in dimensions:
-        kind = kind_of_unit(parts["unit"]) or "in another unit"
-        mass = abs(float(parts["number"])) * written_unit.size
-        weighs = f"; {mass:g} kg weigh {GRAVITY * mass:.3g} N"
-        hint = weighs if kind == "a mass" and BASES["N"][1] in dimensions else ""
-        return f"is {kind}; expected {expected_number(unit)}{hint}"
+        kind, mass = kind_of_unit(parts["unit"]), abs(float(parts["number"])) * written_unit.size
+        hint = (
+            f"; {mass:g} kg weigh {GRAVITY * mass:.3g} N"
+            if kind == "a mass" and BASES["N"][1] in dimensions
+            else ""
+        )
+        return f"is {kind or 'in another unit'}; expected {expected_number(unit)}{hint}"
     if expected_unit is None:
         return f"has a unit; write the number alone, in {unit}"
     converted = float(parts["number"]) * written_unit.size / expected_unit.size

@@ -291,13 +291,13 @@ def _read_items_by_name(kind: ItemsByName, node: Node, label: str, scope: Scope)
     if not isinstance(node, tree.MapNode) or not node.entries:
         return scope.unexpected(node, "a mapping with at least one name", label)
     assert kind.unique is not None, "see ItemsByName"
-    if not any(isinstance(entry, tree.MapNode) for entry in node.entries.values()):
-        keys = {"type", *(key for cls in kind.records.values() for key in declared_fields(cls))}
-        if keys >= node.entries.keys():
-            content = ", ".join(f"{key}: ..." for key in node.entries)
-            example = f"{label}: {{{kind.noun.upper()}: {{{content}}}}}"
-            scope.problems.add(node.line, f"{label}: name the {kind.noun} first, as in {example}")
-            return INVALID
+    keys = {"type", *(key for cls in kind.records.values() for key in declared_fields(cls))}
+    if keys >= node.entries.keys() and not any(
+        isinstance(each, tree.MapNode) for each in node.entries.values()
+    ):
+        example = f"{kind.noun.upper()}: {{{', '.join(f'{key}: ...' for key in node.entries)}}}"
+        scope.problems.add(node.line, f"{label}: name the {kind.noun} first, as in {label}: {{{example}}}")
+        return INVALID
     records = []
     for name, entry in node.entries.items():
         line, named = node.key_lines[name], entry

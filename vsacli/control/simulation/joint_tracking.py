@@ -132,11 +132,6 @@ class JointTracking(Stored):
         return POSITION.unit(self.type)
 
     @property
-    def saturated(self) -> bool:
-        """Whether the controller commands more than the `max_torque` of a motor, at which it saturates."""
-        return Flag.MOTOR_TORQUE_LIMIT.label in self.worst
-
-    @property
     def off_course(self) -> bool:
         """Whether q at the end is further from the command than the tolerance."""
         return abs(self.q.final) > self.tolerance
@@ -155,7 +150,8 @@ def tracking_rows(joints: Sequence[JointTracking], ideal: Sequence[Deviation] = 
         "joint",
         f"q error peak / end\n{position}",
         f"stiffness error peak / end\n{stiffness}",
-        f"peak motor 1 / 2\n{torque}{', saturated' if any(joint.saturated for joint in joints) else ''}",
+        f"peak motor 1 / 2\n{torque}"
+        + (", saturated" if any(SATURATED in joint.worst for joint in joints) else ""),
     )
     if not ideal:
         return [header, *map(_tracking_row, joints)]
@@ -177,8 +173,8 @@ def _pair(deviation: Deviation) -> str:
     return f"{error_text(deviation.peak)} / {error_text(deviation.final)}"
 
 
-AS_COMMANDED = "as commanded; the motor saturates at the limit"
-"""Advice on a torque beyond its limit, which is not the one that the table shows."""
+SATURATED, AS_COMMANDED = Flag.MOTOR_TORQUE_LIMIT.label, "as commanded; the motor saturates at the limit"
+"""Kind of findings on torques, with the reason why they exceed those of the table."""
 
 SMALLEST_ERROR = 1e-12
 """Magnitude below which an error or torque is shown as 0: rounding of values near 1."""
@@ -195,8 +191,7 @@ def tracking_findings(joints: Sequence[JointTracking], complete: bool) -> Iterat
     """Yield the limits that joints exceed and, of a complete run, how far off target they end, by joint."""
     for index, joint in enumerate(joints):
         for kind, worst in joint.worst.items():
-            torque = kind == Flag.MOTOR_TORQUE_LIMIT.label
-            yield index, replace(worst, advice=AS_COMMANDED) if torque else worst
+            yield index, replace(worst, advice=AS_COMMANDED) if kind == SATURATED else worst
         if complete and joint.off_course:
             error, tolerance = joint.q.final, math.copysign(joint.tolerance, joint.q.final)
             yield index, Finding(OFF_TARGET, math.nan, error, tolerance, joint.unit, joint=joint.name)

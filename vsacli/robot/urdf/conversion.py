@@ -10,7 +10,7 @@ import itertools
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -94,20 +94,6 @@ class Conversion:
     file_warnings: tuple[Problem, ...] = ()
     devices: Mapping[str, str] = field(default_factory=dict)
 
-    def with_devices(self, devices: Mapping[str, tuple[str, Joint]]) -> Conversion:
-        """Return the conversion with joints driven by devices: their actuator, damper and damping.
-
-        Args:
-            devices: name of a device, and a joint that it drives, by name of the joint here.
-        """
-        joints = []
-        for joint in self.robot.joints:
-            _, driven = devices.get(joint.name, ("", joint))
-            drive = {"actuator": driven.actuator, "damper": driven.damper, "damping": driven.damping}
-            joints.append(replace(joint, **drive))
-        names = {joint: device for joint, (device, _) in devices.items()}
-        return replace(self, robot=replace(self.robot, joints=tuple(joints)), devices=names)
-
     def __str__(self) -> str:
         """Return the Denavit-Hartenberg table, its accuracy, warnings, and notes."""
         return "\n".join(self._lines())
@@ -164,11 +150,12 @@ class Conversion:
                 yield f"several links end beyond {tip.link}, where the tool is: {others}; {another}"
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
-        if self.devices:
-            driven = (f"{joint} {device}" for joint, device in self.devices.items())
-            yield f"actuators of devices, with their damping: {', '.join(driven)}"
         yield from self._of_motors()
-        left_out: dict[str, list[str]] = {}
+        left_out: dict[str, list[str]] = (
+            {"actuators of devices, with their damping": list(map(" ".join, self.devices.items()))}
+            if self.devices
+            else {}
+        )
         for joint, phrase, value in self._left_out():
             left_out.setdefault(phrase, []).append(f"{joint.name} {value}".rstrip())
         yield from (f"{phrase}: {', '.join(values)}" for phrase, values in left_out.items())
@@ -183,10 +170,11 @@ class Conversion:
 
     def _of_motors(self) -> Iterator[str]:
         """Yield notes on effort limits and gears, which apply to a single motor."""
-        counts = [joint.actuator.motor_count for joint in self.robot.joints]
         for count, taken in ((1, "taken over"), (2, "not taken over, since two motors share a joint")):
             joints = [
-                each.urdf for each, motors in zip(self.tree.joints, counts, strict=True) if motors == count
+                origin.urdf
+                for origin, joint in zip(self.tree.joints, self.robot.joints, strict=True)
+                if joint.actuator.motor_count == count
             ]
             motor_data = {
                 "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],

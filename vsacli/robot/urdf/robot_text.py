@@ -84,11 +84,8 @@ def _joint_lines(conversion: Conversion, index: int) -> Iterator[str]:
     yield "    actuator:"
     yield f"      type: {joint.actuator_type}"
     for name, text in _format_fields(joint.actuator).items():
-        device = conversion.devices.get(joint.name)
-        origin_of_field = (
-            f"of the device {device}" if device else f"placeholder: {_origin_of(name, conversion, index)}"
-        )
-        yield _append_comment(f"      {name}: {text}", f"# {origin_of_field}")
+        comment = f"# {_origin_of(name, conversion, index)}"
+        yield _append_comment(f"      {name}: {text}", comment)
     if joint.damper is not None:
         yield f"    damper: {_format_mapping(_format_fields(joint.damper))}"
     if joint.limits != Limits():
@@ -120,12 +117,14 @@ def _link_lines(link: Link) -> Iterator[str]:
 def _origin_of(field: str, conversion: Conversion, index: int) -> str:
     """Return the origin of the numbers in a field of an actuator, with motor data of the URDF."""
     joint, load = conversion.tree.joints[index], conversion.loads[index]
-    origin = conversion.placeholders.origin(field, joint, load)
+    converted = conversion.robot.joints[index]
+    if device := conversion.devices.get(converted.name):
+        return f"of the device {device}"
+    origin = f"placeholder: {conversion.placeholders.origin(field, joint, load)}"
     motor_data = " and ".join(_describe_urdf_motor(joint.urdf))
     if field != "motor" or not motor_data:
         return origin
-    one_motor = conversion.robot.joints[index].actuator.motor_count == 1
-    return f"{origin}; {'with' if one_motor else 'the URDF has'} {motor_data}"
+    return f"{origin}; {'with' if converted.actuator.motor_count == 1 else 'the URDF has'} {motor_data}"
 
 
 def _describe_urdf_motor(joint: UrdfJoint) -> Iterator[str]:

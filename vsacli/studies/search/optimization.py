@@ -98,18 +98,16 @@ def optimize(
     varied = varied_joints(robot, vary)
     warnings = (*robot.warnings, *trajectory.warnings)
     what = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin, warnings=warnings)
-    shared = vary in (TIMING, BOTH)
+    what = replace(what, admissible=falls_short(what, trajectory) is None)
     if minimize == TIME:
         check_timing_varies(vary)
-        best = optimize_timing(what, trajectory, varied, seed, progress)
-    else:
-        criterion = checked_criterion(robot, minimize, range(len(robot.joints)) if shared else varied)
-        what = replace(what, words=criterion.words)
-        if shared:
-            best = cheapest_pace(what, trajectory, criterion, varied, seed, progress)
-        else:
-            best = cheapest_stiffness(what, trajectory, criterion, seed, progress)
-    return replace(best, admissible=not best.possible or falls_short(what, trajectory) is None)
+        return optimize_timing(what, trajectory, varied, seed, progress)
+    shared = vary in (TIMING, BOTH)
+    criterion = checked_criterion(robot, minimize, range(len(robot.joints)) if shared else varied)
+    what = replace(what, words=criterion.words)
+    if shared:
+        return cheapest_pace(what, trajectory, criterion, varied, seed, progress)
+    return cheapest_stiffness(what, trajectory, criterion, seed, progress)
 
 
 def _refuse_limits_of_tools(robot: Robot) -> None:
@@ -122,8 +120,8 @@ def _refuse_limits_of_tools(robot: Robot) -> None:
         names = ", ".join(robot.limited_tools)
         raise InputError.one(
             f"optimizations do not keep the min_stiffness of tools ({names}); leave it out, and give the "
-            "joints that move them a lower bound by limits.stiffness, which is kept; check-feasibility --fixes "
-            "of the optimized motion may help as well"
+            "joints that move them a lower bound by limits.stiffness, which is kept; check-feasibility "
+            "--fixes of the optimized motion may help as well"
         )
 
 

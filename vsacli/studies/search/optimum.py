@@ -208,9 +208,9 @@ class Optimum(Published):
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""
-        margin = f"{100 * self.min_margin:.4g} %"
-        beyond = f"as commanded, the motion breaks a limit or the margin of {margin}, which the optimum keeps"
-        warnings = list(warnings_and_notes(self.warnings, () if self.admissible else (beyond,)))
+        beyond = f"as commanded, the motion breaks a limit or the margin of {100 * self.min_margin:.4g} %"
+        notes = (f"{beyond}, which the optimum keeps",) if self.possible and not self.admissible else ()
+        warnings = list(warnings_and_notes(self.warnings, notes))
         if self.trajectory is None:
             return ReportText(self.title, [*self.reasons, *warnings])
         if self.timing is not None:

@@ -158,9 +158,13 @@ def _telling_what_is_kept(journal: Journal, together: int, tell: Callable[[str],
         yield
     except BaseException as error:
         if len(journal):
-            count, path = f"{len(journal):,}", journal.path
-            tell(f"{count} finished runs are kept in {path}; the same command goes on from there")
+            tell(
+                f"{len(journal):,} finished runs are kept in {journal.path}; the same command goes on from "
+                "there"
+            )
         elif isinstance(error, Interrupted | KeyboardInterrupt):
-            batches = f"; they are computed up to {together} at a time" if together > 1 else ""
-            tell(f"no run had finished, so none is kept{batches}")
+            tell(
+                "no run had finished, so none is kept"
+                + (f"; they are computed up to {together} at a time" if together > 1 else "")
+            )
         raise

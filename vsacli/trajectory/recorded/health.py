@@ -62,14 +62,12 @@ def check_health(
         return CheckedSignals(list(records), [])
     checked = CheckedSignals([], list(stamp_faults(stamps)))
     for record in records:
-        if record.complete and record.signal in interpolated:
-            checked.records.append(record)
-            continue
         columns = {name: rows.copy() for name, rows in record.columns.items()}
         names = record.signal.names
         # a stiffness with its derivatives is computed, not measured: outliers are kinks of its profile
         measured = record.signal is POSITION or columns.keys() == {names[0]}
-        for quantity, name, lower in zip(record.signal.quantities, names, (None, *names), strict=False):
+        quantities = () if record.complete and record.signal in interpolated else record.signal.quantities
+        for quantity, name, lower in zip(quantities, names, (None, *names), strict=False):
             if name not in columns or not (lower is None or measured):
                 continue
             for component in np.flatnonzero(record.has_values).tolist():

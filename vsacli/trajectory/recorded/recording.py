@@ -139,8 +139,12 @@ def read_recorded_signals(
     file, signals = table.source.path, [record.signal for record in records]
     wanted = dict.fromkeys(signals, AS_IT_ASKS_FOR) if wanted is None else wanted
     turns = list(_unwrap_positions(records, joints)) if unwrap else []
-    interpolated = {signal for signal, choice in wanted.items() if choice.method == INTERPOLATE}
-    records, faults = check_health(time, records, list(joints.types.values()), interpolated)
+    records, faults = check_health(
+        time,
+        records,
+        list(joints.types.values()),
+        [signal for signal, choice in wanted.items() if choice.method == INTERPOLATE],
+    )
     faults += unit_doubts(records, _types_without_unit(table, layout, joints))
     warnings = tuple(str(_locate_problem(fault, table, layout)) for fault in faults)
     clauses = (
