@@ -59,12 +59,7 @@ def unjudged_tools_text(limited_tools: Sequence[str]) -> str:
 
 
 def tool_stiffness_lines(tools: Sequence[ToolReport], *, infeasible: bool = False) -> Iterator[str]:
-    """Yield how stiff each tool is at least, where, and in which direction.
-
-    Args:
-        tools: findings at the tools.
-        infeasible: whether samples are infeasible, at which a stiffness need not exist.
-    """
+    """Yield how stiff each tool is at least, where, and in which direction."""
     unit = LINEAR_STIFFNESS.unit("")
     entries = [
         f"{tool.name} does not yield"

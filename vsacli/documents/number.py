@@ -9,15 +9,7 @@ import math
 import re
 
 from vsacli.base.units import ANY_SI_UNIT, DIMENSIONLESS, RATE
-from vsacli.documents.expression import (
-    BASES,
-    NUMBER,
-    ExpressionError,
-    Grammar,
-    kind_of_unit,
-    parse,
-    size_of_unit,
-)
+from vsacli.documents.expression import NUMBER, ExpressionError, Grammar, kind_of_unit, parse, size_of_unit
 from vsacli.documents.tree import quoted
 
 MAX_LENGTH = 200
@@ -137,7 +129,7 @@ def _describe_written_unit(text: str, unit: str) -> str:
         kind, mass = kind_of_unit(parts["unit"]), abs(float(parts["number"])) * written_unit.size
         hint = (
             f"; {mass:g} kg weigh {GRAVITY * mass:.3g} N"
-            if kind == "a mass" and BASES["N"][1] in dimensions
+            if (kind, unit.partition(" (")[0]) == ("a mass", "N")
             else ""
         )
         return f"is {kind or 'in another unit'}; expected {expected_number(unit)}{hint}"
