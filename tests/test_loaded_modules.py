@@ -63,7 +63,7 @@ TASKS = {
         22_300,
     ),
     "validate": Task(("validate", ROBOT), OF_A_ROBOT, 12_000),
-    "info": Task(("info", ROBOT), OF_A_ROBOT, 13_500),
+    "info": Task(("info", ROBOT), OF_A_ROBOT, 13_550),
 }
 """Lines change with the code: a change that needs more raises them, with its reason in its message."""
 

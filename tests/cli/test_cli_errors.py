@@ -64,6 +64,10 @@ def test_help_of_a_command_explains_each_option_and_shows_an_example(vsacli, com
             "'fast' is not a number; expected samples per second, e.g. 1000",
         ),
         (["check-feasibility", "--jason"], "No such option"),
+        (
+            ["new", "study", "--robot", "a.yaml"],
+            "--robot is no option: write vsacli new study ROBOT TRAJECTORY",
+        ),
     ],
     ids=lambda value: " ".join(value)[:30] if isinstance(value, list) else "",
 )

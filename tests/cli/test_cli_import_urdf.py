@@ -7,11 +7,14 @@ import re
 
 import pytest
 from samples.command_line import REPOSITORY, contents
+from samples.marks import slow
 from samples.urdf import joint, link, random_serial, robot, serial, write
 
 from vsacli import Antagonistic, Elastic, Placeholders, Rigid, import_urdf, load_robot
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.cli.import_urdf import import_urdf as command
+from vsacli.files.device_actuators import DEVICES
+from vsacli.files.examples import examples
 from vsacli.robot.urdf import converted_robot_text
 
 DESK_ARM = REPOSITORY / "robots" / "desk_arm.urdf"
@@ -50,7 +53,44 @@ def test_right_angles_are_written_as_such(vsacli, tmp_path):
 
 def test_the_command_names_every_actuator():
     option = next(option for option in command.params if option.name == "actuator")
-    assert tuple(option.type.choices) == tuple(ACTUATORS)
+    assert tuple(option.type.choices) == (*ACTUATORS, *DEVICES)
+
+
+@pytest.mark.parametrize("devices", [["vs_joint", "compact"], slow([*DEVICES])], ids=len)
+def test_joints_have_the_actuators_of_devices(vsacli, tmp_path, devices):
+    path = write(tmp_path / "arm.urdf", random_serial("R" * len(devices), 0))
+    names, (usual, *words) = import_urdf(path).robot.joint_names, devices
+    chosen = [f"--actuator={name}={word}" for name, word in zip(names[1:], words, strict=True)]
+    (tmp_path / "new").mkdir()
+    done = vsacli("import-urdf", path, "--actuator", usual.upper(), *chosen, "-o", "new/arm.yaml")
+    assert done.code == 0, done.err
+    assert f"actuators of devices, with their damping: {names[0]} {usual}, {names[1]} {words[0]}" in done.out
+    driven = load_robot(tmp_path / "new" / "arm.yaml").joints
+    bundled = {example.path.stem: example.robot.joints[-1] for example in examples(map(DEVICES.get, devices))}
+    for of_urdf, device in zip(driven, devices, strict=True):
+        expected = bundled[DEVICES[device]]
+        assert (of_urdf.damper, of_urdf.damping) == (expected.damper, expected.damping)
+        pathless = [re.sub("path='.*?'", "", repr(each.actuator)) for each in (of_urdf, expected)]
+        assert pathless[0] == pathless[1]  # tables are copies next to the file
+
+
+def test_a_device_that_no_joint_can_have_is_refused(vsacli, tmp_path):
+    write(tmp_path / "arm.urdf", random_serial("RP", 0))
+    turning, sliding = import_urdf(tmp_path / "arm.urdf").robot.joint_names
+    for options, said in {
+        ("fsj",): f"--actuator: {sliding}: fsj turns about an axis, and drives no prismatic joint",
+        ("wrist=fsj",): f"--actuator: the robot has no joint 'wrist'; valid: {turning}, {sliding}",
+        ("fjs",): "'vsaut_ii'; did you mean 'fsj'?",
+        (f"{turning}=rigid",): f"expected {turning}=DEVICE, found '{turning}=rigid'",
+        (
+            "fsj",
+            "--motor-inertia",
+            1,
+        ): "--motor-inertia needs --actuator antagonistic, elastic, rigid or serial, not fsj",
+    }.items():
+        done = vsacli("import-urdf", "arm.urdf", "--actuator", *options)
+        assert (done.code, said in done.err) == (2, True), done.err
+    assert not (tmp_path / "arm.yaml").exists()
 
 
 def test_placeholders_are_marked_and_come_from_the_options(vsacli, tmp_path):

@@ -7,7 +7,15 @@ import json
 import h5py
 import numpy as np
 import pytest
-from samples.command_line import REST_TO_REST, ROBOT, SEVEN_JOINTS, SEVEN_JOINTS_MOTION, contents, installed
+from samples.command_line import (
+    REPOSITORY,
+    REST_TO_REST,
+    ROBOT,
+    SEVEN_JOINTS,
+    SEVEN_JOINTS_MOTION,
+    contents,
+    installed,
+)
 from samples.spoiled import scaled, spoil_torque
 
 GRAVITY = 9.81
@@ -218,3 +226,14 @@ def test_figures_that_cannot_be_drawn_are_refused_before_anything_is_computed(vs
     assert done.code == 2
     assert "nothing can be plotted" in done.err
     assert not list(tmp_path.glob("*.h5"))
+
+
+def test_a_far_upper_end_of_the_attainable_range_is_none(vsacli):
+    """That of a linkage is nearly stretched, at 9e10 N m/rad; its motors end at 519."""
+    robot = REPOSITORY / "robots" / "devices" / "vsa_ii.yaml"
+    motion = REPOSITORY / "trajectories" / "devices" / "vsa_ii.yaml"
+    run = ("check-feasibility", robot, motion, "--set", "rate=50")
+    rows = [line.split() for line in vsacli(*run).out.splitlines() if line.startswith("joint ")]
+    assert rows[1][-3:-1] == ["from", "86.7"]
+    (joint,) = json.loads(vsacli(*run, "--json").out)["joints"]
+    assert joint["margin"]["attainable"][1] > 1e10

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import pytest
 from samples.command_line import ROBOT
+
+from vsacli import load_robot, load_trajectory
 
 TIME = np.arange(1001) / 500
 JOINTS = ("base", "shoulder", "elbow")
@@ -158,3 +161,26 @@ def test_jittering_stamps_recommend_a_rate_also_where_torques_are_exported(vsacl
     assert (
         "set rate: 500 in the trajectory file and run invdyn again, or export without --rate" in refused.err
     )
+
+
+def test_computed_samples_are_used_as_they_are(vsacli, tmp_path):
+    """A fourth derivative that falls to 0 within a step at the end is off a smooth curve, and yet true."""
+    left, fall = TIME[-1] - TIME, 2e-4
+    rest = np.exp(-left / fall)
+    rows = {
+        name: (-left) ** integrals / math.factorial(integrals) - fall**integrals * rest
+        for integrals, name in enumerate(("d4q", "d3q", "ddq", "dq", "q"))
+    }
+    header = ["time", *(f"{joint}.{name}" for name in rows for joint in JOINTS)]
+    table = np.column_stack((TIME, *(row for row in rows.values() for _ in JOINTS)))
+    np.savetxt(tmp_path / "swift.csv", table, "%.17g", ",", header=",".join(header), comments="")
+    doubted = {}
+    for fit in ("", ", fit: interpolate"):
+        (tmp_path / "swift.yaml").write_text(
+            "format: vsacli-trajectory/1\nname: swift\nstiffness: {type: constant, value: 1000}\n"
+            f"position: {{type: csv, file: swift.csv{fit}}}\n"
+        )
+        doubted[fit] = vsacli("validate", ROBOT, "swift.yaml").out.count("d4q is off")
+    assert doubted == {"": len(JOINTS), ", fit: interpolate": 0}
+    used = load_trajectory("swift.yaml", load_robot(ROBOT)).block(0, len(TIME))
+    assert (used.d4q == rows["d4q"][:, None]).all()

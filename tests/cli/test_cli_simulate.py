@@ -47,6 +47,17 @@ def test_feedforward_is_simulated_and_stored(vsacli, quick, tmp_path):
         assert stored.report_json["format"] == "vsacli-simulation-report/2"
 
 
+def test_commanded_and_saturated_torques_are_distinguished(vsacli, quick):
+    weak = ("--set", "joints.base.actuator.motor.max_torque=60")
+    out = vsacli("simulate", ROBOT, quick, *weak, "-o", "s.h5").out
+    (finding,) = [line for line in out.splitlines() if line.startswith("base: joint-side torque")]
+    assert finding.endswith("limit of -60 N m: as commanded; the motor saturates at the limit")
+    assert "N m, saturated" in out
+    (row,) = [line.split() for line in out.splitlines() if line.startswith("base  ")]
+    assert max(map(float, (row[-3], row[-1]))) == 60
+    assert "saturated" not in vsacli("simulate", ROBOT, quick, "-o", "strong.h5").out
+
+
 @pytest.mark.slow
 def test_a_simulation_opens_in_xarray(vsacli, quick, tmp_path):
     vsacli("simulate", ROBOT, quick, "-o", "s.h5")

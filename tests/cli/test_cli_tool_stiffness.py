@@ -8,7 +8,7 @@ import shlex
 import numpy as np
 import pytest
 import yaml
-from samples.command_line import REPOSITORY
+from samples.command_line import REPOSITORY, REST_TO_REST, ROBOT
 from samples.studies import column
 from samples.torso import ACTUATOR, SWING, torso_text
 
@@ -356,7 +356,8 @@ def test_an_optimization_refuses_a_limit_that_it_does_not_keep(vsacli, torso):
     found = vsacli("optimize", *torso, "--set", "tools.left_hand.min_stiffness=300")
     assert found.code == 2
     assert "do not keep the min_stiffness of tools (left_hand)" in found.err
-    assert "check-feasibility --fixes" in found.err
+    assert "a lower bound by limits.stiffness, which is kept" in found.err
+    assert "check-feasibility --fixes of the optimized motion may help as well" in found.err
 
 
 @pytest.mark.slow
@@ -399,3 +400,16 @@ def test_analyses_that_do_not_judge_tools_say_so(vsacli, own_folder):
         assert "min_stiffness of index_tip is not judged here" in vsacli(command, "hand.yaml", motion).out
         plain = vsacli(command, REPOSITORY / "robots" / "hand_3x2r.yaml", motion).out
         assert "min_stiffness" not in plain
+
+
+def test_what_infeasible_samples_lack_is_said(vsacli):
+    """Minima and sums skip these samples in silence otherwise, and look like those of the motion."""
+    feasible = ("smallest stiffness of tools: end_effector", "co-contraction: up to")
+    infeasible = (
+        "smallest stiffness of tools over feasible samples: end_effector",
+        "co-contraction of joints computed throughout: up to 67.",
+    )
+    for start, lines in ((850, feasible), (795, infeasible)):
+        changes = ("--set", "rate=50", "--set", f"stiffness.start.elbow={start}")
+        out = vsacli("invdyn", ROBOT, REST_TO_REST, *changes, *ASKED, "-o", f"{start}.h5").out
+        assert [line in out for line in lines] == [True, True], out

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import evaluate
 
+FORCE_OR_MOMENT = "N (forces), N m (moments)"
+
 
 @pytest.mark.parametrize(
     ("text", "value"),
@@ -74,6 +76,9 @@ def test_degrees_elsewhere_are_refused(unit):
         ("1 kHz", "1/s", "has a unit; write the number alone, in 1/s: 1000"),
         ("1 rev", "rad", "has a unit; write the number alone, in rad: 6.283185307"),
         ("3 s", "kg", "is a time; expected a number in kg"),
+        ("-2e3 g", "N", "is a mass; expected a number in N; 2 kg weigh 19.6 N"),
+        ("2 kg", FORCE_OR_MOMENT, f"is a mass; expected a number in {FORCE_OR_MOMENT}; 2 kg weigh 19.6 N"),
+        ("2 kN", FORCE_OR_MOMENT, f"has a unit; write the number alone, in {FORCE_OR_MOMENT}"),
         ("3 N/V", "kg", "is in another unit; expected a number in kg"),
         ("3 kg", "SI units", "has a unit; write the number alone, in SI units"),
         (

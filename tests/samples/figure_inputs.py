@@ -55,5 +55,5 @@ def moved(stiffness: float) -> Moved:
 def joint(name: str, stiffness: float = 900.0, limit: float = np.inf) -> OptimizedJoint:
     """A joint whose optimum has 0.9 times the commanded stiffness and torques."""
     return OptimizedJoint(
-        name, "revolute", moved(stiffness), moved(0.9 * stiffness), np.array([-limit, limit])
+        name, "revolute", moved(stiffness), moved(0.9 * stiffness), np.array([[-limit, limit]] * 2)
     )

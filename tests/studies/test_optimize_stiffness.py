@@ -276,3 +276,12 @@ def weakened(share):
     actuator = replace(joint.actuator, motor=motors)
     robot = replace(pendulum(), joints=(replace(joint, actuator=actuator),))
     return robot, rest_to_rest(1.0, share * 1000.0, start=(0.0,), end=(1.0,), rate=100)
+
+
+@pytest.mark.slow
+def test_a_command_beyond_the_margin_is_noted(vsacli):
+    """Its cost is below that of the best constant, which keeps the margin."""
+    for margin, noted in ((5, False), (60, True)):
+        out = vsacli("optimize", *TENDON, "--set", "rate=40", "--min-margin", f"{margin}%").out
+        note = f"note: as commanded, the motion breaks a limit or the margin of {margin} %, which the optimum"
+        assert (note in out) is noted, out

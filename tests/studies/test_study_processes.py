@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from itertools import islice
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from samples.studies import DRAWN, GRID, content, study
@@ -16,7 +18,7 @@ from samples.studies import DRAWN, GRID, content, study
 from vsacli.studies.sweeps.executors import Processes
 from vsacli.studies.sweeps.journal import Journal
 from vsacli.studies.sweeps.rows import Computer, lost
-from vsacli.studies.sweeps.run_study import gather
+from vsacli.studies.sweeps.run_study import gather, run_study
 from vsacli.studies.sweeps.study import load_study
 
 COMMAND = (sys.executable, "-m", "vsacli", "study", "study.yaml")
@@ -32,6 +34,19 @@ def test_the_table_is_the_same_for_any_number_of_processes(tmp_path: Path) -> No
     for count in (1, 2):
         assert run(tmp_path, "--processes", f"{count}", "-o", f"{count}.h5").returncode == 0
     assert content(tmp_path / "1.h5") == content(tmp_path / "2.h5")
+
+
+def test_an_interruption_before_any_run_is_finished_is_said(tmp_path: Path) -> None:
+    def interrupted(_total: int) -> NoReturn:
+        raise KeyboardInterrupt
+
+    said: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        run_study(study(tmp_path, GRID), tmp_path / "t.h5", progress=interrupted, tell=said.append)
+    assert re.fullmatch(
+        r"no run had finished, so none is kept; they are computed up to \d+ at a time", said[-1]
+    )
+    assert not list(tmp_path.glob("t.h5*"))
 
 
 @pytest.mark.slow

@@ -89,6 +89,11 @@ def test_torques_change_by_the_transposed_jacobian_of_each_tool(tmp_path: Path) 
         (wrenches(left_hand="{frame: base}"), (), r":7: wrenches.left_hand: missing key 'type'"),
         ("wrenches: {}", (), r":7: wrenches: expected a mapping with at least one name"),
         (
+            "wrenches: {type: constant, value: [0, 0, 0, 0, 0, 0], frame: base}",
+            (),
+            r":7: wrenches: name the tool first, as in wrenches: {TOOL: {type: ..., value: ..., frame",
+        ),
+        (
             wrenches(left_hand=PUSH.replace("polynomial", "steps").replace("start", "levels")),
             (),
             r":7: unknown key 'end'",

@@ -115,7 +115,9 @@ class Report(Stored, TextReport):
                 [(joint.name, joint.type, motor) for joint in self.joints for motor in joint.dry_friction]
             ),
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
-            *tool_stiffness_lines(self.tools),
+            *tool_stiffness_lines(
+                self.tools, infeasible=any(joint.samples["infeasible"] for joint in self.joints)
+            ),
             *spread_lines(self.joints),
             *text.drift_lines(self.drifts),
             *([text.self_check_line(self.self_check)] if self.self_check.passed else []),

@@ -17,7 +17,8 @@ from vsacli.dynamics.energy import JointEnergy
 def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str]:
     """Yield the total energies, if all joints have them, and the joints with the largest ones."""
     energies = [energy for _, _, energy in joints]
-    if not any(math.isnan(energy.spent) for energy in energies):
+    incomplete = any(math.isnan(energy.spent) for energy in energies)
+    if not incomplete:
         spent, recovered = (
             short_number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
         )
@@ -30,9 +31,9 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
     paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
     if paired:
         name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
-        unit = TORQUE.unit(joint_type)
+        unit, among = TORQUE.unit(joint_type), " of joints computed throughout" if incomplete else ""
         effort, load = f"{short_number(most.co_contraction)} {unit}", f"{short_number(most.load)} {unit}"
-        yield f"co-contraction: up to {effort} rms per motor ({name}); its load requires {load}"
+        yield f"co-contraction{among}: up to {effort} rms per motor ({name}); its load requires {load}"
 
 
 def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
@@ -51,6 +52,10 @@ JOINTS_PER_LINE = 3
 MOST_APART = 7
 """Largest number of joints that are described one by one."""
 
+
+FAR_END = 100.0
+"""Smallest upper end of an attainable range, relative to its lower end and to the commanded stiffness, that
+counts as none: limits of motors and deflections bind before, such as at 519 of 8.95e10 N m/rad."""
 
 WHOLE = 1e3
 """Number from which on no decimals are shown."""
@@ -77,7 +82,7 @@ def joint_rows(joints: Sequence[JointReport]) -> list[tuple[str, ...]]:
     )
     columns: tuple[Callable[[JointReport], tuple[float, ...]], ...] = (
         lambda joint: (joint.peak_tau_e, *joint.peak_tau_motor),
-        lambda joint: joint.attainable,
+        _bounding_range,
     )
     huge = [any(EXPONENT <= value < math.inf for joint in joints for value in of(joint)) for of in columns]
     return [header, *(_joint_row(joint, *huge) for joint in joints)]
@@ -90,7 +95,10 @@ def _joint_row(joint: JointReport, huge: bool, huge_range: bool) -> tuple[str, .
         " / ".join(short_number(peak, huge=huge) for peak in values_of_motors(joint, joint.peak_tau_motor)),
         _stiffness_range(joint.commanded_min, joint.commanded_max),
         *(
-            (_attainable_range(*joint.attainable, huge_range), short_percent(joint.margin).removesuffix(" %"))
+            (
+                _attainable_range(*_bounding_range(joint), huge_range),
+                short_percent(joint.margin).removesuffix(" %"),
+            )
             if "stiffness" in actuator_kind(joint).commanded
             else ("-", "-")
         ),
@@ -106,6 +114,12 @@ def actuator_kind(joint: JointReport) -> type[Actuator]:
 def values_of_motors(joint: JointReport, pair: tuple[float, float]) -> tuple[float, ...]:
     """Return the values of a pair for the motors that the joint has."""
     return pair[: actuator_kind(joint).motor_count]
+
+
+def _bounding_range(joint: JointReport) -> tuple[float, float]:
+    """Return the attainable range; without an upper end so far away that it bounds no stiffness."""
+    lower, upper = joint.attainable
+    return lower, math.inf if upper > FAR_END * max(lower, joint.commanded_max) else upper
 
 
 def _attainable_range(lower: float, upper: float, huge: bool) -> str:

@@ -58,7 +58,7 @@ def unjudged_tools_text(limited_tools: Sequence[str]) -> str:
     return f"min_stiffness of {joined(limited_tools)} is not judged here; check-feasibility does so"
 
 
-def tool_stiffness_lines(tools: Sequence[ToolReport]) -> Iterator[str]:
+def tool_stiffness_lines(tools: Sequence[ToolReport], *, infeasible: bool = False) -> Iterator[str]:
     """Yield how stiff each tool is at least, where, and in which direction."""
     unit = LINEAR_STIFFNESS.unit("")
     entries = [
@@ -70,4 +70,6 @@ def tool_stiffness_lines(tools: Sequence[ToolReport]) -> Iterator[str]:
         if tool.rigid or math.isfinite(tool.stiffness)
     ]
     if entries:
-        yield wrap_joint_entries("smallest stiffness of tools: ", entries)
+        yield wrap_joint_entries(
+            f"smallest stiffness of tools{' over feasible samples' if infeasible else ''}: ", entries
+        )

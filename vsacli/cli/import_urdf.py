@@ -2,31 +2,54 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from vsacli.actuators.kinds import ACTUATORS
-from vsacli.base.errors import InvalidRecordError
+from vsacli.base.errors import InputError, InvalidRecordError
 from vsacli.base.outputs import Outputs
+from vsacli.base.texts import joined
 from vsacli.cli.command_parts import example, overwrite_option
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.file_names import FILE, YAML_FILE
 from vsacli.cli.input_errors import naming_kind, naming_option
 from vsacli.cli.option_types import Number, Numbers, Words
+from vsacli.files.device_actuators import DEVICES, OF_DEVICE, check_drives
+
+if TYPE_CHECKING:
+    from vsacli.robot.urdf import Conversion
 
 
-def _check_placeholders(actuator: str, stiffness: float | None, spring: tuple[float, float] | None) -> None:
+class _DrivesType(Words):
+    """A kind of actuator or a device for every joint, or `JOINT=DEVICE` for one."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """See `click.ParamType.convert`."""
+        joint, equals, word = value.rpartition("=")
+        if joint and word in ACTUATORS:
+            self.fail(f"placeholders have one kind; expected {joint}=DEVICE, found {value!r}", param, ctx)
+        return f"{joint}{equals}{super().convert(word.lower().replace('-', '_'), param, ctx)}"
+
+
+def _check_placeholders(
+    actuator: str, motor_inertia: float | None, stiffness: float | None, spring: tuple[float, float] | None
+) -> None:
     """Refuse constants that the chosen kind of actuator does not have.
 
     Raises:
         click.UsageError: with the option, and the one that has an effect.
     """
-    if spring is not None and actuator != "antagonistic":
-        raise click.UsageError(f"--spring needs --actuator antagonistic, not {actuator}")
-    if stiffness is not None and actuator not in ("elastic", "serial"):
-        hint = "; for antagonistic joints give --spring" if actuator == "antagonistic" else ""
-        raise click.UsageError(f"--stiffness needs --actuator elastic or serial, not {actuator}{hint}")
+    for option, value, kinds in (
+        ("--spring", spring, ("antagonistic",)),
+        ("--stiffness", stiffness, ("elastic", "serial")),
+        ("--motor-inertia", motor_inertia, tuple(ACTUATORS)),
+    ):
+        if value is not None and actuator not in kinds:
+            hint = "; for antagonistic joints give --spring" if actuator == "antagonistic" else ""
+            raise click.UsageError(f"{option} needs --actuator {joined(kinds, 'or')}, not {actuator}{hint}")
 
 
 def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[str, ...]) -> dict[str, str]:
@@ -69,10 +92,12 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
 )
 @click.option(
     "--actuator",
-    type=Words(ACTUATORS),
-    default="antagonistic",
-    show_default=True,
-    help="Placeholder: kind of actuator of every joint.",
+    metavar="KIND|DEVICE|JOINT=DEVICE",
+    type=_DrivesType([*ACTUATORS, *DEVICES]),
+    multiple=True,
+    show_default="antagonistic",
+    help="Actuator of every joint, or of one; may be repeated. KIND, of a placeholder: "
+    f"{', '.join(ACTUATORS)}. DEVICE: one of docs/devices.md, {', '.join(DEVICES)}.",
 )
 @click.option(
     "--motor-inertia",
@@ -123,7 +148,7 @@ def import_urdf(
     srdf: str | None,
     group: str | None,
     output: str | None,
-    actuator: str,
+    actuator: tuple[str, ...],
     motor_inertia: float | None,
     stiffness: float | None,
     spring: tuple[float, float] | None,
@@ -138,22 +163,63 @@ def import_urdf(
     joints are merged with their parent links. The command prints the rows, the elements that were
     ignored or changed, and the largest deviation from the kinematics of the URDF. A URDF does not describe
     motors and springs: the robot file has placeholders, marked as such, which are sized to the load of each
-    joint.
+    joint, or those of the devices named by --actuator.
     """
+    from vsacli.files.examples import example_tables
     from vsacli.robot import urdf as conversions
 
     if srdf is None and group is not None:
         raise click.UsageError("--group needs --srdf FILE")
     if srdf is not None and (base or tip):
         raise click.UsageError("--srdf names base and tips; leave out --base and --tip")
-    _check_placeholders(actuator, stiffness, spring)
+    words = dict(word.rpartition("=")[::2] for word in actuator)
+    word = words.pop("", "antagonistic")
+    _check_placeholders(word, motor_inertia, stiffness, spring)
     path = Path(f"{Path(urdf).stem}.yaml" if output is None else output)
-    placeholders = conversions.Placeholders(actuator, motor_inertia, stiffness, spring)
+    placeholders = conversions.Placeholders(
+        word if word in ACTUATORS else "antagonistic", motor_inertia, stiffness, spring
+    )
     with Outputs(overwrite=overwrite, inputs=[urdf, *filter(None, [srdf])]) as outputs:
         with naming_kind("URDF", urdf, ("urdf",)):
             file = outputs.file(path)
             with naming_option("--spring", InvalidRecordError):  # constants from the load are valid
                 conversion = conversions.import_urdf(urdf, base, tip, placeholders, snap, hold, srdf, group)
-        file.write_text(conversions.converted_robot_text(conversion))
+        with naming_option("--actuator"):
+            conversion = _with_devices(conversion, word, words)
+        text = conversions.converted_robot_text(conversion)
+        file.write_text(text)
+        for table in (table for table in example_tables() if table.name in text):
+            outputs.file(path.parent / table.name).write_bytes(table.read_bytes())
     click.echo(str(conversion))
     talk.wrote(outputs)
+
+
+def _with_devices(conversion: Conversion, every: str, devices: dict[str, str]) -> Conversion:
+    """Return the conversion with the actuators of devices.
+
+    Args:
+        conversion: converted robot with placeholders.
+        every: device of every other joint; or the kind of their placeholders.
+        devices: device of some joints by name.
+
+    Raises:
+        InputError: there is no such joint, or a device does not drive it.
+    """
+    from vsacli.base.did_you_mean import did_you_mean
+    from vsacli.files.examples import examples
+
+    robot = conversion.robot
+    for unknown in devices.keys() - {*robot.joint_names}:
+        raise InputError.one(f"the robot has no joint {unknown!r}{did_you_mean(unknown, robot.joint_names)}")
+    bundled = {
+        word: examples([DEVICES[word]])[0].robot.joints[-1]
+        for word in {every, *devices.values()} & {*DEVICES}
+    }
+    joints, words = [], {}
+    for joint in robot.joints:
+        if (word := devices.get(joint.name, every)) in DEVICES:
+            words[joint.name] = word
+            with naming_option(joint.name):
+                check_drives(word, joint.type)
+        joints.append(replace(joint, **{key: getattr(bundled.get(word, joint), key) for key in OF_DEVICE}))
+    return replace(conversion, robot=replace(robot, joints=tuple(joints)), devices=words)

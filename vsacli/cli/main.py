@@ -195,6 +195,10 @@ def _advised(error: click.ClickException) -> click.ClickException:
             return click.UsageError(
                 f"{error.option_name} is now {usage(error.option_name) or new}", error.ctx
             )
+        arguments = [each for each in error.ctx.command.params if isinstance(each, click.Argument)]
+        if error.option_name.strip("-") in [each.name for each in arguments]:
+            words = [error.ctx.command_path, *(each.make_metavar(error.ctx) for each in arguments)]
+            return click.UsageError(f"{error.option_name} is no option: write {' '.join(words)}", error.ctx)
     if isinstance(error, click.MissingParameter) and error.ctx and (path := error.ctx.params.get("robot")):
         kind = recognized(path)
         if kind in ("result", "simulation"):

@@ -54,7 +54,6 @@ def _moved(result: Result, place: FloatArray, index: int) -> Moved:
 
 
 def _torque_limits(joint: Joint) -> FloatArray:
-    """Return the interval (2,) of torque that all motors of a joint allow."""
-    ranges = [check.range for check in joint.actuator.limits if check.variable == "tau_motor"]
-    lower, upper = zip(*ranges, strict=True) if ranges else ((-np.inf,), (np.inf,))
-    return np.array([max(lower), min(upper)])
+    """Return the interval of torque that each motor of a joint allows, (motors, 2)."""
+    largest = np.array([motor.max_torque for motor in joint.actuator.motors])
+    return np.stack([-largest, largest], axis=-1)

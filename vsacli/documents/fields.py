@@ -182,10 +182,11 @@ class Items(ValueKind):
 
 
 class ItemsByName(Items):
-    """A mapping from names to records, read as a tuple of records whose field `name` is the key of each."""
+    """A mapping from names, of a `noun`, to records, read as a tuple; each key is the field `name`."""
 
-    def __init__(self, item: ValueKind) -> None:
+    def __init__(self, item: ValueKind, noun: str) -> None:
         super().__init__(item, unique="name")
+        self.noun = noun
 
 
 class OneOrMore(Items):

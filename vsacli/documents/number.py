@@ -29,6 +29,8 @@ PER_CENT = re.compile(r"(?P<number>.*\S)\s*%")
 _DEGREES = re.compile(rf"(?P<sign>[+-]?)\s*(?P<value>{NUMBER}|\(.*\))\s*deg", re.ASCII)
 _WITH_UNIT = re.compile(rf"(?P<number>[+-]?(?!0\d){NUMBER})\s*(?P<unit>[^\W\d_].*)", re.ASCII)
 _WORD = re.compile(r"[^\W\d]\w*")
+_OF_COMPONENTS = re.compile(r"([^,()]+) \(\w+\)")  # as in `N (forces), N m (moments)`
+GRAVITY = 9.80665  # standard gravity, m/s^2, for the weight of a mass that is given as a force
 
 _REFUSED_FORMS = {
     r"[+-]?\.?(nan|inf|infinity)": "only finite numbers can be used",
@@ -121,9 +123,17 @@ def _describe_written_unit(text: str, unit: str) -> str:
     if unit in ("", str(DIMENSIONLESS)):
         return "has a unit; write the number alone"
     expected_unit = size_of_unit("Hz" if unit == str(RATE) else unit)
-    if expected_unit is None:  # SI units, or a unit for each of several components
+    several = map(size_of_unit, _OF_COMPONENTS.findall(unit)) if expected_unit is None else [expected_unit]
+    dimensions = [each.dimensions for each in several if each is not None]  # none of "SI units"
+    if dimensions and written_unit.dimensions not in dimensions:
+        kind, mass = kind_of_unit(parts["unit"]), abs(float(parts["number"])) * written_unit.size
+        hint = (
+            f"; {mass:g} kg weigh {GRAVITY * mass:.3g} N"
+            if (kind, unit.partition(" (")[0]) == ("a mass", "N")
+            else ""
+        )
+        return f"is {kind or 'in another unit'}; expected {expected_number(unit)}{hint}"
+    if expected_unit is None:
         return f"has a unit; write the number alone, in {unit}"
-    if written_unit.dimensions != expected_unit.dimensions:
-        return f"is {kind_of_unit(parts['unit']) or 'in another unit'}; expected {expected_number(unit)}"
     converted = float(parts["number"]) * written_unit.size / expected_unit.size
     return f"has a unit; write the number alone, in {unit}: {converted:.10g}"

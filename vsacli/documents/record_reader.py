@@ -286,6 +286,11 @@ def _read_items_by_name(kind: ItemsByName, node: Node, label: str, scope: Scope)
     if not isinstance(node, MapNode) or not node.entries:
         return scope.unexpected(node, "a mapping with at least one name", label)
     assert kind.unique is not None, "see ItemsByName"
+    keys = {"type", *(key for cls in kind.records.values() for key in declared_fields(cls))}
+    if keys >= node.entries.keys() and not any(isinstance(each, MapNode) for each in node.entries.values()):
+        example = f"{kind.noun.upper()}: {{{', '.join(f'{key}: ...' for key in node.entries)}}}"
+        scope.problems.add(node.line, f"{label}: name the {kind.noun} first, as in {label}: {{{example}}}")
+        return INVALID
     records = []
     for name, entry in node.entries.items():
         line, named = node.key_lines[name], entry

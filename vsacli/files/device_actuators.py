@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from vsacli.base.errors import InputError
+
 DEVICES = {
     "amasc": "coupled_1r",
     "awas_1r": "awas_1r",
@@ -28,3 +30,13 @@ DEVICES = {
 
 OF_DEVICE = ("actuator", "damper", "damping")
 """Keys of a joint that belong to the device."""
+
+
+def check_drives(device: str, joint_type: str) -> None:
+    """Raise an error unless a device drives joints of a type.
+
+    Raises:
+        InputError: without the name of the joint.
+    """
+    if joint_type != "revolute":
+        raise InputError.one(f"{device} turns about an axis, and drives no {joint_type} joint")

@@ -19,7 +19,7 @@ from vsacli.documents.commented import commented_document, three_digits
 from vsacli.documents.number import BOOLEANS
 from vsacli.documents.record_values import PathIndex
 from vsacli.documents.source import Problems
-from vsacli.files.device_actuators import DEVICES, OF_DEVICE
+from vsacli.files.device_actuators import DEVICES, OF_DEVICE, check_drives
 from vsacli.files.examples import example_tables, examples
 from vsacli.robot import file as robot_file
 from vsacli.robot.model import Robot
@@ -271,8 +271,7 @@ def _drive_values(actuator: str, joint_type: str) -> Values:
     """
     if actuator not in DEVICES:
         return {"actuator": example(actuator, joint_type)}
-    if joint_type != TYPES["R"]:
-        raise InputError.one(f"{actuator} turns about an axis, and drives no {joint_type} joint")
+    check_drives(actuator, joint_type)
     (robot,) = examples([DEVICES[actuator]])
     text = robot.path.read_text(encoding="utf-8")
     document = tree.plain(tree.parse_yaml(text, Problems(str(robot.path))))

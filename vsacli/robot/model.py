@@ -69,7 +69,7 @@ class Robot(DeclaredRecord):
     base: Pose = value(RecordOf(Pose), "DH frame 0 in the base frame", default=Pose())
     tool: Pose = value(RecordOf(Pose), "end effector in the last DH frame (frame N)", default=Pose())
     tools: tuple[Tool, ...] = value(
-        ItemsByName(RecordOf(Tool)), "end effectors by name, instead of `tool`", default=()
+        ItemsByName(RecordOf(Tool), "tool"), "end effectors by name, instead of `tool`", default=()
     )
     joints: tuple[Joint, ...] = value(
         Items(RecordOf(Joint), unique="name"), "joints, each after the one that carries it"

@@ -183,7 +183,7 @@ def trajectory_file_class(
         meaning = signal.meaning + ("; may be absent if there are none" if needed else "")
         fields[key] = value(declared_as(Use(signal)), meaning, default=REQUIRED if needed else None)
     fields[WRENCH.key] = value(declared_as(Use(WRENCH)), WRENCH.meaning, default=None)
-    by_tool = ItemsByName(declared_as(Use(WRENCH, by_tool=True)))
+    by_tool = ItemsByName(declared_as(Use(WRENCH, by_tool=True)), "tool")
     meaning = "wrenches by tool, for a robot with several: each as `wrench`, with its own frame"
     fields[WRENCHES] = value(by_tool, meaning, default=None)
     signals = [(name, Any, field) for name, field in fields.items()]

@@ -12,6 +12,7 @@ import numpy as np
 from vsacli.analysis.report_text import short_number
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
+from vsacli.base.flags import Flag
 from vsacli.base.json_records import Stored, named
 from vsacli.base.units import POSITION, STIFFNESS, TORQUE, units_of
 from vsacli.dynamics.energy import JointEnergy
@@ -149,7 +150,8 @@ def tracking_rows(joints: Sequence[JointTracking], ideal: Sequence[Deviation] = 
         "joint",
         f"q error peak / end\n{position}",
         f"stiffness error peak / end\n{stiffness}",
-        f"peak motor 1 / 2\n{torque}",
+        f"peak motor 1 / 2\n{torque}"
+        + (", saturated" if any(SATURATED in joint.worst for joint in joints) else ""),
     )
     if not ideal:
         return [header, *map(_tracking_row, joints)]
@@ -171,6 +173,9 @@ def _pair(deviation: Deviation) -> str:
     return f"{error_text(deviation.peak)} / {error_text(deviation.final)}"
 
 
+SATURATED, AS_COMMANDED = Flag.MOTOR_TORQUE_LIMIT.label, "as commanded; the motor saturates at the limit"
+"""Kind of findings on torques, with the reason why they exceed those of the table."""
+
 SMALLEST_ERROR = 1e-12
 """Magnitude below which an error or torque is shown as 0: rounding of values near 1."""
 
@@ -185,7 +190,8 @@ def error_text(value: float) -> str:
 def tracking_findings(joints: Sequence[JointTracking], complete: bool) -> Iterator[tuple[int, Finding]]:
     """Yield the limits that joints exceed and, of a complete run, how far off target they end, by joint."""
     for index, joint in enumerate(joints):
-        yield from ((index, worst) for worst in joint.worst.values())
+        for kind, worst in joint.worst.items():
+            yield index, replace(worst, advice=AS_COMMANDED) if kind == SATURATED else worst
         if complete and joint.off_course:
             error, tolerance = joint.q.final, math.copysign(joint.tolerance, joint.q.final)
             yield index, Finding(OFF_TARGET, math.nan, error, tolerance, joint.unit, joint=joint.name)

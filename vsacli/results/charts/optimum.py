@@ -69,7 +69,7 @@ class OptimizedJoint(NamedTuple):
         joint_type: revolute or prismatic.
         before: motion as commanded.
         after: motion at the optimum.
-        limits: bounds of the motor torques, (2,), infinite if there are none.
+        limits: lower and upper bound of the torque of each motor, (motors, 2), infinite if there are none.
     """
 
     name: str
@@ -105,7 +105,7 @@ class OptimizedJoint(NamedTuple):
             return None
         unit = TORQUE.unit(self.joint_type)
         lines = [self.before.torque_line(motor, BEFORE), self.after.torque_line(motor, AFTER)]
-        limits = [Limit(AFTER, 0, float(value)) for value in self.limits if np.isfinite(value)]
+        limits = [Limit(AFTER, 0, float(value)) for value in self.limits[motor - 1] if np.isfinite(value)]
         title, axis = f"{self.name}, motor {motor}", rf"$\tau_{motor}$ [{unit}]"
         return Chart(title, unit, lines, axis, limits=limits)
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import itertools
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -81,6 +81,7 @@ class Conversion:
         snaps: axes that were made parallel.
         residual: deviation of the robot's tools from the URDF's tips.
         file_warnings: words of the file that are ignored, and implausible orientations, by line.
+        devices: device whose actuator a joint has instead of a placeholder, by name of the joint.
     """
 
     file: str
@@ -91,11 +92,7 @@ class Conversion:
     snaps: tuple[Snap, ...]
     residual: KinematicResidual
     file_warnings: tuple[Problem, ...] = ()
-
-    @property
-    def one_motor_each(self) -> bool:
-        """Whether a single motor drives each joint, so that effort limits and gears of the URDF apply."""
-        return all(joint.actuator.motor_count == 1 for joint in self.robot.joints)
+    devices: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """Return the Denavit-Hartenberg table, its accuracy, warnings, and notes."""
@@ -154,7 +151,11 @@ class Conversion:
         for snap in self.snaps:
             yield f"axis of {snap.joint} made parallel to the one before it, {snap.angle:.2g} rad off"
         yield from self._of_motors()
-        left_out: dict[str, list[str]] = {}
+        left_out: dict[str, list[str]] = (
+            {"actuators of devices, with their damping": list(map(" ".join, self.devices.items()))}
+            if self.devices
+            else {}
+        )
         for joint, phrase, value in self._left_out():
             left_out.setdefault(phrase, []).append(f"{joint.name} {value}".rstrip())
         yield from (f"{phrase}: {', '.join(values)}" for phrase, values in left_out.items())
@@ -169,15 +170,21 @@ class Conversion:
 
     def _of_motors(self) -> Iterator[str]:
         """Yield notes on effort limits and gears, which apply to a single motor."""
-        joints = [joint.urdf for joint in self.tree.joints]
-        motor_data = {
-            "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
-            "gear reductions": [f"{joint.name} {joint.gear_ratio:g}" for joint in joints if joint.gear_ratio],
-        }
-        taken = "taken over" if self.one_motor_each else "not taken over, since two motors share a joint"
-        for quantity, names in motor_data.items():
-            if names:
-                yield f"{quantity} {taken}: {', '.join(names)}"
+        for count, taken in ((1, "taken over"), (2, "not taken over, since two motors share a joint")):
+            joints = [
+                origin.urdf
+                for origin, joint in zip(self.tree.joints, self.robot.joints, strict=True)
+                if joint.actuator.motor_count == count
+            ]
+            motor_data = {
+                "effort limits (joint side)": [joint.name for joint in joints if joint.limit.effort],
+                "gear reductions": [
+                    f"{joint.name} {joint.gear_ratio:g}" for joint in joints if joint.gear_ratio
+                ],
+            }
+            for quantity, names in motor_data.items():
+                if names:
+                    yield f"{quantity} {taken}: {', '.join(names)}"
 
 
 def _describe_held_joints(place: str, joints: Sequence[HeldJoint]) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from vsacli.base import file_formats
@@ -17,6 +18,7 @@ from vsacli.documents.fields import (
     OneOf,
     PairOf,
     RecordOf,
+    TablePath,
     ValueKind,
     WordChoice,
     declared_fields,
@@ -82,8 +84,10 @@ def _joint_lines(conversion: Conversion, index: int) -> Iterator[str]:
     yield "    actuator:"
     yield f"      type: {joint.actuator_type}"
     for name, text in _format_fields(joint.actuator).items():
-        comment = f"# placeholder: {_origin_of(name, conversion, index)}"
+        comment = f"# {_origin_of(name, conversion, index)}"
         yield _append_comment(f"      {name}: {text}", comment)
+    if joint.damper is not None:
+        yield f"    damper: {_format_mapping(_format_fields(joint.damper))}"
     if joint.limits != Limits():
         yield _append_comment(f"    limits: {_format_limits(joint.limits)}", "# of the joint's motion")
 
@@ -113,11 +117,14 @@ def _link_lines(link: Link) -> Iterator[str]:
 def _origin_of(field: str, conversion: Conversion, index: int) -> str:
     """Return the origin of the numbers in a field of an actuator, with motor data of the URDF."""
     joint, load = conversion.tree.joints[index], conversion.loads[index]
-    origin = conversion.placeholders.origin(field, joint, load)
+    converted = conversion.robot.joints[index]
+    if device := conversion.devices.get(converted.name):
+        return f"of the device {device}"
+    origin = f"placeholder: {conversion.placeholders.origin(field, joint, load)}"
     motor_data = " and ".join(_describe_urdf_motor(joint.urdf))
     if field != "motor" or not motor_data:
         return origin
-    return f"{origin}; {'with' if conversion.one_motor_each else 'the URDF has'} {motor_data}"
+    return f"{origin}; {'with' if converted.actuator.motor_count == 1 else 'the URDF has'} {motor_data}"
 
 
 def _describe_urdf_motor(joint: UrdfJoint) -> Iterator[str]:
@@ -151,6 +158,8 @@ def _format_field(kind: ValueKind, content: Any) -> str:
             return _format_number(content)
         case WordChoice():
             return str(content)
+        case TablePath():
+            return json.dumps(Path(content.source.path).name)
         case Interval() | NumberList():
             return _format_numbers(content)
     return json.dumps(content)

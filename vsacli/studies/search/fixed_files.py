@@ -21,6 +21,7 @@ from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.file import text_to_change
 from vsacli.studies.search.fix_report import Fix, branch_path
 from vsacli.studies.search.fixed_text import TableFile, edited_text, formula
+from vsacli.trajectory.fits import INTERPOLATE
 from vsacli.trajectory.profile import Profile, WrenchProfile
 from vsacli.trajectory.times import ResampledTimes, UniformTimes
 from vsacli.trajectory.trajectory import Trajectory
@@ -124,10 +125,10 @@ def _wrenches_on(tools: Sequence[str], wrench: WrenchProfile) -> dict[Signal, tu
 
 
 def _fit_options(profile: Profile | None) -> dict[str, Any]:
-    """Return the options of a recording's fit that were given, by key."""
+    """Return the options of a recording's fit that were given, by key; computed samples are interpolated."""
     estimate = None if profile is None else profile.estimate
     if estimate is None:
-        return {}
+        return {"fit": INTERPOLATE}
     chosen = estimate.choice
     noise = None if chosen.noise is None else list(chosen.noise)
     said = {"fit": chosen.method, "noise": noise, "bandwidth": chosen.bandwidth}

@@ -97,6 +97,7 @@ def optimize(
     varied = varied_joints(robot, vary)
     warnings = (*robot.warnings, *trajectory.warnings)
     what = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin, warnings=warnings)
+    what = replace(what, admissible=falls_short(what, trajectory) is None)
     if minimize == TIME:
         check_timing_varies(vary)
         return optimize_timing(what, trajectory, varied, seed, progress)
@@ -117,8 +118,9 @@ def _refuse_limits_of_tools(robot: Robot) -> None:
     if robot.limited_tools:
         names = ", ".join(robot.limited_tools)
         raise InputError.one(
-            f"optimizations do not keep the min_stiffness of tools ({names}); leave it out, and make the "
-            "optimized motion stiff enough with check-feasibility --fixes"
+            f"optimizations do not keep the min_stiffness of tools ({names}); leave it out, and give the "
+            "joints that move them a lower bound by limits.stiffness, which is kept; check-feasibility "
+            "--fixes of the optimized motion may help as well"
         )
 
 

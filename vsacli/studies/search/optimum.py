@@ -128,6 +128,7 @@ class Optimum(Published, TextReport):
         trajectory: best trajectory; None if nothing was found.
         pace: pace dt/ds along the path, a spline whose argument is s; None if the timing is unchanged.
         warnings: sentences about implausible values of robot and commanded trajectory.
+        admissible: whether the commanded motion keeps the margin and all limits, as the optimum does.
     """
 
     robot: Robot = field(repr=False)
@@ -144,6 +145,7 @@ class Optimum(Published, TextReport):
     trajectory: Trajectory | None = field(default=None, repr=False)
     pace: BSpline[np.float64] | None = field(default=None, repr=False)
     warnings: tuple[str, ...] = ()
+    admissible: bool = True
 
     format: ClassVar[str] = "vsacli-optimum/2"
     shape: ClassVar = {
@@ -203,7 +205,9 @@ class Optimum(Published, TextReport):
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""
-        warnings = list(warnings_and_notes(self.warnings, ()))
+        beyond = f"as commanded, the motion breaks a limit or the margin of {100 * self.min_margin:.4g} %"
+        notes = (f"{beyond}, which the optimum keeps",) if self.possible and not self.admissible else ()
+        warnings = list(warnings_and_notes(self.warnings, notes))
         if self.trajectory is None:
             return ReportText(self.title, [*self.reasons, *warnings])
         if self.timing is not None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from vsacli.base.arrays import IndexArray
 from vsacli.base.errors import InputError, check_path
+from vsacli.base.interrupts import Interrupted
 from vsacli.base.outputs import Outputs, Staged
 from vsacli.base.progress import Progress, unheard, unseen
 from vsacli.base.texts import counted, listed
@@ -306,7 +307,7 @@ def run_study(
         with Journal(target.with_name(f"{target.name}.journal")) as journal:
             _tell_damage(journal, tell)
             file = outputs.file(target)
-            with _telling_what_is_kept(journal, tell):
+            with _telling_what_is_kept(journal, study.runs_of_batch, tell):
                 lost = _computed(study, runs, journal, (processes, dask), progress, tell)
                 write(study, runs, lost, journal, file, command_line=command_line)
     if lost:
@@ -384,14 +385,19 @@ def gather(rows: Iterable[Row], journal: Journal, done: Callable[[int], object])
 
 
 @contextmanager
-def _telling_what_is_kept(journal: Journal, tell: Callable[[str], object]) -> Iterator[None]:
-    """Report the kept rows if the study ends early."""
+def _telling_what_is_kept(journal: Journal, together: int, tell: Callable[[str], object]) -> Iterator[None]:
+    """Report the kept rows if the study ends early; up to `together` runs finish at a time."""
     try:
         yield
-    except BaseException:
-        if not len(journal):
-            raise
-        tell(
-            f"{len(journal):,} finished runs are kept in {journal.path}; the same command goes on from there"
-        )
+    except BaseException as error:
+        if len(journal):
+            tell(
+                f"{len(journal):,} finished runs are kept in {journal.path}; the same command goes on from "
+                "there"
+            )
+        elif isinstance(error, Interrupted | KeyboardInterrupt):
+            tell(
+                "no run had finished, so none is kept"
+                + (f"; they are computed up to {together} at a time" if together > 1 else "")
+            )
         raise

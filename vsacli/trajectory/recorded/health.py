@@ -7,13 +7,13 @@ than seconds.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.base.signals import POSITION
+from vsacli.base.signals import POSITION, Signal
 from vsacli.base.units import Quantity, WrenchQuantity, time_text
 from vsacli.documents.time_column import UNITS, unit_of_steps
 from vsacli.trajectory.recorded.faults import (
@@ -112,7 +112,10 @@ class CheckedSignals(NamedTuple):
 
 
 def check_health(
-    stamps: FloatArray, records: Sequence[SignalSamples], types: Sequence[str] = ()
+    stamps: FloatArray,
+    records: Sequence[SignalSamples],
+    types: Sequence[str] = (),
+    interpolated: Collection[Signal] = (),
 ) -> CheckedSignals:
     """Find probable faults of a usable recording, and leave outliers out.
 
@@ -120,6 +123,8 @@ def check_health(
         stamps: recorded stamps, (samples,), s.
         records: signals that are used, without problems.
         types: joint types, "revolute" or "prismatic", for units; empty if unknown.
+        interpolated: signals whose spline passes all samples; those with all derivatives are computed, as
+            the tables of fixes and optima are, and are not checked.
     """
     if len(stamps) <= ORDER:
         return CheckedSignals(list(records), [])
@@ -129,7 +134,8 @@ def check_health(
         names = record.signal.names
         # a stiffness with its derivatives is computed, not measured: outliers are kinks of its profile
         measured = record.signal is POSITION or columns.keys() == {names[0]}
-        for quantity, name, lower in zip(record.signal.quantities, names, (None, *names), strict=False):
+        quantities = () if record.complete and record.signal in interpolated else record.signal.quantities
+        for quantity, name, lower in zip(quantities, names, (None, *names), strict=False):
             if name not in columns or not (lower is None or measured):
                 continue
             for component in np.flatnonzero(record.has_values).tolist():

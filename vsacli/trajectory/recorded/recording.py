@@ -24,7 +24,7 @@ from vsacli.documents.source import Source
 from vsacli.documents.table import CsvTable, RowLines, read_table
 from vsacli.documents.time_column import TIME
 from vsacli.robot.commanded_joints import CommandedJoints, describe_commanded_joints
-from vsacli.trajectory.fits import AS_IT_ASKS_FOR, FitChoice
+from vsacli.trajectory.fits import AS_IT_ASKS_FOR, INTERPOLATE, FitChoice
 from vsacli.trajectory.recorded.columns import (
     ColumnLayout,
     SignalColumn,
@@ -143,7 +143,12 @@ def read_recorded_signals(
     file, signals = table.source.path, [record.signal for record in records]
     wanted = dict.fromkeys(signals, AS_IT_ASKS_FOR) if wanted is None else wanted
     turns = list(_unwrap_positions(records, joints)) if unwrap else []
-    records, faults = check_health(time, records, list(joints.types.values()))
+    records, faults = check_health(
+        time,
+        records,
+        list(joints.types.values()),
+        [signal for signal, choice in wanted.items() if choice.method == INTERPOLATE],
+    )
     faults += unit_doubts(records, _types_without_unit(table, layout, joints))
     warnings = tuple(str(_locate_problem(fault, table, layout)) for fault in faults)
     clauses = (
