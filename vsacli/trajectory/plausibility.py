@@ -13,7 +13,14 @@ from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.errors import Problem
 from vsacli.base.signals import POSITION
 from vsacli.base.units import Quantity
-from vsacli.documents.plausibility import Measured, OtherUnit, Rule, ValuesInFile, implausible_values
+from vsacli.documents.plausibility import (
+    Judged,
+    Measured,
+    OtherUnit,
+    Rule,
+    ValuesInFile,
+    implausible_values,
+)
 from vsacli.documents.record_values import NumberAtPath, PathIndex
 from vsacli.documents.source import Source
 from vsacli.robot.joint import Joint
@@ -80,12 +87,16 @@ def trajectory_findings(
     """
     with np.errstate(all="ignore"):  # extreme values may be infinite in between
         sampled = None if motion is None else motion.at(np.linspace(*times.span, INSTANTS))
-    file_lines, findings = ValuesInFile(source), list[Problem]()
-    for subtree in robot.checked_subtrees:
-        checked = CheckedTrajectory(robot, subtree, numbers, times, sampled)
-        robot_rules = robot_rules_with_findings(robot.checked, subtree, robot.sources)
-        findings += implausible_values(TRAJECTORY_RULES, checked, file_lines, robot_rules)
-    return tuple(dict.fromkeys(findings))
+    file_lines = ValuesInFile(source)
+    judged = [
+        Judged(
+            CheckedTrajectory(robot, subtree, numbers, times, sampled),
+            file_lines,
+            robot_rules_with_findings(robot.checked, subtree, robot.sources),
+        )
+        for subtree in robot.checked_subtrees
+    ]
+    return implausible_values(TRAJECTORY_RULES, judged)
 
 
 @dataclass(frozen=True)

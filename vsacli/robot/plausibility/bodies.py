@@ -50,7 +50,11 @@ SLENDER = 2.0
 """Length of a link over its radius of gyration from which on the link is long enough to have two ends; of a
 thin rod it is 3.5."""
 
-SIZES = ("lengths", "densities of links", "sizes of links")
+LENGTHS_OF_BODIES = ("dh", "com", "tool", "tools", "mount")
+"""Keys on the paths of lengths of a robot's bodies."""
+
+UNIT_SYSTEM, LONG = "systems of units", "long links"
+SIZES = (UNIT_SYSTEM, "lengths", LONG, "masses of links", "densities of links", "sizes of links")
 """Names of rules of numbers that determine the sizes of a robot; if one has findings, sizes mean little."""
 
 Measure: TypeAlias = Callable[[CheckedRobot], Iterator[Measured]]
@@ -100,7 +104,7 @@ def _speed_of_limit(_: CheckedRobot, velocity: float) -> float:
 def _measure_lengths(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield lengths over the largest gyration; mounts on the base, where all may stand, over the reach."""
     largest, reach = float(np.max(checked.sizes.gyrations)), checked.sizes.reach
-    for number in _measure_numbers("m", "dh", "com", "tool", "tools", "mount")(checked):
+    for number in _measure_numbers("m", *LENGTHS_OF_BODIES)(checked):
         if "mount" in number.path and number.path[1] == PathIndex(0, checked.joints[0].name):
             size, reference = ratio_or_nan(number.size, reach), f"the reach of what it carries, {reach:.3g} m"
         else:
@@ -192,6 +196,39 @@ def _measure_upward_gravity(checked: CheckedRobot) -> Iterator[Measured]:
         yield Measured(("gravity",), upward, "m/s^2", ratio_or_nan(upward, math.hypot(*checked.gravity)))
 
 
+LONG_LINKS: Rule[CheckedRobot] = Rule(LONG, "`dh.a`, `dh.d`, `com`, `xyz` of `mount`, `tool`, `tools`",
+        _measure_numbers("m", *LENGTHS_OF_BODIES),
+        size="m", high=20, usual=0.1, reason="links of space manipulators have up to 10 m",
+        finding="is longer than any link", units=(MILLIMETERS, CENTIMETERS), explained_by=(UNIT_SYSTEM, "lengths"))  # fmt: skip
+
+MASSES_OF_LINKS: Rule[CheckedRobot] = Rule("masses of links", "`mass`",
+        _measure_link_masses(lambda checked, index: checked.joints[index].link.mass),
+        size="kg", high=1e4, usual=5, reason="links of the largest excavators are lighter",
+        finding="is heavier than links of excavators", units=(GRAMS._replace(power=1),),
+        explained_by=(UNIT_SYSTEM,))  # fmt: skip
+
+DENSITIES: Rule[CheckedRobot] = Rule("densities of links", "`mass`, `inertia`",
+        _measure_link_masses(lambda checked, index: density_of_sphere(checked.joints[index].link)),
+        size="kg/m^3, of a solid sphere with this mass and sum of moments",
+        low=2e-3, high=25000, usual=400,
+        reason="real robots: 0.006 to 11,000; osmium: 22,600",
+        finding="makes a link as dense as a solid sphere of {size} kg/m^3", units=SLIPS_OF_DENSITY,
+        explained_by=(UNIT_SYSTEM, LONG, "masses of links"))  # fmt: skip
+
+LENGTHS: Rule[CheckedRobot] = Rule("lengths", "`dh.a`, `dh.d`, `com`, `xyz` of `mount`, `tool`, `tools`", _measure_lengths,
+        size="over the largest radius of gyration; of mounts on the base, over the reach", high=30, usual=0.8,
+        reason="real robots: up to 8",
+        finding="is {size} times {reference}",
+        units=(MILLIMETERS, CENTIMETERS),
+        explained_by=(UNIT_SYSTEM,))  # fmt: skip
+
+SIZES_OF_LINKS: Rule[CheckedRobot] = Rule("sizes of links", "`mass`, `inertia`", _measure_link_masses(_relative_gyration),
+        size="radius of gyration over the reach from the base frame", high=3,
+        reason="real robots: up to 1.9",
+        finding="makes a link whose radius of gyration is {size} times the reach of the robot",
+        advice="check the units of mass, inertia and lengths",
+        explained_by=SIZES[:5])  # fmt: skip
+
 BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("fixed angles", "`alpha`, `theta`, `rpy`",
         _measure_numbers("rad", without=("limits", "actuator"), size=lambda _, angle: turns(angle)),
@@ -216,23 +253,7 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("velocities of prismatic joints", "`limits.velocity`", _measure_numbers("m/s", "limits"),
         size="m/s", high=20, usual=0.5, reason="linear motors are slower",
         finding="is faster than linear motors are", units=(OtherUnit("mm/s", 1e-3),)),
-    Rule("lengths", "`dh.a`, `dh.d`, `com`, `xyz` of `mount`, `tool`, `tools`", _measure_lengths,
-        size="over the largest radius of gyration; of mounts on the base, over the reach", high=30, usual=0.8,
-        reason="real robots: up to 8",
-        finding="is {size} times {reference}",
-        units=(MILLIMETERS, CENTIMETERS)),
-    Rule("densities of links", "`mass`, `inertia`",
-        _measure_link_masses(lambda checked, index: density_of_sphere(checked.joints[index].link)),
-        size="kg/m^3, of a solid sphere with this mass and sum of moments",
-        low=2e-3, high=25000, usual=400,
-        reason="real robots: 0.006 to 11,000; osmium: 22,600",
-        finding="makes a link as dense as a solid sphere of {size} kg/m^3", units=SLIPS_OF_DENSITY),
-    Rule("sizes of links", "`mass`, `inertia`", _measure_link_masses(_relative_gyration),
-        size="radius of gyration over the reach from the base frame", high=3,
-        reason="real robots: up to 1.9",
-        finding="makes a link whose radius of gyration is {size} times the reach of the robot",
-        advice="check the units of mass, inertia and lengths",
-        explained_by=("lengths", "densities of links")),
+    LENGTHS, LONG_LINKS, MASSES_OF_LINKS, DENSITIES, SIZES_OF_LINKS,
     Rule("centers of mass", "`com`", _measure_centers_of_mass,
         size="of revolute joints: link lengths beyond joint, next joints and tools, if above 2 gyrations",
         low=-math.inf, high=0.25,
