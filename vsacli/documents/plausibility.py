@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from functools import cached_property, partial
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 
@@ -33,8 +33,6 @@ _COMPONENTS = {
 """Names of the components of fields that are lists."""
 
 MOST_NAMED = 5
-"""Largest number of values that are named as having the same unit as another one."""
-
 _EXPRESSION_OF_ANGLE = re.compile("deg|pi")
 
 
@@ -117,25 +115,28 @@ class Rule(NamedTuple, Generic[_Subject]):
 
         A unit is tried the earlier, the more of the numbers it makes plausible, and the more usual ones.
         """
+        plausible = {other: self._plausible_sizes(outside, other) for other in self.units}
         chosen: dict[int, OtherUnit] = {}
-        for other in sorted(self.units, key=partial(self._likelihood, outside), reverse=True):
+        for other in sorted(
+            plausible,
+            key=lambda other: (
+                -len(plausible[other]),
+                sum(abs(math.log(size / self.usual)) for size in plausible[other].values()),
+            ),
+        ):
             taken = {(outside[index].unit, earlier.field) for index, earlier in chosen.items()}
-            for index in self._made_plausible(outside, other):
-                if (outside[index].unit, other.field) not in taken:
-                    chosen.setdefault(index, other)
+            fitting = (each for each in plausible[other] if (outside[each].unit, other.field) not in taken)
+            chosen = {**dict.fromkeys(fitting, other), **chosen}
         return [chosen.get(index) for index in range(len(outside))]
 
-    def _likelihood(self, outside: Sequence[Measured], other: OtherUnit) -> tuple[int, float]:
-        sizes = self._made_plausible(outside, other).values()
-        return len(sizes), -sum(abs(math.log(size / self.usual)) for size in sizes)
-
-    def _made_plausible(self, outside: Sequence[Measured], other: OtherUnit) -> dict[int, float]:
-        """Return the sizes that are plausible in another unit, by index of the number."""
-        sizes = (measured.size * other.factor**other.power for measured in outside)
+    def _plausible_sizes(self, outside: Sequence[Measured], other: OtherUnit) -> dict[int, float]:
+        """Return the sizes in another unit of the numbers that it makes plausible, by index."""
         return {
             index: size
-            for index, (measured, size) in enumerate(zip(outside, sizes, strict=True))
-            if size and self.admits(size) and other.instead_of in ("", measured.unit)
+            for index, measured in enumerate(outside)
+            if (size := measured.size * other.factor**other.power)
+            and self.admits(size)
+            and other.instead_of in ("", measured.unit)
         }
 
     def sentence(self, measured: Measured, other: OtherUnit | None) -> str:
@@ -264,24 +265,16 @@ def implausible_measurements(
     return outside_by_rule
 
 
-class Judged(NamedTuple, Generic[_Subject]):
-    """A robot or trajectory to judge; of a tree, for one of its subtrees.
-
-    Attributes:
-        subject: robot or trajectory.
-        written: its file, if any.
-        rules_with_findings: names of rules with findings elsewhere.
-    """
-
-    subject: _Subject
-    written: ValuesInFile | None
-    rules_with_findings: Collection[str] = ()
-
-
 def implausible_values(
-    rules: Sequence[Rule[_Subject]], judged: Sequence[Judged[_Subject]]
+    rules: Sequence[Rule[_Subject]],
+    judged: Sequence[tuple[_Subject, ValuesInFile | None, Collection[str]]],
 ) -> tuple[Problem, ...]:
-    """Return the warnings about implausible values, with file and line if the file has the same value."""
+    """Return the warnings about implausible values, with file and line if the file has the same value.
+
+    Args:
+        rules: see `implausible_measurements`.
+        judged: its other arguments, several times for a tree: once for each subtree.
+    """
     outside_by_rule = [implausible_measurements(rules, *each) for each in judged]
     problems = (
         problem
@@ -289,8 +282,8 @@ def implausible_values(
         for problem in _warnings_by_rule(
             rule,
             [
-                (measured, each.written)
-                for each, outside in zip(judged, outside_by_rule, strict=True)
+                (measured, written)
+                for (_, written, _), outside in zip(judged, outside_by_rule, strict=True)
                 for measured in outside.get(rule.name, ())
             ],
         )

@@ -8,7 +8,6 @@ from functools import partial
 from vsacli.base.errors import Problem
 from vsacli.documents import tree
 from vsacli.documents.plausibility import (
-    Judged,
     ValuesInFile,
     implausible_measurements,
     implausible_values,
@@ -20,9 +19,8 @@ from vsacli.robot.plausibility.checked_robot import CheckedRobot
 from vsacli.robot.plausibility.drives import DRIVE_RULES, RULES_OF_MOTORS_AND_SPRINGS
 from vsacli.robot.plausibility.links import impossible_links
 from vsacli.robot.plausibility.springs import SPRING_RULES
-from vsacli.robot.plausibility.unit_systems import UNIT_SYSTEM_RULES
 
-SUBTREE_RULES = (*UNIT_SYSTEM_RULES, *BODY_RULES, *DRIVE_RULES, *SPRING_RULES, *RULES_OF_MOTORS_AND_SPRINGS)
+SUBTREE_RULES = (*BODY_RULES, *DRIVE_RULES, *SPRING_RULES, *RULES_OF_MOTORS_AND_SPRINGS)
 ROBOT_RULES = (*WHOLE_ROBOT_RULES, *SUBTREE_RULES)
 
 
@@ -37,13 +35,14 @@ def robot_findings(
     file_lines = ValuesInFile(sources[0]) if sources else None
     # A single joint may well be vertical, unless its file says nothing about gravity.
     chosen = file_lines is None or file_lines.has(("gravity",))
-    whole_robot_rules = () if chosen and len(robot.joints) == 1 else WHOLE_ROBOT_RULES
     findings = [
         *impossible_links(robot.joints, file_lines),
-        *implausible_values(whole_robot_rules, [Judged(robot, file_lines)]),
+        *implausible_values(
+            () if chosen and len(robot.joints) == 1 else WHOLE_ROBOT_RULES, [(robot, file_lines, ())]
+        ),
         *implausible_values(
             SUBTREE_RULES,
-            [Judged(subtree, _robot_file_lines(robot, subtree, sources)) for subtree in subtrees],
+            [(subtree, _robot_file_lines(robot, subtree, sources), ()) for subtree in subtrees],
         ),
     ]
     return tuple(dict.fromkeys(findings))
