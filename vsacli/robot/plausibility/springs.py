@@ -192,7 +192,8 @@ SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="is a deflection of more than half a turn (than the reach)",
         units=(DEGREES, MILLIMETERS), in_angles=True),
     Rule("springs at their largest deflection", "`spring`", _measure_largest_deflections,
-        size="torque at `max_deflection` or the end of a table, over the largest of load and motor", high=150,
+        size="torque at `max_deflection`, the end of a table or, of springs without stiffness at rest, 1 rad "
+        "(reach), over the largest of load and motor", high=150,
         usual=1, reason="bundled robots: 1 to 25; no motor would deflect them so far",
         finding="has {torque} at {end}, {size} times the {asked} that load or motor can ask of it",
         units=TOO_STIFF, advice="check the units of its constants and of its largest deflection",
