@@ -34,5 +34,5 @@ def test_all_values_of_the_same_unit_are_listed_with_their_lines(tmp_path: Path)
     arm.write_text(slip.of(FINGER))
     (warning,) = load_robot(arm).warnings
     assert warning.endswith(
-        "? Likewise joints.middle.link.com.0 (x) (line 19), joints.tip.link.com.0 (x) (line 28)"
+        "? Also joints.middle.link.com.0 (x) (line 19), joints.tip.link.com.0 (x) (line 29)"
     )

@@ -311,5 +311,5 @@ def _warnings_by_rule(
             f"{name} (line {each.line})" if each.line != first.line else name
             for name, each in zip([*group][1:], likewise, strict=True)
         ]
-        also = f" Likewise {listed(places, MOST_NAMED)}" if places else ""
+        also = f" Also {listed(places, MOST_NAMED)}" if places else ""
         yield first._replace(message=first.message + also)

@@ -248,12 +248,17 @@ def _measure_upward_gravity(checked: CheckedRobot) -> Iterator[Measured]:
 
 def _guess_system(checked: CheckedRobot) -> tuple[str, ...]:
     """Return the units that make a robot most usual; the proper ones if its sizes are plausible in these."""
+    gyrations, mass = checked.sizes.gyrations[checked.sizes.gyrations > 0], checked.sizes.mass
     reach = max(checked.sizes.reach + checked.distance_from_base_frame, np.finfo(float).tiny)
-    rules = [rule for rule in BODY_RULES if rule.name in (SIZES[1], SIZES[4], SIZES[5])]
-    of_links = [np.array([each.size for each in rule.measure(checked) if each.size > 0]) for rule in rules]
-    sizes = [np.array([reach]), np.array([checked.sizes.mass / reach**3]), *of_links]
+    lengths = np.abs([(*joint.link.com, joint.dh.a, joint.dh.d) for joint in checked.joints])
+    densities = np.array([density_of_sphere(joint.link) for joint in checked.joints])
+    if not mass or not len(gyrations) or not lengths.any():
+        return PROPER
+    sizes = [np.array([reach]), np.array([mass / reach**3])]
+    sizes += [lengths[lengths > 0] / max(gyrations), densities[densities > 0], gyrations / reach]
+    rules = [rule for rule in BODY_RULES if rule.name in ("lengths", "densities of links", "sizes of links")]
     ranges = [(0.0, math.inf), (3e-3, 2e4), *((rule.low, rule.high) for rule in rules)]
-    if not all(map(np.size, sizes)) or not checked.sizes.mass or _are_plausible(sizes, ranges, PROPER):
+    if _are_plausible(sizes, ranges, PROPER):
         return PROPER
     units = min(UNIT_SYSTEMS, key=lambda units: _misfit(sizes, units))
     length, mass, inertia = UNIT_SYSTEMS[units]
@@ -265,9 +270,9 @@ def _are_plausible(
     sizes: list[FloatArray], ranges: list[tuple[float, float]], units: tuple[str, ...]
 ) -> bool:
     scales = np.prod(UNIT_SYSTEMS[units] ** POWERS, axis=1)
-    scaled = [size * scale for size, scale in zip(sizes, scales, strict=True)]
     return all(
-        np.all((low <= size) & (size < high)) for size, (low, high) in zip(scaled, ranges, strict=True)
+        np.all((low <= size * scale) & (size * scale < high))
+        for size, scale, (low, high) in zip(sizes, scales, ranges, strict=True)
     )
 
 

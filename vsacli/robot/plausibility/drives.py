@@ -119,16 +119,19 @@ def _measure_motors(
 
     Args:
         name: name of the field.
-        size: function that returns the size of a motor; by default |value|, NaN if 0 or infinite.
+        size: function that returns the size of a motor; by default |value|, NaN if 0 or infinite. Those
+            with NaN are skipped.
         unit: unit of the field; motors with another one are skipped. "" for any unit.
         carrying: whether to skip motors that do not carry the load.
     """
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
         for drive in _checked_motors(checked):
-            if unit in ("", drive.unit(name)) and (drive.carries_load or not carrying):
-                value = getattr(drive.motor, name) or math.nan
-                yield drive.measure(name, _nan_if_infinite(abs(value)) if size is None else size(drive))
+            value = getattr(drive.motor, name) or math.nan
+            relative = _nan_if_infinite(abs(value)) if size is None else size(drive)
+            counts = not math.isnan(relative) and (drive.carries_load or not carrying)
+            if counts and unit in ("", drive.unit(name)):
+                yield drive.measure(name, relative)
 
     return measure
 
@@ -169,9 +172,9 @@ def _measure_viscous_losses(checked: CheckedRobot) -> Iterator[Measured]:
     Of motors without a largest velocity it is that at 1 rad/s (reach/s).
     """
     for drive in _checked_motors(checked):
-        travel = 1.0 if drive.joint.is_revolute else checked.sizes.extent
-        share = (travel if math.isnan(drive.velocity) else drive.velocity) / drive.torque
-        if drive.carries_load:
+        if drive.carries_load and not math.isnan(drive.torque):
+            travel = 1.0 if drive.joint.is_revolute else checked.sizes.extent
+            share = (travel if math.isnan(drive.velocity) else drive.velocity) / drive.torque
             yield drive.measure("damping", drive.at_joint_side.damping * share)
             path, damping = joint_path(drive.number, drive.joint, "damping"), drive.joint.damping
             yield Measured(path, damping, units.DAMPING.unit(drive.joint.type), damping * share)
