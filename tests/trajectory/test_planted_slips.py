@@ -36,3 +36,20 @@ def test_all_values_of_the_same_unit_are_listed_with_their_lines(tmp_path: Path)
     assert warning.endswith(
         "? Also joints.middle.link.com.0 (x) (line 19), joints.tip.link.com.0 (x) (line 29)"
     )
+
+
+@pytest.mark.parametrize(
+    ("lengths", "masses", "unit"),
+    [
+        ("45,28,22", "0.018,0.01,0.007", "45 mm"),
+        ("4.5,2.8,2.2", "0.018,0.01,0.007", "4.5 cm"),
+        ("0.045,0.028,0.022", "18,10,7", "18 g"),
+        ("0.045,0.028,0.022", "0.018,0.01,0.007", ""),
+    ],
+)
+def test_a_new_robot_is_written_with_a_warning_of_its_cause(lengths, masses, unit, vsacli) -> None:
+    new = ("new", "robot", "--joints", "RRR", "--length", lengths, "--mass", masses, "-o", "finger.yaml")
+    done = vsacli(*new)
+    assert done.code == 0
+    assert done.err.count("warning: finger.yaml:") == bool(unit)
+    assert not unit or f"did you mean {unit}, which is" in done.err

@@ -149,9 +149,12 @@ class CheckedTrajectory:
         """
         assert self.motion_of_robot is not None, "of motions by a formula"
         largest = np.abs(self.motion_of_robot[1, list(subtree.numbers_in_robot)]).max(axis=1)
-        joints = ([motor for _, motor in motors_in_file(joint)] for joint in subtree.joints)
+        drives = dict(subtree.joints_with_drives)  # none if they are placeholders
         limits = [
-            min((motor.at_joint.max_velocity for motor in motors), default=math.inf) for motors in joints
+            min((motor.at_joint.max_velocity for _, motor in motors_in_file(joint)), default=math.inf)
+            if number in drives
+            else math.inf
+            for number, joint in enumerate(subtree.joints)
         ]
         velocities: FloatArray = np.where(np.isinf(limits) & (largest > 0), math.inf, largest / limits)
         return velocities

@@ -249,13 +249,13 @@ def _measure_upward_gravity(checked: CheckedRobot) -> Iterator[Measured]:
 def _guess_system(checked: CheckedRobot) -> tuple[str, ...]:
     """Return the units that make a robot most usual; the proper ones if its sizes are plausible in these."""
     gyrations, mass = checked.sizes.gyrations[checked.sizes.gyrations > 0], checked.sizes.mass
-    reach = max(checked.sizes.reach + checked.distance_from_base_frame, np.finfo(float).tiny)
+    reach = np.array([checked.sizes.reach + checked.distance_from_base_frame])
     lengths = np.abs([(*joint.link.com, joint.dh.a, joint.dh.d) for joint in checked.joints])
     densities = np.array([density_of_sphere(joint.link) for joint in checked.joints])
     if not mass or not len(gyrations) or not lengths.any():
         return PROPER
-    sizes = [np.array([reach]), np.array([mass / reach**3])]
-    sizes += [lengths[lengths > 0] / max(gyrations), densities[densities > 0], gyrations / reach]
+    sizes = [reach, mass / reach**3, lengths[lengths > 0] / max(gyrations)]
+    sizes += [densities[densities > 0], gyrations / reach]
     rules = [rule for rule in BODY_RULES if rule.name in ("lengths", "densities of links", "sizes of links")]
     ranges = [(0.0, math.inf), (3e-3, 2e4), *((rule.low, rule.high) for rule in rules)]
     if _are_plausible(sizes, ranges, PROPER):
