@@ -227,7 +227,7 @@ DOUBTS = {
         "column 'base.q', as 14 more, has each value in 2 rows",
     ),
 }
-"""Likewise of those that only make the numbers unreliable."""
+"""Also of those that only make the numbers unreliable."""
 
 
 @pytest.mark.cases(4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import shlex
 from collections import Counter
@@ -183,7 +184,7 @@ def robot(
     out. Reports mark its springs and motors as placeholders until the key `placeholder` is removed.
     """
     from vsacli.files.examples import example_tables
-    from vsacli.files.robot_template import LinkSizes, robot_template
+    from vsacli.files.robot_template import LinkSizes, load_template, robot_template
 
     letters = _letters(joints, actuator, chosen)
     for option, sizes in {"--length": lengths, "--mass": masses}.items():
@@ -198,6 +199,10 @@ def robot(
             sizes=LinkSizes(lengths or (), masses or ()),
         )
     _write(text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text])
+    if lengths or masses:  # the first warning is about these, others about what was computed from them
+        located = (problem for problem in load_template(text).located_warnings if problem.line)
+        for problem in itertools.islice(located, 1):
+            talk.note(f"warning: {problem._replace(file=_file(output, 'arm.yaml'))}")
     talk.note(f"next: vsacli new trajectory --robot {_file(output, 'arm.yaml')} -o move.yaml")
 
 

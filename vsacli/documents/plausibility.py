@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
@@ -17,6 +17,7 @@ from typing import Any, Generic, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from vsacli.base.errors import InputError, Problem
+from vsacli.base.texts import listed
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.number import ANGLES, evaluate
 from vsacli.documents.record_values import NumberPath, PathIndex
@@ -30,6 +31,7 @@ _COMPONENTS = {
 }
 """Names of the components of fields that are lists."""
 
+MOST_NAMED = 5
 _EXPRESSION_OF_ANGLE = re.compile("deg|pi")
 
 
@@ -107,15 +109,34 @@ class Rule(NamedTuple, Generic[_Subject]):
         """Return whether a size is plausible or unknown."""
         return math.isnan(size) or self.low <= size < self.high
 
-    def other_unit(self, measured: Measured) -> OtherUnit | None:
-        """Return the unit in which the number would be closest to a typical size, or None."""
-        sizes = {
-            other: measured.size * other.factor**other.power
-            for other in self.units
-            if other.instead_of in ("", measured.unit)
+    def choose_units(self, outside: Sequence[Measured]) -> list[OtherUnit | None]:
+        """Return the unit in which each number was probably written, or None; never two for one field.
+
+        A unit is tried the earlier, the more of the numbers it makes plausible, and the more usual ones.
+        """
+        plausible = {other: self._plausible_sizes(outside, other) for other in self.units}
+        chosen: dict[int, OtherUnit] = {}
+        for other in sorted(
+            plausible,
+            key=lambda other: (
+                -len(plausible[other]),
+                sum(abs(math.log(size / self.usual)) for size in plausible[other].values()),
+            ),
+        ):
+            taken = {(outside[index].unit, earlier.field) for index, earlier in chosen.items()}
+            fitting = (each for each in plausible[other] if (outside[each].unit, other.field) not in taken)
+            chosen = {**dict.fromkeys(fitting, other), **chosen}
+        return [chosen.get(index) for index in range(len(outside))]
+
+    def _plausible_sizes(self, outside: Sequence[Measured], other: OtherUnit) -> dict[int, float]:
+        """Return the sizes in another unit of the numbers that it makes plausible, by index."""
+        return {
+            index: size
+            for index, measured in enumerate(outside)
+            if (size := measured.size * other.factor**other.power)
+            and self.admits(size)
+            and other.instead_of in ("", measured.unit)
         }
-        fitting = [other for other, size in sizes.items() if size and self.admits(size)]
-        return min(fitting, key=lambda other: abs(math.log(sizes[other] / self.usual)), default=None)
 
     def sentence(self, measured: Measured, other: OtherUnit | None) -> str:
         """Return the warning: field, value, finding, and the likely unit."""
@@ -127,16 +148,15 @@ class Rule(NamedTuple, Generic[_Subject]):
         advice = self.advice
         if other is not None:
             advice = _guess_unit(measured, other) if has_value else f"is it in {other.unit}?"
-        return f"{'.'.join(map(str, path))}{_component_name(path)}{value} {finding}; {advice}"
+        return f"{_name_of_path(path)}{value} {finding}; {advice.format(**measured.beside)}"
 
 
-def _component_name(path: NumberPath) -> str:
-    """Return the name of a component that a path gives by its index only; empty if it has none."""
-    if len(path) < 3 or not isinstance(path[-1], PathIndex) or path[-1].name:
-        return ""
-    field = "limits" if path[-3] == "limits" else path[-2]
-    words = _COMPONENTS.get(str(field), ())
-    return f" ({words[path[-1].number]})" if path[-1].number < len(words) else ""
+def _name_of_path(path: NumberPath) -> str:
+    """Return a path joined by dots, with the name of a component that it gives by its index only."""
+    words: Sequence[str] = ()
+    if len(path) > 2 and isinstance(path[-1], PathIndex) and not path[-1].name:
+        words = _COMPONENTS.get("limits" if path[-3] == "limits" else str(path[-2]), ())[path[-1].number :]
+    return ".".join(map(str, path)) + (f" ({words[0]})" if words else "")
 
 
 def _guess_unit(measured: Measured, other: OtherUnit) -> str:
@@ -246,26 +266,49 @@ def implausible_measurements(
 
 def implausible_values(
     rules: Sequence[Rule[_Subject]],
-    subject: _Subject,
-    written: ValuesInFile | None = None,
-    rules_with_findings: Collection[str] = (),
+    judged: Sequence[tuple[_Subject, ValuesInFile | None, Collection[str]]],
 ) -> tuple[Problem, ...]:
-    """Return the warnings about implausible values, with file and line if the file has the same value."""
-    named = {rule.name: rule for rule in rules}
-    outside_by_rule = implausible_measurements(rules, subject, written, rules_with_findings)
+    """Return the warnings about implausible values, with file and line if the file has the same value.
+
+    Args:
+        rules: see `implausible_measurements`.
+        judged: its other arguments, several times for a tree: once for each subtree.
+    """
+    outside_by_rule = [implausible_measurements(rules, *each) for each in judged]
     problems = (
-        _warning_about(named[name], each, written)
-        for name, several in outside_by_rule.items()
-        for each in several
+        problem
+        for rule in rules
+        for problem in _warnings_by_rule(
+            rule,
+            [
+                (measured, written)
+                for (_, written, _), outside in zip(judged, outside_by_rule, strict=True)
+                for measured in outside.get(rule.name, ())
+            ],
+        )
     )
     return tuple(dict.fromkeys(problems))
 
 
-def _warning_about(rule: Rule[Any], measured: Measured, written: ValuesInFile | None) -> Problem:
-    """Return the warning about a number."""
-    other = rule.other_unit(measured)
-    in_file = written.as_in_file(measured) if written is not None else None
-    if written is None or in_file is None:
-        return Problem("", 0, rule.sentence(measured, other))
-    line = written.line(_path_to_report(measured.path, other))
-    return Problem(written.path, line, rule.sentence(in_file, other))
+def _warnings_by_rule(
+    rule: Rule[Any], outside: Sequence[tuple[Measured, ValuesInFile | None]]
+) -> Iterator[Problem]:
+    """Yield a warning about each number, but only one about all that probably have the same other unit."""
+    groups: dict[object, dict[str, Problem]] = {}
+    units = rule.choose_units([measured for measured, _ in outside])
+    for index, ((measured, written), other) in enumerate(zip(outside, units, strict=True)):
+        in_file = written.as_in_file(measured) if written is not None else None
+        number, place = in_file or measured, ("", 0)
+        if written is not None and in_file is not None:
+            place = written.path, written.line(_path_to_report(measured.path, other))
+        warning = Problem(*place, rule.sentence(number, other))
+        of_unit = groups.setdefault(index if other is None else other, {})
+        of_unit.setdefault(_name_of_path(_path_to_report(number.path, other)), warning)
+    for group in groups.values():
+        first, *likewise = group.values()
+        places = [
+            f"{name} (line {each.line})" if each.line != first.line else name
+            for name, each in zip([*group][1:], likewise, strict=True)
+        ]
+        also = f" Also {listed(places, MOST_NAMED)}" if places else ""
+        yield first._replace(message=first.message + also)

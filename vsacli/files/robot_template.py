@@ -123,8 +123,8 @@ def robot_template(
     chosen = [*zip(names, types, words, strict=True)]
     values = _robot_values(name, chosen, sizes)
     if sizes != USUAL_SIZES:
-        usual = _load_template(_robot_document(_robot_values(name, chosen, USUAL_SIZES)))
-        scales = _scales_of_numbers(_load_template(_robot_document(values)), usual)
+        usual = load_template(_robot_document(_robot_values(name, chosen, USUAL_SIZES)))
+        scales = _scales_of_numbers(load_template(_robot_document(values)), usual)
         for index, (joint, word) in enumerate(zip(values["joints"], words, strict=True)):
             if word not in DEVICES:
                 scaled = {
@@ -155,7 +155,8 @@ def _robot_values(name: str, joints: Sequence[tuple[str, str, str]], sizes: Link
     }
 
 
-def _load_template(text: str) -> Robot:
+def load_template(text: str) -> Robot:
+    """Return the robot of a template."""
     with temporary_folder() as folder:
         path = folder / "starter.yaml"
         with reporting_temporary_errors():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,7 @@ from vsacli.robot.plausibility.checked_robot import (
     BodySizes,
     CheckedRobot,
     UnloadedStiffnessRange,
+    motors_in_file,
     ratio_or_nan,
 )
 from vsacli.robot.plausibility.springs import NEWTON_MILLIMETERS, TOO_SOFT
@@ -60,7 +61,7 @@ UNITS_OF_TIME = (
 )
 UNITS_OF_STIFFNESS = (*TOO_SOFT, NEWTON_MILLIMETERS)
 
-SPRINGS = ("stiff springs", "hardening of springs")
+SPRINGS = ("springs at their largest deflection", "stiff springs", "hardening of springs")
 RANGES = ("ranges of revolute joints", "ranges of prismatic joints")
 POSITIONS = ("positions of revolute joints", "positions of prismatic joints", *RANGES)
 
@@ -79,12 +80,16 @@ def trajectory_findings(
     """
     with np.errstate(all="ignore"):  # extreme values may be infinite in between
         sampled = None if motion is None else motion.at(np.linspace(*times.span, INSTANTS))
-    file_lines, findings = ValuesInFile(source), list[Problem]()
-    for subtree in robot.checked_subtrees:
-        checked = CheckedTrajectory(robot, subtree, numbers, times, sampled)
-        robot_rules = robot_rules_with_findings(robot.checked, subtree, robot.sources)
-        findings += implausible_values(TRAJECTORY_RULES, checked, file_lines, robot_rules)
-    return tuple(dict.fromkeys(findings))
+    file_lines = ValuesInFile(source)
+    judged = [
+        (
+            CheckedTrajectory(robot, subtree, numbers, times, sampled),
+            file_lines,
+            robot_rules_with_findings(robot.checked, subtree, robot.sources),
+        )
+        for subtree in robot.checked_subtrees
+    ]
+    return implausible_values(TRAJECTORY_RULES, judged)
 
 
 @dataclass(frozen=True)
@@ -129,6 +134,23 @@ class CheckedTrajectory:
         usual = [1.0 if joint.is_revolute else subtree.sizes.extent or math.nan for joint in subtree.joints]
         return np.asarray(np.abs(np.diff(position)).sum(axis=1) / usual / self.duration)
 
+    def velocities_in_limits(self, subtree: CheckedRobot) -> FloatArray:
+        """Return the largest velocity of each joint of a subtree, (joints,), over that of its motors.
+
+        It is infinite of a joint that moves with a motor without a largest velocity.
+        """
+        assert self.motion_of_robot is not None, "of motions by a formula"
+        largest = np.abs(self.motion_of_robot[1, list(subtree.numbers_in_robot)]).max(axis=1)
+        drives = dict(subtree.joints_with_drives)  # none if they are placeholders
+        limits = [
+            min((motor.at_joint.max_velocity for _, motor in motors_in_file(joint)), default=math.inf)
+            if number in drives
+            else math.inf
+            for number, joint in enumerate(subtree.joints)
+        ]
+        velocities: FloatArray = np.where(np.isinf(limits) & (largest > 0), math.inf, largest / limits)
+        return velocities
+
     @property
     def duration(self) -> float:
         """Time from the first sample to the last, s."""
@@ -168,14 +190,16 @@ def _measure_joint_positions(checked: CheckedTrajectory, unit: str) -> Iterator[
             yield measured._replace(size=turns(measured.value) if unit == "rad" else in_reaches)
 
 
-def _measure_slowness(checked: CheckedTrajectory) -> Iterator[Measured]:
-    """Yield the mean velocity of the joint that moves most, of prismatic ones in reaches of the robot.
+def _measure_slowness(
+    checked: CheckedTrajectory, velocities_of: Callable[[CheckedTrajectory, CheckedRobot], FloatArray]
+) -> Iterator[Measured]:
+    """Yield the relative velocity of the joint that is fastest.
 
     A subtree may move slowly while another one does not.
     """
     if checked.sampled_motion is not None and checked.duration > LONG:
-        velocities = checked.mean_velocities(checked.subtree)
-        of_robot = [np.max(checked.mean_velocities(subtree)) for subtree in checked.robot.checked_subtrees]
+        velocities = velocities_of(checked, checked.subtree)
+        of_robot = [np.max(velocities_of(checked, subtree)) for subtree in checked.robot.checked_subtrees]
         if velocities.any() and not np.max(velocities) < np.max(of_robot):
             yield from checked.measure_timing(units.TIME, velocities)
 
@@ -250,11 +274,18 @@ MOTION_RULES: tuple[Rule[CheckedTrajectory], ...] = (
         reason="tracks are shorter; positions within the limits pass",
         finding="is {size} times the reach of the robot",
         units=(MILLIMETERS, CENTIMETERS), explained_by=SIZES),
-    Rule("slow motions", "`duration`, `times`", _measure_slowness,
+    Rule("slow motions", "`duration`, `times`",
+        lambda checked: _measure_slowness(checked, CheckedTrajectory.mean_velocities),
         size=f"1/s, mean velocity in rad (reaches) of motions longer than {LONG:g} s",
         low=1e-3, usual=0.5, reason="a turn would take more than an hour and a half",
         finding="lets no joint move faster than {size} rad (reaches) a second in the mean",
         units=UNITS_OF_TIME),
+    Rule("motions slow for the motors", "`duration`, `times`",
+        lambda checked: _measure_slowness(checked, CheckedTrajectory.velocities_in_limits),
+        size=f"largest velocity of a joint over that of its motor, of motions longer than {LONG:g} s",
+        low=1e-3, usual=0.3, reason="motors are chosen for the velocities of motions",
+        finding="lets no joint reach more than {size} times the largest velocity of its motors",
+        units=UNITS_OF_TIME, explained_by=("slow motions",)),
     Rule("accelerations", "`duration`, `times`", lambda checked: _measure_accelerations(checked, units.TIME),
         size="m/s^2, largest acceleration of the farthest point", high=300, usual=3,
         reason="the fastest parallel robots reach half",

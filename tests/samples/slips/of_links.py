@@ -39,7 +39,7 @@ FURTHER: list[Slip] = [
     Slip("gravity as direction", "vsa_3r", "rest_to_rest",
         {"gravity: [0, 0, -9.81]": "gravity: [0, 0, -1]"}, "gravity as a direction", "gravity", ""),
     Slip("cm as lengths", "vsa_3r", "rest_to_rest",
-        {"a: 0.30": "a: 30", "[-0.15, 0, 0]": "[-15, 0, 0]"}, "lengths", "dh.a", "30 cm"),
+        {"a: 0.30": "a: 30", "[-0.15, 0, 0]": "[-15, 0, 0]"}, "systems of units", "dh.a", "30 cm"),
 ]  # fmt: skip
 
 REST: list[Slip] = [
@@ -49,7 +49,15 @@ REST: list[Slip] = [
         {"gravity: [0, -9.81, 0]": "gravity: [0, 0, -9.81]"}, "load of gravity", "gravity", "turn it"),
     Slip("masses in g, inertias in g m^2", "tendon_1r", "tendon_1r",
         {"mass: 0.8 ": "mass: 800 ", "xx: 5e-4, yy: 4.5e-3, zz: 4.5e-3": "xx: 0.5, yy: 4.5, zz: 4.5"},
-        "densities of links", "mass", "800 g"),
+        "systems of units", "mass", "800 g"),
+    Slip("a link of mm whose mass is that of its volume", "tendon_1r", "tendon_1r",
+        {"a: 0.25": "a: 250", "[-0.12, 0, 0]": "[-120, 0, 0]", "mass: 0.8 ": "mass: 8e8 ",
+         "xx: 5e-4, yy: 4.5e-3, zz: 4.5e-3": "xx: 5e11, yy: 4.5e12, zz: 4.5e12"},
+        "long links", "dh.a", "250 mm"),
+    Slip("mass in mg", "vsa_3r", "rest_to_rest",
+        {"mass: 6.7858": "mass: 6.7858e6"}, "masses of links", "mass", "6.7858e+06 g"),
+    Slip("a center of mass ten times too far", "vsa_3r", "rest_to_rest",
+        {"com: [-0.15, 0, 0]": "com: [-1.5, 0, 0]"}, "centers of mass", "link.com", "a tenth of it"),
     Slip("inertia in kg cm^2 of a light link", "qbmove_arm_manual", "qbmove_arm",
         {"xx: 2e-5, yy: 2.5e-4, zz: 2.5e-4": "xx: 0.2, yy: 2.5, zz: 2.5"},
         "densities of links", "inertia", "kg cm^2"),

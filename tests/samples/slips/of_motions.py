@@ -48,6 +48,8 @@ FURTHER: list[Slip] = [
 ]  # fmt: skip
 
 REST: list[Slip] = [
+    Slip("ms as duration of a short motion", "devices/vsa_ii", "devices/vsa_ii",
+        {"duration: 1.5": "duration: 1000"}, "motions slow for the motors", "duration", "1000 ms"),
     Slip("N mm as moment", "vsa_3r", "vsa_3r_pick_and_place",
         {"[0, 0, -4.905, 0, 0, 0]": "[0, 0, -4.905, 0, 0, 2000]"},
         "moments on the end effector", "levels.1.5", "2000 N mm"),

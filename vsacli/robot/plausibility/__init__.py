@@ -7,7 +7,11 @@ from functools import partial
 
 from vsacli.base.errors import Problem
 from vsacli.documents import tree
-from vsacli.documents.plausibility import ValuesInFile, implausible_measurements, implausible_values
+from vsacli.documents.plausibility import (
+    ValuesInFile,
+    implausible_measurements,
+    implausible_values,
+)
 from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.documents.source import Source
 from vsacli.robot.plausibility.bodies import BODY_RULES, WHOLE_ROBOT_RULES, impossible_links
@@ -33,14 +37,11 @@ def robot_findings(
     findings = [
         *impossible_links(robot.joints, file_lines),
         *implausible_values(
-            () if chosen and len(robot.joints) == 1 else WHOLE_ROBOT_RULES, robot, file_lines
+            () if chosen and len(robot.joints) == 1 else WHOLE_ROBOT_RULES, [(robot, file_lines, ())]
         ),
-        *(
-            problem
-            for subtree in subtrees
-            for problem in implausible_values(
-                SUBTREE_RULES, subtree, _robot_file_lines(robot, subtree, sources)
-            )
+        *implausible_values(
+            SUBTREE_RULES,
+            [(subtree, _robot_file_lines(robot, subtree, sources), ()) for subtree in subtrees],
         ),
     ]
     return tuple(dict.fromkeys(findings))

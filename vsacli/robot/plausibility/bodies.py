@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeAlias
 
 import numpy as np
 
+from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import Problem
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule, ValuesInFile
 from vsacli.documents.record_values import NumberPath, PathIndex
@@ -47,12 +49,56 @@ SLIPS_OF_GRAVITY = (
     OtherUnit("cm/s^2", 1e-2),
     OtherUnit("ft/s^2", 0.3048),
 )
+SLIPS_OF_DAMPING = (
+    OtherUnit("N mm s/rad", 1e-3, instead_of="N m s/rad"),
+    OtherUnit("N m s/deg", 180 / math.pi, instead_of="N m s/rad"),
+    OtherUnit("N s/mm", 1e3, instead_of="N s/m"),
+)
+BEYOND = 0.25
+"""Lengths of a link by which its center of mass may be beyond its ends."""
+
 SLENDER = 2.0
 """Length of a link over its radius of gyration from which on the link is long enough to have two ends; of a
 thin rod it is 3.5."""
 
-SIZES = ("lengths", "densities of links", "sizes of links")
+KEYS_OF_LENGTHS = ("dh", "com", "tool", "tools", "mount")
+"""Keys on the paths of lengths of a robot's bodies."""
+
+SIZES = (
+    "systems of units",
+    "lengths",
+    "long links",
+    "masses of links",
+    "densities of links",
+    "sizes of links",
+)
 """Names of rules of numbers that determine the sizes of a robot; if one has findings, sizes mean little."""
+
+COMMON_SYSTEMS = (("mm", "g", "g mm^2"), ("mm", "kg", "kg mm^2"), ("cm", "g", "g cm^2"), ("m", "g", "g m^2"))
+UNIT_SYSTEMS = {
+    units: np.array([factor for _, factor in system])
+    for system in itertools.product(
+        {"m": 1.0, "mm": 1e-3, "cm": 1e-2}.items(),
+        {"kg": 1.0, "g": 1e-3}.items(),
+        {"kg m^2": 1.0, **UNITS_OF_INERTIA, "g m^2": 1e-3}.items(),
+    )
+    if (units := tuple(unit for unit, _ in system)) in COMMON_SYSTEMS or "g m^2" not in units
+}
+"""Systems of units of lengths, masses and inertias, with the factors to the proper one, the first."""
+
+PROPER = next(iter(UNIT_SYSTEMS))
+UNLIKELY = 4.0
+"""Misfit that each field in another unit has to save; common systems count as one field."""
+
+POWERS = np.array([(1, 0, 0), (-3, 1, 0), (1, 0.5, -0.5), (0, 2.5, -1.5), (-1, -0.5, 0.5)])
+"""Powers of length, mass and inertia of reach, mass over reach cubed, and the sizes of three rules."""
+
+USUAL, SPREADS = np.array([-0.1, 1.4, 2.45]), np.array([0.5, 0.8, 0.6])
+"""Median and spread of the logarithms of reach, m, mass over reach cubed, kg/m^3, and median density of
+links, of half of the bundled and real robots; few are as small as fingers, so a spread of 0.35 became 0.5."""
+
+MOST, LONG = 0.6, 8.0
+"""Share of the lengths that are more than so many gyrations if all of them have another unit, not a few."""
 
 Measure: TypeAlias = Callable[[CheckedRobot], Iterator[Measured]]
 
@@ -101,7 +147,7 @@ def _speed_of_limit(_: CheckedRobot, velocity: float) -> float:
 def _measure_lengths(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield lengths over the largest gyration; mounts on the base, where all may stand, over the reach."""
     largest, reach = float(np.max(checked.sizes.gyrations)), checked.sizes.reach
-    for number in _measure_numbers("m", "dh", "com", "tool", "tools", "mount")(checked):
+    for number in _measure_numbers("m", *KEYS_OF_LENGTHS)(checked):
         if "mount" in number.path and number.path[1] == PathIndex(0, checked.joints[0].name):
             size, reference = ratio_or_nan(number.size, reach), f"the reach of what it carries, {reach:.3g} m"
         else:
@@ -139,12 +185,20 @@ def _measure_centers_of_mass(checked: CheckedRobot) -> Iterator[Measured]:
         length = math.hypot(a, d)
         if joint.is_revolute and length > SLENDER * checked.sizes.gyrations[index] > 0:
             along = np.array([a, d * math.sin(alpha), d * math.cos(alpha)]) / length**2
-            com = 1 + float(along @ joint.link.com)  # 0 at the joint, 1 at the link's frame
-            places = [0.0, 1.0, *(1 + float(along @ point) for point in _points_on_link(checked, index))]
-            before, behind = min(places) - com, com - max(places)
-            beside = {"end": "its joint" if before > behind else "its far end"}
+            com = float(along @ joint.link.com)  # -1 at the joint, 0 at the link's frame
+            places = [-1.0, 0.0, *(float(along @ point) for point in _points_on_link(checked, index))]
+            ends = np.array([min(places), max(places)])
+            beyond = {
+                words: float(np.max((ends - com * factor) * (1, -1)))
+                for words, factor in {"": 1.0, "the opposite sign": -1.0, "a tenth of it": 0.1}.items()
+            }
+            meant = [words for words, length in beyond.items() if length < BEYOND]
+            beside = {
+                "end": "its joint" if com < ends[0] else "its far end",
+                "meant": (*meant, "the opposite sign")[0],
+            }
             path = joint_path(index, joint, "link", "com")
-            yield Measured(path, math.nan, "m", max(before, behind), beside)
+            yield Measured(path, math.nan, "m", beyond[""], beside)
 
 
 def _points_on_link(checked: CheckedRobot, carrier: int) -> Iterator[tuple[float, float, float]]:
@@ -193,6 +247,58 @@ def _measure_upward_gravity(checked: CheckedRobot) -> Iterator[Measured]:
         yield Measured(("gravity",), upward, "m/s^2", ratio_or_nan(upward, math.hypot(*checked.gravity)))
 
 
+def _guess_system(checked: CheckedRobot) -> tuple[str, ...]:
+    """Return the units that make a robot most usual; the proper ones if its sizes are plausible in these."""
+    gyrations, mass = checked.sizes.gyrations[checked.sizes.gyrations > 0], checked.sizes.mass
+    reach = np.array([checked.sizes.reach + checked.distance_from_base_frame])
+    lengths = np.abs([(*joint.link.com, joint.dh.a, joint.dh.d) for joint in checked.joints])
+    densities = np.array([density_of_sphere(joint.link) for joint in checked.joints])
+    if not mass or not len(gyrations) or not lengths.any():
+        return PROPER
+    sizes = [reach, mass / reach**3, lengths[lengths > 0] / max(gyrations)]
+    sizes += [densities[densities > 0], gyrations / reach]
+    rules = [rule for rule in BODY_RULES if rule.name in ("lengths", "densities of links", "sizes of links")]
+    ranges = [(0.0, math.inf), (3e-3, 2e4), *((rule.low, rule.high) for rule in rules)]
+    if _are_plausible(sizes, ranges, PROPER):
+        return PROPER
+    units = min(UNIT_SYSTEMS, key=lambda units: _misfit(sizes, units))
+    length, mass, inertia = UNIT_SYSTEMS[units]
+    shortest = np.quantile(sizes[2], 1 - MOST, method="lower") * math.sqrt(mass / inertia)
+    return units if (length == 1 or shortest > LONG) and _are_plausible(sizes, ranges, units) else PROPER
+
+
+def _are_plausible(
+    sizes: list[FloatArray], ranges: list[tuple[float, float]], units: tuple[str, ...]
+) -> bool:
+    scales = np.prod(UNIT_SYSTEMS[units] ** POWERS, axis=1)
+    return all(
+        np.all((low <= size * scale) & (size * scale < high))
+        for size, scale, (low, high) in zip(sizes, scales, ranges, strict=True)
+    )
+
+
+def _misfit(sizes: list[FloatArray], units: tuple[str, ...]) -> float:
+    """Return the sum of squares of the deviations from usual sizes, and a charge for each field."""
+    changes = 1 if units in COMMON_SYSTEMS else np.count_nonzero(UNIT_SYSTEMS[units] != 1)
+    logarithms = np.log10([np.median(size) for size in sizes]) + POWERS @ np.log10(UNIT_SYSTEMS[units])
+    return float(np.sum(((logarithms[[0, 1, 3]] - USUAL) / SPREADS) ** 2)) + UNLIKELY * changes
+
+
+def _measure_unit_systems(checked: CheckedRobot) -> Iterator[Measured]:
+    """Yield the first length, mass and inertia, each with the number of its units in the proper one."""
+    sizes, joint = checked.sizes, checked.joints[0]
+    text = f"{sizes.reach:.3g} m, {sizes.mass:.3g} kg and {np.max(sizes.gyrations):.3g} m"
+    numbers = {
+        "lengths": next((each for each in _measure_lengths(checked) if each.value), None),
+        "masses": Measured(joint_path(0, joint, "link", "mass"), joint.link.mass, "kg", math.nan),
+        "inertias": Measured(joint_path(0, joint, "link", "inertia"), math.nan, "kg m^2", math.nan),
+    }
+    factors = UNIT_SYSTEMS[_guess_system(checked)]
+    for (kind, number), factor in zip(numbers.items(), factors, strict=True):
+        if factor != 1 and number is not None:
+            yield number._replace(size=1 / factor, beside={"kind": kind, "sizes": text})
+
+
 BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("fixed angles", "`alpha`, `theta`, `rpy`",
         _measure_numbers("rad", without=("limits", "actuator"), size=lambda _, angle: turns(angle)),
@@ -217,29 +323,50 @@ BODY_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("velocities of prismatic joints", "`limits.velocity`", _measure_numbers("m/s", "limits"),
         size="m/s", high=20, usual=0.5, reason="linear motors are slower",
         finding="is faster than linear motors are", units=(OtherUnit("mm/s", 1e-3),)),
+    Rule(SIZES[0], "all of `dh.a`, `dh.d`, `com` and `xyz`, of `mass`, or of `inertia`",
+        _measure_unit_systems,
+        size="proper unit over that with which reach, density and mass over reach cubed are most usual",
+        high=2, reason="only if one of these or the size of a link is implausible",
+        finding="is too large, as are all {kind}: reach, mass and radius of gyration of {sizes} fit no robot",
+        units=tuple(
+            OtherUnit(unit, float(factor), instead_of=proper)
+            for units, factors in UNIT_SYSTEMS.items()
+            for unit, factor, proper in zip(units, factors, PROPER, strict=True)
+        )),
     Rule("lengths", "`dh.a`, `dh.d`, `com`, `xyz` of `mount`, `tool`, `tools`", _measure_lengths,
         size="over the largest radius of gyration; of mounts on the base, over the reach", high=30, usual=0.8,
         reason="real robots: up to 8",
         finding="is {size} times {reference}",
-        units=(MILLIMETERS, CENTIMETERS)),
+        units=(MILLIMETERS, CENTIMETERS), explained_by=SIZES[:1]),
+    Rule("long links", "`dh.a`, `dh.d`, `com`, `xyz` of `mount`, `tool`, `tools`",
+        _measure_numbers("m", *KEYS_OF_LENGTHS),
+        size="m", high=20,
+        reason="links of space manipulators have up to 10 m",
+        finding="is longer than links are", units=(MILLIMETERS,), explained_by=SIZES[:2]),
+    Rule("masses of links", "`mass`",
+        _measure_link_masses(lambda checked, index: checked.joints[index].link.mass),
+        size="kg", high=1e4, usual=5,
+        reason="links of the largest excavators are lighter",
+        finding="is heavier than links are", units=(GRAMS._replace(power=1),), explained_by=SIZES[:3]),
     Rule("densities of links", "`mass`, `inertia`",
         _measure_link_masses(lambda checked, index: density_of_sphere(checked.joints[index].link)),
         size="kg/m^3, of a solid sphere with this mass and sum of moments",
         low=2e-3, high=25000, usual=400,
         reason="real robots: 0.006 to 11,000; osmium: 22,600",
-        finding="makes a link as dense as a solid sphere of {size} kg/m^3", units=SLIPS_OF_DENSITY),
+        finding="makes a link as dense as a solid sphere of {size} kg/m^3", units=SLIPS_OF_DENSITY,
+        explained_by=(SIZES[0], *SIZES[2:4])),
     Rule("sizes of links", "`mass`, `inertia`", _measure_link_masses(_relative_gyration),
         size="radius of gyration over the reach from the base frame", high=3,
         reason="real robots: up to 1.9",
         finding="makes a link whose radius of gyration is {size} times the reach of the robot",
         advice="check the units of mass, inertia and lengths",
-        explained_by=("lengths", "densities of links")),
+        explained_by=SIZES[:5]),
     Rule("centers of mass", "`com`", _measure_centers_of_mass,
         size="of revolute joints: link lengths beyond joint, next joints and tools, if above 2 gyrations",
-        low=-math.inf, high=0.25,
+        low=-math.inf, high=BEYOND,
         reason="links end near their joints; real robots: up to 0.15",
         finding="puts the center of mass {size} link lengths beyond {end}",
-        advice="did you mean the opposite sign? It is given in the link frame", explained_by=SIZES),
+        advice="did you mean {meant}? It is given in the link frame", explained_by=SIZES),
     Rule("size of gravity", "`gravity`", _measure_gravity(lambda size: size or math.nan),
         size="m/s^2, if there is any", low=0.02, high=30, usual=9.81,
         reason="Jupiter: 25; Ceres: 0.28",

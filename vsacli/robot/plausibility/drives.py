@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
-from vsacli.actuators.motor import SHAFT, JointMotor, Motor
+from vsacli.actuators.motor import JOINT, SHAFT, JointMotor, Motor
+from vsacli.base import units
 from vsacli.base.variables import VARIABLES
 from vsacli.documents.fields import declared_fields
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.robot.joint import Joint
-from vsacli.robot.plausibility.bodies import DEGREES_PER_SECOND, RPM, SIZES, Measure
+from vsacli.robot.plausibility.bodies import (
+    DEGREES_PER_SECOND,
+    RPM,
+    SIZES,
+    SLIPS_OF_DAMPING,
+    Measure,
+)
 from vsacli.robot.plausibility.checked_robot import CheckedRobot, joint_path, motors_in_file, ratio_or_nan
 
 TINY = 0.1
@@ -20,6 +28,7 @@ TINY = 0.1
 
 ROTARY = (RPM._replace(instead_of="rad/s"), DEGREES_PER_SECOND._replace(instead_of="rad/s"))
 OTHER_TORQUES = (OtherUnit("N mm", 1e-3), OtherUnit("N cm", 1e-2), OtherUnit("mN m", 1e-3))
+UNITS_OF_ROTORS = (OtherUnit("kg cm^2", 1e-4), OtherUnit("g cm^2", 1e-7), OtherUnit("kg mm^2", 1e-6))
 WHICH_SIDE = "with `side: shaft` it is that of the motor's shaft, otherwise that on the joint's side"
 GEARS = (*SIZES, "gear ratios", "gear ratios of prismatic joints")
 """Names of rules, of gear ratios and sizes, whose findings explain those of motors behind a gear."""
@@ -110,31 +119,38 @@ def _measure_motors(
 
     Args:
         name: name of the field.
-        size: function that returns the size of a motor; by default |value|, NaN if 0 or infinite.
+        size: function that returns the size of a motor; by default |value|, NaN if 0 or infinite. Those
+            with NaN are skipped.
         unit: unit of the field; motors with another one are skipped. "" for any unit.
         carrying: whether to skip motors that do not carry the load.
     """
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
         for drive in _checked_motors(checked):
-            if unit in ("", drive.unit(name)) and (drive.carries_load or not carrying):
-                value = getattr(drive.motor, name) or math.nan
-                yield drive.measure(name, _nan_if_infinite(abs(value)) if size is None else size(drive))
+            value = getattr(drive.motor, name) or math.nan
+            relative = _nan_if_infinite(abs(value)) if size is None else size(drive)
+            counts = not math.isnan(relative) and (drive.carries_load or not carrying)
+            if counts and unit in ("", drive.unit(name)):
+                yield drive.measure(name, relative)
 
     return measure
 
 
-def _rotor_inertia_share(drive: _CheckedMotor) -> float:
+def _rotor_inertia_share(drive: _CheckedMotor, *, tiny: bool) -> float:
+    """Return the inertia of the rotor over that of the robot, if this is a tiny one or not."""
     sizes = drive.checked.sizes
     lever = sizes.extent if drive.joint.is_revolute else 1.0
-    return (
-        ratio_or_nan(drive.at_joint_side.inertia, sizes.mass * lever**2) if sizes.extent > TINY else math.nan
-    )
+    of_kind = tiny == (sizes.extent <= TINY)
+    return ratio_or_nan(drive.at_joint_side.inertia, sizes.mass * lever**2) if of_kind else math.nan
 
 
-def _shaft_velocity(drive: _CheckedMotor) -> float:
-    """Return the largest velocity of the motor's shaft, as written if the gear ratio is unknown."""
-    return drive.velocity * abs(drive.motor.gear_ratio or 1.0) if drive.rotates else math.nan
+def _shaft_velocity(drive: _CheckedMotor, *, side: str) -> float:
+    """Return the largest velocity of the motor's shaft, if the file gives that of this side of the gear.
+
+    It is as written if the gear ratio is unknown.
+    """
+    of_side = drive.rotates and side == (drive.motor.side or JOINT)
+    return drive.velocity * abs(drive.motor.gear_ratio or 1.0) if of_side else math.nan
 
 
 def _joint_velocity(drive: _CheckedMotor) -> float:
@@ -148,6 +164,20 @@ def _deflection_of_springs(drive: _CheckedMotor) -> float:
     attainable = drive.checked.unloaded_ranges[drive.number]
     travel = 1.0 if drive.joint.is_revolute else drive.checked.sizes.extent
     return math.nan if attainable is None else ratio_or_nan(drive.torque, attainable.lower * travel)
+
+
+def _measure_viscous_losses(checked: CheckedRobot) -> Iterator[Measured]:
+    """Yield damping of joints and motors, with its torque at the motor's largest velocity over its largest.
+
+    Of motors without a largest velocity it is that at 1 rad/s (reach/s).
+    """
+    for drive in _checked_motors(checked):
+        if drive.carries_load and not math.isnan(drive.torque):
+            travel = 1.0 if drive.joint.is_revolute else checked.sizes.extent
+            share = (travel if math.isnan(drive.velocity) else drive.velocity) / drive.torque
+            yield drive.measure("damping", drive.at_joint_side.damping * share)
+            path, damping = joint_path(drive.number, drive.joint, "damping"), drive.joint.damping
+            yield Measured(path, damping, units.DAMPING.unit(drive.joint.type), damping * share)
 
 
 def _measure_dry_friction(checked: CheckedRobot) -> Iterator[Measured]:
@@ -187,24 +217,43 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="is, on the joint's side of the gear, {size} of the inertia of the link about its joint",
         advice="is it the rotor's own? Then give `gear_ratio` and `side: shaft`, or multiply by its square",
         explained_by=GEARS),
-    Rule("heavy rotors", "`motor.inertia`", _measure_motors("inertia", _rotor_inertia_share, carrying=True),
-        size="joint-side, over mass times reach squared (mass)",
-        high=100, usual=0.1,
-        reason="it would not feel the robot; robots below 0.1 m pass",
-        finding="is, on the joint's side of the gear, {size} times mass times reach squared of the robot",
-        units=(OtherUnit("kg cm^2", 1e-4), OtherUnit("g cm^2", 1e-7), OtherUnit("kg mm^2", 1e-6)),
-        advice=WHICH_SIDE, explained_by=GEARS),
-    Rule("velocities of motors", "`max_velocity`",
-        _measure_motors("max_velocity", _shaft_velocity, carrying=True),
-        size="rad/s, of the motor's shaft", high=2500, usual=400, reason="robots have no faster motors",
-        finding="is more than 24,000 turns a minute of the motor", units=ROTARY, in_angles=True),
+    *(
+        Rule(name, "`motor.inertia`",
+            _measure_motors("inertia", partial(_rotor_inertia_share, tiny=tiny), carrying=True),
+            size="joint-side, over mass times reach squared (mass)",
+            high=high, usual=0.1, reason=reason,
+            finding="is, on the joint's side of the gear, {size} times mass times reach squared of the robot",
+            units=UNITS_OF_ROTORS, advice=WHICH_SIDE, explained_by=GEARS)
+        for name, tiny, high, reason in (
+            ("heavy rotors", False, 100, "it would not feel the robot; not for robots below 0.1 m"),
+            ("heavy rotors of tiny robots", True, 1e5, "for robots below 0.1 m; bundled: up to 27"),
+        )
+    ),
+    Rule("starting times", "`motor.inertia`",
+        _measure_motors("inertia", lambda m: m.at_joint_side.inertia * m.velocity / m.torque),
+        size="s, in which `max_torque` accelerates the rotor alone to `max_velocity`", high=5, usual=0.01,
+        reason="electric motors need some hundredths",
+        finding="lets the motor alone start in no less than {size} s", units=UNITS_OF_ROTORS,
+        advice="check its unit and those of `max_torque` and `max_velocity`",
+        explained_by=(*GEARS, "heavy rotors", "heavy rotors of tiny robots")),
+    *(
+        Rule(name, "`max_velocity`",
+            _measure_motors("max_velocity", partial(_shaft_velocity, side=side), carrying=True),
+            size=f"rad/s, of the motor's shaft, {condition}", high=2500, usual=usual,
+            reason="robots have no faster motors",
+            finding="is more than 24,000 turns a minute of the motor", units=units_of_side, in_angles=True)
+        for name, side, condition, usual, units_of_side in (
+            ("velocities of motors", JOINT, "if the file gives it for the joint's side", 400, ROTARY),
+            ("velocities of shafts", SHAFT, "if the file gives it with `side: shaft`", 800, ROTARY[:1]),
+        )
+    ),
     Rule("velocities of motors and joints", "`max_velocity`, `limits.velocity`",
         _measure_motors("max_velocity", _joint_velocity, carrying=True),
         size="joint-side, over the joint's limit", high=8,
         reason="a joint's limit is about what its motor can do",
         finding="lets the joint go {size} times as fast as its `limits.velocity`",
         units=ROTARY, advice="check the units of both", in_angles=True,
-        explained_by=(*GEARS, "velocities of motors")),
+        explained_by=(*GEARS, "velocities of motors", "velocities of shafts")),
     Rule("weak motors", "`max_torque`",
         _measure_motors("max_torque", lambda m: ratio_or_nan(m.torque, m.load), carrying=True),
         size="joint-side, over the load of the stretched arm's weight",
@@ -222,6 +271,14 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
 )  # fmt: skip
 
 RESISTANCE_RULES: tuple[Rule[CheckedRobot], ...] = (
+    Rule("viscous losses", "`damping`, `motor.damping`", _measure_viscous_losses,
+        size="torque at the motor's largest velocity, else at 1 rad/s (reach/s), over its largest",
+        high=0.5, usual=0.01,
+        reason="the motor would hardly reach this velocity",
+        finding="requires {size} times the largest torque of the motor at the largest velocity",
+        units=SLIPS_OF_DAMPING,
+        explained_by=(
+            *GEARS, "weak motors", "strong motors", "velocities of motors", "velocities of shafts")),
     Rule("dry friction compared with torque", "`motor.friction.coulomb`", _measure_dry_friction,
         size="over the motor's largest torque", high=1, usual=0.1,
         reason="the motor could not move",
@@ -243,7 +300,7 @@ RULES_OF_MOTORS_AND_SPRINGS: tuple[Rule[CheckedRobot], ...] = (
         low=0.01, reason="bundled robots: 0.03 to 6; the springs would not count",
         finding="deflects the springs of the joint by only {size} rad (of the reach)",
         advice="check the units of the springs, then those of the motor",
-        explained_by=(*GEARS, "weak motors", "stiff springs")),
+        explained_by=(*GEARS, "weak motors", "springs at their largest deflection", "stiff springs")),
 )  # fmt: skip
 """Rules that follow those of springs."""
 

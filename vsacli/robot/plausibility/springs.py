@@ -14,11 +14,12 @@ from vsacli.base.flags import MIN_MARGIN
 from vsacli.documents.plausibility import Measured, OtherUnit, Rule
 from vsacli.documents.record_values import NumberPath, PathIndex
 from vsacli.robot.joint import Joint
-from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, TURN
+from vsacli.robot.plausibility.bodies import DEGREES, MILLIMETERS, SIZES, SLIPS_OF_DAMPING, TURN
 from vsacli.robot.plausibility.checked_robot import (
     CheckedRobot,
     UnloadedStiffnessRange,
     joint_path,
+    motors_in_file,
     ratio_or_nan,
     records_in_file,
 )
@@ -32,12 +33,6 @@ TOO_SOFT = (
 NEWTON_MILLIMETERS = OtherUnit("N mm/rad", 1e-3, instead_of="N m/rad")
 TOO_STIFF = (NEWTON_MILLIMETERS, OtherUnit("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
 """Units in which a stiffness is a smaller number (`TOO_SOFT`) or a larger one than in the expected unit."""
-
-SLIPS_OF_DAMPING = (
-    OtherUnit("N mm s/rad", 1e-3, instead_of="N m s/rad"),
-    OtherUnit("N m s/deg", 180 / math.pi, instead_of="N m s/rad"),
-    OtherUnit("N s/mm", 1e3, instead_of="N s/m"),
-)
 
 
 def _stiffness_unit(joint: Joint) -> str:
@@ -135,6 +130,29 @@ def _measure_deflection_limits(checked: CheckedRobot) -> Iterator[Measured]:
                 yield Measured((*path, name), end, unit, ratio_or_nan(end, full))
 
 
+def _measure_largest_deflections(checked: CheckedRobot) -> Iterator[Measured]:
+    """Yield the torque of springs at their largest deflection, over the largest of load and motors.
+
+    Of springs without stiffness at rest, of which nothing else tells how stiff they are, it may be 1 rad.
+    Only springs of joints with commanded stiffness.
+    """
+    for joint, path, law in _springs_in_file(checked):
+        end = min(law.max_deflection, law.domain[1] if law.sources else math.inf)
+        if math.isinf(min(end, law.domain[1])) and not law.stiffness(np.zeros(1)).any():
+            end = _reference_travel(checked, joint)
+        if math.isfinite(end) and "stiffness" in joint.actuator.commanded:
+            torque, unit = float(law.torque(np.array([end]))[0]), units.TORQUE.unit(joint.type)
+            motors = [motor.at_joint.max_torque for _, motor in motors_in_file(joint)]
+            load = float(checked.sizes.load_bounds[checked.joints.index(joint)])
+            asked = max(load, *(torque for torque in motors if math.isfinite(torque)), 0.0)
+            beside = {
+                "end": f"{end:.3g} {units.POSITION.unit(joint.type)}",
+                "torque": f"{torque:.3g} {unit}",
+                "asked": f"{asked:.3g} {unit}",
+            }
+            yield Measured(path, math.nan, _stiffness_unit(joint), ratio_or_nan(torque, asked), beside)
+
+
 def _measure_stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield limits over the minimum at rest; a lower limit below the attainable range does no harm."""
     for index, joint, attainable in _joints_with_commanded_stiffness(checked):
@@ -168,12 +186,24 @@ def _measure_largest_dampings(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
+    Rule("deflections", "`max_deflection`, `file` of a table", _measure_deflection_limits,
+        size="turns (twice the reach)", high=0.5, usual=0.05,
+        reason="joint springs do not wind up so far",
+        finding="is a deflection of more than half a turn (than the reach)",
+        units=(DEGREES, MILLIMETERS), in_angles=True),
+    Rule("springs at their largest deflection", "`spring`", _measure_largest_deflections,
+        size="torque at `max_deflection`, the end of a table or, of springs without stiffness at rest, 1 rad "
+        "(reach), over the largest of load and motor", high=150,
+        usual=1, reason="bundled robots: 1 to 25; no motor would deflect them so far",
+        finding="has {torque} at {end}, {size} times the {asked} that load or motor can ask of it",
+        units=TOO_STIFF, advice="check the units of its constants and of its largest deflection",
+        explained_by=(*SIZES, "deflections")),
     Rule("stiff springs", "`spring`", _measure_minimum_stiffness,
         size="stiffness at rest times 1 rad (reach), over weight times gyration, plus damping at 1 rad/s",
         high=2000, usual=20,
         reason="bundled robots have 0.06 to 700",
         finding="makes {stiffness} at rest, per rad (reach) {size} times {load} of weight and damping",
-        units=TOO_STIFF, explained_by=SIZES),
+        units=TOO_STIFF, explained_by=(*SIZES, "springs at their largest deflection")),
     Rule("stiff transmissions", "`stiffness`, `spring` of elastic joints", _measure_stiff_transmissions,
         size="of revolute joints, stiffness at rest times 1 rad, over weight times reach",
         high=5000, usual=300,
@@ -190,11 +220,6 @@ SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
         reason="without hardening, the stiffness cannot change",
         finding="is at {deflection} but {size} times as stiff as at rest",
         advice="check the units of its constants: rad, not deg (m, not mm)"),
-    Rule("deflections", "`max_deflection`, `file` of a table", _measure_deflection_limits,
-        size="turns (twice the reach)", high=0.5, usual=0.05,
-        reason="joint springs do not wind up so far",
-        finding="is a deflection of more than half a turn (than the reach)",
-        units=(DEGREES, MILLIMETERS), in_angles=True),
     Rule("limits of stiffness", "`limits.stiffness`", _measure_stiffness_limits,
         size="over the lowest of the springs at rest", low=1, high=500, usual=2,
         reason="below 1 the limits exclude everything",
