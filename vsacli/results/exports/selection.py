@@ -217,8 +217,8 @@ def stride_of(result: StoredResult, rate: float, *, exact: bool = False) -> int:
     stored = _stored_rate(result, again)
     ratio = stored / rate
     stride = round(ratio)
-    half_interval = min(0.5 / (result.samples - 1), LARGEST_TOLERANCE)
-    tolerance = RATE_TOLERANCE if exact else max(RATE_TOLERANCE, half_interval)
+    half_interval = 0.5 / (result.samples - 1)
+    tolerance = max(RATE_TOLERANCE, 0.0 if exact else min(half_interval, LARGEST_TOLERANCE))
     if ratio < 1 - tolerance:
         raise InputError.one(
             f"{rate:.9g} Hz exceeds the stored rate of {stored:.9g} Hz; use a lower rate, or {again}"

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.simulation_variables import measured
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
@@ -40,6 +40,7 @@ class RecordedColumn(NamedTuple):
         time: times of the samples, (samples,) in s since the first row of the file.
         values: values, (samples,), SI units on the joint side of the gear.
         has_unit: whether the file gives a unit after the name.
+        rows: rows of the table in which the column has a value, (samples,).
     """
 
     name: str
@@ -47,6 +48,7 @@ class RecordedColumn(NamedTuple):
     time: FloatArray
     values: FloatArray
     has_unit: bool
+    rows: IndexArray
 
 
 class _RobotColumns(NamedTuple):
@@ -93,9 +95,11 @@ def recorded_columns(
     united = {name for name, unit in map(split_heading, recording.table.columns) if unit is not None}
     stamps, columns = elapsed_times(recording.time), []
     for place, signal in _preferred_columns(recording.signals).items():
-        there = np.isfinite(signal.values)
-        values = signal.values[there] * _torque_of_current(robot, signal)
-        columns.append(RecordedColumn(signal.column, place, stamps[there], values, signal.column in united))
+        rows = np.flatnonzero(np.isfinite(signal.values))
+        values = signal.values[rows] * _torque_of_current(robot, signal)
+        columns.append(
+            RecordedColumn(signal.column, place, stamps[rows], values, signal.column in united, rows)
+        )
     used = {column.name for column in columns}
     others = [signal.column for signal in recording.signals if signal.column not in used]
     return columns, (*others, *recording.table.unknown_columns), recording

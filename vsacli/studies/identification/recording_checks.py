@@ -215,9 +215,6 @@ chance."""
 WORTH_IT = 0.05
 """Delay in samples above which it is removed."""
 
-LONGEST_DELAY = 1.0
-"""Delay in periods of the bandwidth above which it is not determined: tau(t - d) is expanded about d = 0."""
-
 
 class Delay(NamedTuple):
     """The delay of the torques of a recording behind its positions.
@@ -251,8 +248,8 @@ def delay(found: Sequence[Solution], signals: ConditionedRecording) -> Delay:
         return Delay(np.nan, np.nan)
     weights = 1 / errors**2
     late = Delay(float(weights @ values / weights.sum()), float(weights.sum() ** -0.5))
-    expanded = abs(late.seconds) * signals.filter.bandwidth <= LONGEST_DELAY
-    return late if expanded else Delay(np.nan, np.nan)
+    # the expansion tells nothing of delays beyond a period of the highest frequency
+    return late if abs(late.seconds) * signals.filter.bandwidth <= 1 else Delay(np.nan, np.nan)
 
 
 def _delay_of(

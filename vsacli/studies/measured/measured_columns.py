@@ -148,7 +148,7 @@ def read_recording(
     order = {name: number for number, name in enumerate(places)}
     signals = [
         MeasuredSignal(
-            name, places[name], _scaled_values(table.values[:, index], factors[index] * places[name].gear)
+            name, places[name], _in_si_units(table.values[:, index], factors[index], places[name], mapping)
         )
         for index, name in enumerate(names)
         if name in places
@@ -277,8 +277,21 @@ def _no_column(header: ColumnNames, places: Mapping[str, Place]) -> str:
 
 
 @np.errstate(over="ignore")  # an overflow to infinity means a missing sample
-def _scaled_values(values: FloatArray, factor: float) -> FloatArray:
-    return np.asarray(values * factor)
+def _in_si_units(values: FloatArray, factor: float, place: Place, mapping: ColumnMapping) -> FloatArray:
+    """Return values on the joint side of the gear, with angles unwrapped on demand."""
+    if mapping.unwrap and place.unit == "rad":
+        there = np.isfinite(values)
+        angles = np.array(values * factor)
+        angles[there] = np.unwrap(angles[there])
+        return np.asarray(angles * place.gear)
+    return np.asarray(values * (factor * place.gear))
+
+
+def nearest_turn(angles: FloatArray, others: FloatArray) -> FloatArray:
+    """Return unwrapped angles plus the whole turns that bring most of them nearest to others, (samples,)."""
+    apart = (angles - others)[np.isfinite(angles - others)]
+    turns = np.round(np.median(apart) / (2 * np.pi)) if apart.size else 0.0
+    return np.asarray(angles - 2 * np.pi * turns)
 
 
 def _elapsed(table: CsvTable, at: int, factors: Mapping[int, float], rate: float | None) -> FloatArray:
