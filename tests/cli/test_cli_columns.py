@@ -92,7 +92,7 @@ def test_identify(vsacli: Command, tmp_path: Path) -> None:
         ("columns: {time: t}\n", "columns.yaml:1: missing key 'format'"),
         (
             "format: vsacli-columns/1\n",
-            "columns.yaml:1: says nothing: give columns, ignore, skip_rows or rate",
+            "columns.yaml:1: says nothing: give columns, ignore, skip_rows, rate or unwrap",
         ),
         (
             "format: vsacli-columns/1\nignore: all\n",

@@ -14,6 +14,7 @@ from samples.command_line import REPOSITORY, Outcome
 from samples.random_logs import random_log
 
 from vsacli import InputError, load_robot, load_trajectory
+from vsacli.documents.columns_file import load_columns
 from vsacli.files.recordings import describe_recording
 from vsacli.trajectory.recorded.problems import find_disorder
 
@@ -313,6 +314,39 @@ def test_variants_of_a_signal_are_one_joint_and_commands_no_measurements(tmp_pat
         "a command, not a measurement"
         in describe_recording(tmp_path / "log.csv", load_robot(ROBOT))["mapping"]
     )
+
+
+def sides(*patterns: str) -> list[str]:
+    return [pattern.format(joint) for pattern in patterns for joint in (1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("names", "motors", "unknown"),
+    [
+        (
+            sides("enc{}", "encL{}", "encR{}", "tauL{}", "tauR{}"),
+            sides("theta_1: encL{}", "theta_2: encR{}", "tau_motor_1: tauL{}", "tau_motor_2: tauR{}"),
+            [],
+        ),
+        (sides("pos{}", "torque_left_{}", "torque_right_{}"), sides("tau_motor_2: torque_right_{}"), []),
+        (sides("posL{}", "posR{}"), [], []),  # may be two arms
+        ([*sides("pos{}"), "tauL1", "tauR1", "tauL2"], [], ["tauL1", "tauR1", "tauL2"]),
+    ],
+)
+def test_both_sides_of_a_joint_are_its_motors(
+    vsacli: Command, tmp_path: Path, names: list[str], motors: list[str], unknown: list[str]
+) -> None:
+    values = dict.fromkeys(names, MOTION["elbow_position"])
+    (tmp_path / "log.csv").write_text("\n".join(table(**values)))
+    mapping = vsacli("info", "log.csv", "--robot", ROBOT, "--field", "mapping").out
+    joints = ("shoulder", "elbow")
+    for entry in motors:
+        joint = joints[int(entry[-1]) - 1]
+        assert re.search(rf"^  {joint}.{entry} +# guessed: .*sides taken for motors 1 and 2", mapping, re.M)
+    assert ("theta" in mapping) == any("theta" in entry for entry in motors)
+    assert re.findall(r"^# (\S+): not recognized$", mapping, re.M) == unknown
+    (tmp_path / "columns.yaml").write_text(mapping)
+    load_columns(tmp_path / "columns.yaml")
 
 
 @pytest.mark.slow

@@ -109,6 +109,66 @@ def test_a_piece_cut_out_of_the_motion_is_found(computed, tmp_path, cut):
     assert found.time_offset == pytest.approx(BEGIN - columns["time"][kept][0], abs=2e-4)
 
 
+@pytest.mark.slow
+def test_errors_of_the_model_in_motors_do_not_move_the_beginning(computed, tmp_path):
+    """Motors of a wrong model look late, each by some milliseconds; joints do as they were told."""
+    columns = recorded(computed)
+    draw = np.random.default_rng(5)
+    for name in [name for name in columns if ".theta_" in name]:
+        late = recorded(computed, delay=draw.uniform(1e-3, 4e-3))[name]
+        columns[name] = 1.004 * late + 2e-4 * draw.standard_normal(len(late))
+    for name in [name for name in columns if name.endswith(".q")]:
+        columns[name] = columns[name] + 2e-4 * draw.standard_normal(len(columns[name]))
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
+    assert abs(found.time_offset - BEGIN) < 3 * found.time_offset_error
+    assert found.time_offset_error < 1e-4  # 2e-4 rad of 0.4 rad/s, over 1500 rows
+    lags = [signal.lag for signal in found.signals if signal.variable == "theta"]
+    assert all(0.9e-3 < lag < 4.2e-3 for lag in lags)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [0.02, -0.02, 0.0])
+def test_a_delay_between_torques_and_positions_is_said(computed, tmp_path, delay):
+    columns, late = recorded(computed), recorded(computed, delay=delay)
+    draw = np.random.default_rng(6)
+    noise = 0.5 * draw.standard_normal((len(TORQUES), len(columns["time"])))
+    columns |= {name: late[name] + each for name, each in zip(TORQUES, noise, strict=True)}
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns))
+    said = [note for note in found.notes if "torques agree on a lag of" in note]
+    assert len(said) == (delay != 0)
+    for note in said:
+        number = r"([-+]?[\d.]+)"
+        figures = re.search(rf"lag of {number} \+- {number} ms behind .* --time-offset {number} is", note)
+        lag, error, offset = map(float, figures.groups())
+        assert lag == pytest.approx(1e3 * delay, abs=4 * error)  # the error has one digit
+        assert offset == pytest.approx(BEGIN + lag / 1e3, abs=2e-4)  # of 0.1 ms
+        assert "their sensors are late (vsacli identify ROBOT RECORDING removes such a delay)" in note
+
+
+@pytest.mark.slow
+def test_wrapped_angles_are_named_and_unwrapped_on_demand(vsacli, computed, tmp_path):
+    columns = recorded(computed)
+    shifted = {name: columns[name] + 6.0 for name in ("base.q", "base.theta_1", "base.theta_2")}
+    columns |= {name: np.mod(values, 2 * np.pi) for name, values in shifted.items()}
+    written(tmp_path / "m.csv", columns)
+    wrapped = vsacli("compare", "r.h5", "m.csv")
+    jump = r"base.q jumps by 2 pi at [\d.]+ s, a wrapped angle: set unwrap: true in the file of --columns\n"
+    assert re.search(jump, wrapped.out)
+    (tmp_path / "c.yaml").write_text("format: vsacli-columns/1\nunwrap: true\n")
+    found = compare(tmp_path / "r.h5", tmp_path / "m.csv", columns=tmp_path / "c.yaml")
+    base = [signal for signal in found.signals if signal.column in shifted]
+    # 6 rad are a turn less 0.28 rad, and whole turns are those of the result
+    assert [signal.offset for signal in base] == pytest.approx([6 - 2 * np.pi] * 3, abs=1e-3)
+    assert [signal.gain for signal in base] == pytest.approx([1] * 3, abs=1e-3)
+
+
+def test_left_out_columns_are_named_if_no_torque_was_compared(computed, tmp_path):
+    columns = {"tauL1": computed["base.tau_motor_1"], **{name: computed[name] for name in ("time", "base.q")}}
+    (tmp_path / "c.yaml").write_text("format: vsacli-columns/1\nignore: rest\n")
+    found = compare(tmp_path / "r.h5", written(tmp_path / "m.csv", columns), columns=tmp_path / "c.yaml")
+    assert "no torque was compared; if any of tauL1 is one, map it with --columns" in found.notes
+
+
 TORQUES = tuple(f"{joint}.tau_motor_{motor}" for joint in ("base", "shoulder", "elbow") for motor in (1, 2))
 
 SLIPS = {

@@ -5,6 +5,7 @@ Thresholds were chosen with seeds below 2000; the seeds here are others.
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -89,6 +90,23 @@ def test_damping_without_its_quadratic_part_is_told(tmp_path: Path) -> None:
     truth = case.robot.joints[0].actuator.motors[0].damping
     assert abs(right - truth) < 4 * error
     assert abs(wrong - truth) > 4 * stated
+
+
+@pytest.mark.slow
+def test_damping_of_zero_in_the_file_is_named_with_its_path(tmp_path: Path) -> None:
+    """It is not sought, so that friction of another law looked like what is missing."""
+    arm = shipped_robot("vsa_3r")
+    base = dataclasses.replace(arm, joints=arm.joints[:1])
+    motion = Excitation(position=[0], reach=[0.4], stiffness=[1400], swing=[300])
+    damped = base.replace({"joints.base.damping": 0.5})
+    record = excited(damped, motion).noisy(seed=4, torque=0.05).write(tmp_path / "record.csv", damped)
+    told = identify(base.replace({"joints.base.damping": 0}), record)
+    assert told.notes == (
+        "link of base: what is left is proportional to its velocity, and its damping, 0 in the file, is not "
+        "identified: name joints.base.damping in --fit",
+    )
+    fit = ["springs", "motors", "friction", "links", "joints.base.damping"]
+    assert identify(base.replace({"joints.base.damping": 0}), record, fit).verdict == "ok"
 
 
 ARM = Excitation(position=[0, 0, 0], reach=[0.4] * 3, stiffness=[1400] * 3, swing=[300] * 3, duration=16)

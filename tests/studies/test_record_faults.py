@@ -15,6 +15,8 @@ from samples.marks import slow_but
 from samples.shipped import shipped_robot
 
 from vsacli import InputError, Robot, identify
+from vsacli.documents.columns_file import load_columns
+from vsacli.studies.identification.recordings import read_motor_recording
 
 MOTION = Excitation(position=[0, 0, 0], reach=[0.4] * 3, stiffness=[1400] * 3, swing=[300] * 3, duration=12)
 
@@ -52,7 +54,8 @@ ELBOW, SHOULDER = 2, 1
 STOPPING = {
     "gap": (
         lambda record: Recorded(*(np.delete(each, np.s_[1000:1200], axis=0) for each in record)),
-        r"column 'base.q', as 14 more, has a gap of 804 ms from t = 3.996 s on.*cut the file there",
+        r"column 'base.q', as 14 more, has a gap of 804 ms from t = 3.996 s on.*cut the file there and give "
+        "both parts as recordings: lines 1 to 1001, and line 1 with those from 1002 on",
     ),
     "degrees": (
         lambda record: changed(record, q=np.degrees, theta=np.degrees),
@@ -60,7 +63,7 @@ STOPPING = {
     ),
     "wrapped": (
         lambda record: changed(record, q=lambda q: (q + 3 + np.pi) % (2 * np.pi) - np.pi),
-        r"column 'elbow.q' jumps by 2 pi at t = [\d.]+ s, a wrapped angle: unwrap it",
+        r"column 'elbow.q' jumps by 2 pi at t = [\d.]+ s, a wrapped angle: set unwrap: true in the file of",
     ),
     "not connected": (
         lambda record: changed(record, theta=put(np.s_[:, SHOULDER, 0], 0.1)),
@@ -95,6 +98,45 @@ def test_what_nothing_can_be_made_of_stops_the_fit(
     change, words = STOPPING[fault]
     with pytest.raises(InputError, match=words):
         identify(arm, change(record).write(tmp_path / "record.csv", arm))
+
+
+@pytest.mark.slow
+def test_wrapped_angles_are_unwrapped_on_demand(arm: Robot, record: Recorded, tmp_path: Path) -> None:
+    """Joint and motors jump at different times, and the motors begin in another turn than their joint."""
+    wrapped = changed(
+        record,
+        q=lambda q: (q + 3 + np.pi) % (2 * np.pi) - np.pi,
+        theta=lambda theta: (theta + 3) % (2 * np.pi),
+    )
+    (tmp_path / "columns.yaml").write_text("format: vsacli-columns/1\nunwrap: true\n")
+    path = wrapped.write(tmp_path / "wrapped.csv", arm)
+    fit = ["joints.elbow.actuator.spring.*"]
+    told = identify(arm, path, fit, columns=tmp_path / "columns.yaml").numbers
+    expected = identify(arm, record.write(tmp_path / "record.csv", arm), fit).numbers
+    # nine digits in the files, and filters that turn rounding into 1e-5 of the values
+    assert [each.value for each in told] == pytest.approx([each.value for each in expected], rel=1e-4)
+
+
+def test_a_gap_is_cut_where_the_message_says(arm: Robot, record: Recorded, tmp_path: Path) -> None:
+    """The parts have no gap; below a preamble and above the rows is a line of units, which both need."""
+    path = Recorded(*(np.delete(each, np.s_[1000:1020], axis=0) for each in record)).write(
+        tmp_path / "record.csv", arm
+    )
+    header, *rows = path.read_text().splitlines()
+    lines = ["of the laboratory", "", header, ";".join("units"), *rows]
+    path.write_text("\n".join(lines))
+    mapping = tmp_path / "columns.yaml"
+    mapping.write_text("format: vsacli-columns/1\nskip_rows: [1, 4]\n")
+    with pytest.raises(InputError, match="gap of 84 ms") as refused:
+        identify(arm, path, columns=mapping)
+    said = re.search(r"lines 1 to (\d+), and lines 1 to (\d+) with those from (\d+) on", str(refused.value))
+    assert said is not None
+    last, head, first = map(int, said.groups())
+    assert (last, head, first) == (1004, 4, 1005)
+    parts = [tmp_path / name for name in ("part1.csv", "part2.csv")]
+    for part, chosen in zip(parts, (lines[:last], lines[:head] + lines[first - 1 :]), strict=True):
+        part.write_text("\n".join(chosen))
+        read_motor_recording(arm, part, load_columns(mapping))
 
 
 def test_missing_columns_are_named(arm: Robot, record: Recorded, tmp_path: Path) -> None:

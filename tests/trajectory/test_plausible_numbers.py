@@ -155,3 +155,19 @@ def test_what_was_changed_in_python_has_no_line():
     (found,) = robot.located_warnings
     assert (found.file, found.line) == ("", 0)
     assert robot.replace("joints.base.dh.alpha", "pi/2").warnings == ()
+
+
+@pytest.mark.parametrize(("stiffness", "named_as"), [(54.99, None), (54990, "54990 N mm/rad")])
+def test_what_springs_harden_to_under_their_load_is_no_other_unit(vsacli, tmp_path, stiffness, named_as):
+    """Exponential springs that hold an arm are a thousand times as stiff as at rest."""
+    joints = ["--joint", "shoulder:qbmove", "--joint", "elbow:qbmove"]
+    arm = vsacli("new", "robot", *joints, "--length", "0.3,0.25", "--mass", "1.2,0.7", "-o", "arm.yaml")
+    assert arm.code == 0, arm.err
+    edited(tmp_path / "arm.yaml", tmp_path / "arm.yaml", ("placeholder: true", "placeholder: false"))
+    (tmp_path / "move.yaml").write_text(
+        "format: vsacli-trajectory/1\nname: move\nduration: 1\nrate: 100\n"
+        "position: {type: polynomial, degree: 7, start: 0, end: [0.2, 0.2]}\n"
+        f"stiffness: {{type: constant, value: [{stiffness}, 15]}}\n"
+    )
+    said = " ".join(load_trajectory(tmp_path / "move.yaml", load_robot(tmp_path / "arm.yaml")).warnings)
+    assert (said == "") if named_as is None else f"did you mean {named_as}" in said, said

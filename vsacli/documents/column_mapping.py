@@ -102,12 +102,14 @@ class ColumnMapping:
         ignore: `REST`, or columns to leave out.
         rate: rows per second of a file without times; None if the file has times.
         skip_rows: numbers of lines of the file that are neither header nor rows.
+        unwrap: whether to remove jumps by 2 pi from angles.
     """
 
     columns: Mapping[str, MappedColumn] = field(default_factory=dict)
     ignore: str | tuple[str | int, ...] = ()
     rate: float | None = None
     skip_rows: tuple[int, ...] = ()
+    unwrap: bool = False
 
     def __bool__(self) -> bool:
         return bool(self.columns or self.ignore)

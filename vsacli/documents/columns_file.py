@@ -26,6 +26,7 @@ from vsacli.documents.fields import (
     OwnKind,
     Refer,
     Schema,
+    boolean,
     number,
     text,
     value,
@@ -181,9 +182,13 @@ class ColumnsFile(DeclaredRecord):
         RATE, "sampling rate of recordings without a time column", check=POSITIVE, default=None
     )
 
+    unwrap: bool = boolean(
+        "remove jumps by 2 pi from the angles of revolute joints and their motors", default=False
+    )
+
     def _problems(self) -> Iterator[FieldProblem]:
-        if not (self.columns or self.ignore or self.skip_rows or self.rate):
-            yield FieldProblem((), "says nothing: give columns, ignore, skip_rows or rate")
+        if not (self.columns or self.ignore or self.skip_rows or self.rate or self.unwrap):
+            yield FieldProblem((), "says nothing: give columns, ignore, skip_rows, rate or unwrap")
 
 
 def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
@@ -196,7 +201,11 @@ def load_columns(path: str | os.PathLike[str] | None) -> ColumnMapping:
         return AS_NAMED
     document, _ = read_document(path, ColumnsFile, file_formats.COLUMNS)
     return ColumnMapping(
-        document.columns or {}, document.ignore or (), document.rate, document.skip_rows or ()
+        document.columns or {},
+        document.ignore or (),
+        document.rate,
+        document.skip_rows or (),
+        document.unwrap,
     )
 
 

@@ -236,7 +236,7 @@ def at_rate(result: StoredResult, rate: float) -> Iterator[StoredResult]:
 
 def _takes_every_nth(result: StoredResult, rate: float) -> bool:
     try:
-        stride_of(result, rate)
+        stride_of(result, rate, exact=True)
     except InputError:
         return False
     return True

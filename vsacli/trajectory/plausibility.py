@@ -233,28 +233,43 @@ def _measure_wrenches(checked: CheckedTrajectory, *, forces: bool) -> Iterator[M
 
 def _commanded_stiffness(
     checked: CheckedTrajectory,
-) -> Iterator[tuple[Measured, Joint, UnloadedStiffnessRange]]:
-    """Yield every stiffness except amplitudes, with its joint and the attainable range at rest."""
+) -> Iterator[tuple[Measured, int, UnloadedStiffnessRange]]:
+    """Yield every stiffness except amplitudes, with the index of its joint and its range at rest."""
     for measured, number in checked.of_joints(units.STIFFNESS) if not checked.robot.placeholder else ():
         attainable = checked.subtree.unloaded_ranges[number]
         if attainable is not None and AMPLITUDES.isdisjoint(measured.path):
             ends = {
                 "lower": f"{attainable.lower:.4g}",
+                "load": "without load",
                 "upper": f"{attainable.upper:.4g}",
                 "unit": measured.unit,
             }
-            yield measured._replace(beside=ends), checked.subtree.joints[number], attainable
+            yield measured._replace(beside=ends), number, attainable
 
 
 def _stiffness_over_minimum(checked: CheckedTrajectory, *, linear: bool) -> Iterator[Measured]:
     """Yield stiffness over its minimum, at joints whose springs all have a linear part, or at the others."""
-    for measured, joint, attainable in _commanded_stiffness(checked):
+    for measured, number, attainable in _commanded_stiffness(checked):
+        joint = checked.subtree.joints[number]
         laws = getattr(joint.actuator, "spring", ())
         each_linear = bool(laws) and all(
             law.polynomial is not None for law in laws
         )  # polynomial laws have a linear part
         if each_linear == linear:
-            yield measured._replace(size=ratio_or_nan(measured.size, attainable.lower))
+            measured = measured._replace(size=ratio_or_nan(measured.size, attainable.lower))
+            yield measured if linear else _under_weight(measured, joint, checked.subtree.sizes.loads[number])
+
+
+def _under_weight(measured: Measured, joint: Joint, load: float) -> Measured:
+    """Return a stiffness above the minimum at rest relative to that under the weight.
+
+    Springs that harden like an exponential function are a thousand times as stiff under their load.
+    """
+    least = float(joint.actuator.solve(np.array([load]), np.ones(1), np.zeros(1)).lower[0])
+    if not (measured.size > 1 and measured.value / least < measured.size):
+        return measured
+    of_weight = {"lower": f"{least:.4g}", "load": "under the weight of the stretched arm"}
+    return measured._replace(size=max(1.0, measured.value / least), beside={**measured.beside, **of_weight})
 
 
 def _stiffness_over_maximum(checked: CheckedTrajectory) -> Iterator[Measured]:
@@ -330,9 +345,10 @@ EFFORT_RULES: tuple[Rule[CheckedTrajectory], ...] = (
         units=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
     Rule("stiffness compared with other springs", "`stiffness`: all values",
         lambda checked: _stiffness_over_minimum(checked, linear=False),
-        size="over the lowest of springs of other laws at rest", low=LOWEST_SHARE, high=1000, usual=3,
+        size="over the lowest of springs of other laws, above 1 under the weight of the stretched arm",
+        low=LOWEST_SHARE, high=1000, usual=3,
         reason="below, unattainable; bundled robots: up to 300",
-        finding="is {size} times the minimum of {lower} {unit} without load",
+        finding="is {size} times the minimum of {lower} {unit} {load}",
         units=UNITS_OF_STIFFNESS, advice="check its unit and those of the springs", explained_by=SPRINGS),
     Rule("stiffness beyond the springs", "`stiffness`: all values", _stiffness_over_maximum,
         size="over the highest of the springs at rest", high=5, usual=0.5,

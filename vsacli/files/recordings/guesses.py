@@ -29,6 +29,7 @@ from vsacli.trajectory.recorded.header_words import (
     JointNames,
     motor_of,
     role_of,
+    side_of,
     words_of_column_name,
 )
 from vsacli.trajectory.recorded.thresholds import LARGEST_ANGLE
@@ -90,6 +91,7 @@ class _QuantityColumn(NamedTuple):
         entry: index in an array.
         bare: whether the name has no word for a quantity.
         of_motor: whether the name says of which motor it is.
+        sided: whether it says so by left or right.
         role: role of the column, a key of `ROLES`; its words are in neither `before` nor `words`.
     """
 
@@ -100,6 +102,7 @@ class _QuantityColumn(NamedTuple):
     entry: int | None = None
     bare: bool = False
     of_motor: bool = False
+    sided: bool = False
     role: str = PLAIN
 
     @property
@@ -141,7 +144,7 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
     found: dict[str, Guess] = {}
     names = JointNames(joint_names)
     if joint_names:
-        columns = [_of_motor(column, names) for column in columns]
+        columns = _sided([_of_motor(column, names) for column in columns], names)
     best = {column.signal: column.role for column in reversed(columns)}
     columns = [column for column in columns if column.role == best[column.signal]]
     assign = partial(_of_robot, joints=names) if joint_names else _named
@@ -152,8 +155,10 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
         for column, joint in list(assign(measured, labels)) or assign(of_it, labels):
             source, doubt = _source(rows, column)
             command = COMMAND if column.role == COMMANDED else ""
-            reasons = "; ".join(filter(None, (joint.reason, command, doubt)))
-            guess = Guess(column.place, joint.name, quantity, source, reasons, joint.sure, column.of_motor)
+            sides = "sides taken for motors 1 and 2" * column.sided
+            reasons = "; ".join(filter(None, (joint.reason, sides, command, doubt)))
+            sure = joint.sure and not column.sided
+            guess = Guess(column.place, joint.name, quantity, source, reasons, sure, column.of_motor)
             found.setdefault(guess.name, guess)
     return sorted(found.values(), key=lambda guess: (guess.quantity not in TAKEN, guess.place))
 
@@ -199,6 +204,34 @@ def _of_motor(column: _QuantityColumn, joints: JointNames) -> _QuantityColumn:
     return _QuantityColumn(
         column.place, f"{variable}_{motor}", column.before, words, of_motor=True, role=column.role
     )
+
+
+def _sided(columns: Sequence[_QuantityColumn], joints: JointNames) -> list[_QuantityColumn]:
+    """Return columns as those of motors where both sides of a joint are there.
+
+    Positions of sides are those of motors only next to a position of the joint; they may be two arms else.
+    """
+    of_side = {
+        column.place: (side[0], (column.quantity, *side[1]))
+        for column in columns
+        if column.quantity in ("q", "tau_motor_1") and (side := side_of(column.words, joints))
+    }
+    sides = set(of_side.values())
+    of_joints = {(column.quantity, *column.words) for column in columns if not column.bare}
+    pairs = {
+        signal
+        for motor, signal in sides
+        if (3 - motor, signal) in sides and (signal[0] != "q" or signal in of_joints)
+    }
+    return [
+        column._replace(
+            quantity=f"{OF_MOTORS[column.quantity]}_{motor}", words=signal[1:], of_motor=True, sided=True
+        )
+        if signal in pairs
+        else column
+        for column in columns
+        for motor, signal in [of_side.get(column.place, (0, ()))]
+    ]
 
 
 def _labels(rows: FirstRows) -> dict[int, str]:
@@ -289,6 +322,17 @@ def _named(
             yield column, _GuessedJoint(last)
         else:
             yield column, _GuessedJoint(f"joint_{rank}", "by the order alone", sure=False)
+
+
+def names_torque(heading: str) -> bool:
+    """Return whether a name speaks of a measured torque, other than a moment of a force sensor."""
+    role, name = role_of(split_heading(heading)[0])
+    words = {*words_of_column_name(name)}
+    return (
+        role not in (COMMANDED, ERROR)
+        and not words.isdisjoint(QUANTITIES["tau_motor_1"])
+        and words.isdisjoint(AXES)
+    )
 
 
 def _is_no_joint(column: _QuantityColumn) -> bool:

@@ -34,7 +34,7 @@ from vsacli.files.recordings.first_rows import (
     time_columns,
     unread_times,
 )
-from vsacli.files.recordings.guesses import TAKEN, Guess, guesses
+from vsacli.files.recordings.guesses import TAKEN, Guess, guesses, names_torque
 from vsacli.files.recordings.recording_text import is_proposed, mapping_lines
 from vsacli.robot.commanded_joints import CommandedJoints
 from vsacli.robot.model import Robot
@@ -200,6 +200,11 @@ class _Proposal:
         yield f"format: {file_formats.COLUMNS}"
         yield from self._rates()
         yield from self._lines(self._found, joint_names)
+        places = {guess.place for guess in self._found}
+        torques = [place for place, name in enumerate(self._rows.columns) if names_torque(name)]
+        yield from (
+            f"# {self._rows.called(place)}: not recognized" for place in torques if place not in places
+        )
 
     def _rates(self) -> Iterator[str]:
         if self._rate is not None:

@@ -29,6 +29,9 @@ MOST_TRIED = 1000
 
 RATE_TOLERANCE = 1e-6
 """Relative tolerance of a rate, for rates typed with at least six digits, such as 333.3333."""
+LARGEST_TOLERANCE = 1e-3
+"""Largest relative tolerance of a rate for which the duration is no whole number of intervals."""
+
 STEP_TOLERANCE = 1e-3
 """Tolerance of stored times, in sampling intervals: twice the error of times at 1 kHz printed with six
 decimals."""
@@ -194,42 +197,55 @@ def _check_geared(result: StoredResult) -> None:
         raise InputError.one(message, result.path)
 
 
-def stride_of(result: StoredResult, rate: float) -> int:
+def stride_of(result: StoredResult, rate: float, *, exact: bool = False) -> int:
     """Return the decimation factor from the stored rate to a rate, Hz.
+
+    Samples over the span of a recording have the rate that was requested only up to a whole number of
+    intervals, such as 1000.002 Hz; its fractions are those of the requested one.
+
+    Args:
+        result: result with equally spaced times.
+        rate: samples per second, Hz.
+        exact: whether the stored rate must be a multiple within `RATE_TOLERANCE`.
 
     Raises:
         InputError: the stored rate is not a multiple of it, or the times are not equally spaced.
     """
     check_rate(rate)
-    stored = _stored_rate(result)
+    again = f"run {result.command} with --set rate={rate:.9g}, then export without --rate"
+    stored = _stored_rate(result, again)
     ratio = stored / rate
     stride = round(ratio)
-    if ratio < 1 - RATE_TOLERANCE:
+    half_interval = 0.5 / (result.samples - 1)
+    tolerance = max(RATE_TOLERANCE, 0.0 if exact else min(half_interval, LARGEST_TOLERANCE))
+    if ratio < 1 - tolerance:
         raise InputError.one(
-            f"{rate:.9g} Hz exceeds the stored rate of {stored:.9g} Hz; use a lower rate, or run "
-            f"{result.command} with --set rate={rate:.9g}"
+            f"{rate:.9g} Hz exceeds the stored rate of {stored:.9g} Hz; use a lower rate, or {again}"
         )
-    if abs(ratio - stride) > RATE_TOLERANCE * ratio:
-        choices = joined((f"{each:.9g}" for each in _near_rates(stored, ratio)), "or")
+    if abs(ratio - stride) > tolerance * ratio:
+        choices = joined((f"{each:.9g}" for each in _near_rates(stored, rate, tolerance)), "or")
         raise InputError.one(
-            f"the stored rate of {stored:.9g} Hz is not a multiple of {rate:.9g} Hz; use {choices} Hz"
+            f"the stored rate of {stored:.9g} Hz is not a multiple of {rate:.9g} Hz; use {choices} Hz, "
+            f"or {again}"
         )
     return stride
 
 
-def _near_rates(stored: float, ratio: float) -> list[float]:
-    """Return the nearest rates below and above stored/ratio that are easily typed; if there are none, any."""
-    least, most = math.floor(ratio), math.ceil(ratio)
+def _near_rates(stored: float, rate: float, tolerance: float) -> list[float]:
+    """Return the nearest fractions below and above a rate that are easily typed; if there are none, any."""
+    few_digits = (float(f"{stored:.{digits}g}") for digits in range(1, 18))
+    nominal = next(each for each in few_digits if abs(each - stored) <= tolerance * stored)
+    least, most = math.floor(nominal / rate), math.ceil(nominal / rate)
     sides = (range(most, most + MOST_TRIED), range(least, 0, -1))
-    found = [rate for strides in sides for rate in _typed(stored, strides)]
-    return found or [stored / most, stored / least]
+    found = [rate for strides in sides for rate in _typed(nominal, strides)]
+    return found or [nominal / most, nominal / least]
 
 
-def _typed(stored: float, strides: Iterable[int]) -> list[float]:
-    """Return the first quotient of the stored rate that has at most four digits, if there is one."""
+def _typed(nominal: float, strides: Iterable[int]) -> list[float]:
+    """Return the first quotient of a rate that has at most four digits, if there is one."""
     for stride in strides:
-        rate = float(f"{stored / stride:.4g}")
-        if abs(stored - rate * stride) <= RATE_TOLERANCE * stored:
+        rate = float(f"{nominal / stride:.4g}")
+        if abs(nominal - rate * stride) <= RATE_TOLERANCE * nominal:
             return [rate]
     return []
 
@@ -240,8 +256,8 @@ def check_rate(rate: float) -> None:
         raise InputError.one(f"the rate must be positive, not {rate:g} Hz")
 
 
-def _stored_rate(result: StoredResult) -> float:
-    """Return the samples per second of a file with equally spaced times."""
+def _stored_rate(result: StoredResult, again: str) -> float:
+    """Return the samples per second of a file with equally spaced times; `again` computes such a file."""
     time, steps = result.time, result.samples - 1
     if steps < 1:
         raise InputError.one(
@@ -251,10 +267,6 @@ def _stored_rate(result: StoredResult) -> float:
     error = np.abs(time - (time[0] + step * np.arange(result.samples)))
     if error.max() > STEP_TOLERANCE * step:
         place = f"near t = {time_text(float(time[error.argmax()]))}"
-        rate = float(f"{1 / step:.3g}")
-        message = (
-            f"the stored times are not equally spaced ({place}); set rate: {rate:g} in the"
-            f" trajectory file and run {result.command} again, or export without --rate"
-        )
+        message = f"the stored times are not equally spaced ({place}); {again}"
         raise InputError.one(message, result.path)
     return 1 / step

@@ -247,7 +247,9 @@ def delay(found: Sequence[Solution], signals: ConditionedRecording) -> Delay:
     if not len(values):
         return Delay(np.nan, np.nan)
     weights = 1 / errors**2
-    return Delay(float(weights @ values / weights.sum()), float(weights.sum() ** -0.5))
+    late = Delay(float(weights @ values / weights.sum()), float(weights.sum() ** -0.5))
+    # the expansion tells nothing of delays beyond a period of the highest frequency
+    return late if abs(late.seconds) * signals.filter.bandwidth <= 1 else Delay(np.nan, np.nan)
 
 
 def _delay_of(
@@ -263,14 +265,14 @@ def _delay_of(
 
 
 def without_delay(signals: ConditionedRecording, late: float) -> ConditionedRecording:
-    """Return the recording with torques advanced by `late` seconds."""
-    torques = signals.tau_motor.copy()
+    """Return the recording with torques advanced by `late` seconds, while both were recorded."""
+    spline = scipy.interpolate.make_interp_spline
+    first, last = np.searchsorted(signals.time, (signals.time[0] - late, signals.time[-1] - late))
+    covered = signals.during(slice(first, last))
+    torques = covered.tau_motor.copy()
     there = np.isfinite(torques).all(axis=0)
-    shifted: FloatArray = scipy.interpolate.make_interp_spline(signals.time, torques[:, there], k=3)(
-        signals.time + late
-    )
-    torques[:, there] = shifted
-    return signals._replace(tau_motor=torques)
+    torques[:, there] = spline(signals.time, signals.tau_motor[:, there], k=3)(covered.time + late)
+    return covered._replace(tau_motor=torques)
 
 
 CERTAIN_FACTOR = 4.0

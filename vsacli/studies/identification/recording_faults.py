@@ -14,14 +14,16 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from vsacli.actuators.drivetrain import SIDES
-from vsacli.base.arrays import BoolArray, FloatArray
+from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.simulation_variables import measured
 from vsacli.base.texts import counted
 from vsacli.base.units import time_text
 from vsacli.base.variables import VARIABLES, Variable
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.csv_file import split_heading
+from vsacli.documents.table import CsvTable
 from vsacli.robot.model import Robot
+from vsacli.studies.measured.likely_causes import UNWRAP
 from vsacli.studies.measured.measured_columns import MeasuredSignal, Recording, preferred, read_recording
 from vsacli.trajectory.recorded.faults import Quantization, angle_wraps
 from vsacli.trajectory.recorded.health import column_faults, stamp_faults, step_text
@@ -55,6 +57,7 @@ class RecordedColumn(NamedTuple):
         time: times of the samples, (samples,) in s since the first row of the file.
         values: values, (samples,), SI units on the joint side of the gear.
         has_unit: whether the file gives a unit after the name.
+        rows: rows of the table in which the column has a value, (samples,).
     """
 
     name: str
@@ -62,6 +65,7 @@ class RecordedColumn(NamedTuple):
     time: FloatArray
     values: FloatArray
     has_unit: bool
+    rows: IndexArray
 
 
 class _RobotColumns(NamedTuple):
@@ -108,9 +112,11 @@ def recorded_columns(
     united = {name for name, unit in map(split_heading, recording.table.columns) if unit is not None}
     stamps, columns = elapsed_times(recording.time), []
     for place, signal in _preferred_columns(recording.signals).items():
-        there = np.isfinite(signal.values)
-        values = signal.values[there] * _torque_of_current(robot, signal)
-        columns.append(RecordedColumn(signal.column, place, stamps[there], values, signal.column in united))
+        rows = np.flatnonzero(np.isfinite(signal.values))
+        values = signal.values[rows] * _torque_of_current(robot, signal)
+        columns.append(
+            RecordedColumn(signal.column, place, stamps[rows], values, signal.column in united, rows)
+        )
     used = {column.name for column in columns}
     others = [signal.column for signal in recording.signals if signal.column not in used]
     return columns, (*others, *recording.table.unknown_columns), recording
@@ -145,7 +151,7 @@ CUT_SHARE = 5.0
 sine without noise has 2.4."""
 
 
-def stopping_faults(columns: Sequence[RecordedColumn], robot: Robot) -> Iterator[str]:
+def stopping_faults(columns: Sequence[RecordedColumn], robot: Robot, table: CsvTable) -> Iterator[str]:
     """Yield sentences on faults that make columns unusable."""
     few = [column for column in columns if len(column.time) < FEWEST_SAMPLES]
     if few:
@@ -155,8 +161,9 @@ def stopping_faults(columns: Sequence[RecordedColumn], robot: Robot) -> Iterator
     if unit is not None:  # the columns of a file share their times
         yield unit
         return
-    yield from _merge_clauses((column.name, clause) for column in columns for clause in _gap_clauses(column))
-    if not any(_gap_clauses(column) for column in columns):
+    gaps = [(column.name, clause) for column in columns for clause in _gap_clauses(column, table)]
+    yield from _merge_clauses(gaps)
+    if not gaps:
         yield from _too_short_in_common(columns)
     yield from _merge_clauses(
         (column.name, clause)
@@ -202,15 +209,19 @@ def _unit_of_time(column: RecordedColumn) -> Iterator[str]:
         yield from (f"time {fault.message}" for fault in stamp_faults(column.time))
 
 
-def _gap_clauses(column: RecordedColumn) -> list[str]:
+def _gap_clauses(column: RecordedColumn, table: CsvTable) -> list[str]:
     steps, usual = np.diff(column.time), _usual_step(column)
     longest = int(np.argmax(steps))
     if steps[longest] <= GAP_STEPS * usual:
         return []
     when = time_text(float(column.time[longest]))
+    before, after = (table.line_of(int(row)) for row in column.rows[longest : longest + 2])
+    above = table.line_of(0) - 1  # preamble, header and units, which the second part needs as well
+    head = f"{'line 1' if above == 1 else f'lines 1 to {above}'} with " if above > 0 else ""
     return [
         f"has a gap of {step_text(float(steps[longest]))} from t = {when} on, where rows are "
-        f"{step_text(usual)} apart: cut the file there and give both parts as recordings"
+        f"{step_text(usual)} apart: cut the file there and give both parts as recordings: lines 1 to "
+        f"{before}, and {head}those from {after} on"
     ]
 
 
@@ -235,7 +246,7 @@ def _position_clauses(column: RecordedColumn, robot: Robot) -> Iterator[str]:
     jumps = angle_wraps(column.values) if turns else None
     if jumps is not None:
         when = time_text(float(column.time[jumps.at]))
-        yield f"jumps by 2 pi at t = {when}, a wrapped angle: unwrap it"
+        yield f"jumps by 2 pi at t = {when}, a wrapped angle: set {UNWRAP}"
     elif follows and not column.has_unit and largest > (LARGEST_ANGLE if turns else LARGEST_TRAVEL):
         wrong, right = ("deg", "rad") if turns else ("mm", "m")
         yield (

@@ -14,9 +14,10 @@ from vsacli.actuators.drivetrain import SIDES
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError, Problem
 from vsacli.base.texts import listed
-from vsacli.base.variables import MOTORS
+from vsacli.base.variables import MOTORS, VARIABLES
 from vsacli.documents.column_mapping import AS_NAMED, ColumnMapping
 from vsacli.documents.source import Source
+from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.recording_faults import (
     MOTOR,
@@ -28,6 +29,7 @@ from vsacli.studies.identification.recording_faults import (
     stopping_faults,
     unreliable_fit_sentences,
 )
+from vsacli.studies.measured.measured_columns import nearest_turn
 
 INTERPOLATION = 3
 """Degree of the spline that resamples a column."""
@@ -79,7 +81,7 @@ def read_motor_recording(robot: Robot, path: str | Path, mapping: ColumnMapping 
     needed = {place for index in range(len(robot.joints)) for place in _needed(robot, index)}
     columns = [column for column in recorded if column.place in needed] or recorded
     unused = (*(column.name for column in recorded if column.place not in needed), *unused)
-    faults = list(stopping_faults(columns, robot))
+    faults = list(stopping_faults(columns, robot, recording.table))
     if faults:
         raise InputError(Problem(str(path), 0, sentence) for sentence in faults)
     time = _grid(columns)
@@ -93,6 +95,8 @@ def read_motor_recording(robot: Robot, path: str | Path, mapping: ColumnMapping 
     for index, joint_ in enumerate(robot.joints):
         if not joint_.actuator.sprung:
             arrays[MOTOR][:, index, 0] = arrays[POSITION][:, index, 0]
+        elif mapping.unwrap and joint_.is_revolute:
+            _turn_motors(arrays[MOTOR][:, index], arrays[POSITION][:, index, 0], joint_)
     return Record(
         path=str(path),
         source=recording.table.source,
@@ -104,6 +108,14 @@ def read_motor_recording(robot: Robot, path: str | Path, mapping: ColumnMapping 
         unused=unused,
         doubts=(*filter(None, [recording.stranger]), *unreliable_fit_sentences(columns)),
     )
+
+
+def _turn_motors(theta: FloatArray, q: FloatArray, joint: Joint) -> None:
+    """Bring motors behind springs, (samples, 2), into the turn of their joint, which unwrapping may miss."""
+    follow = joint.actuator.has_columns(VARIABLES["phi"])
+    ungeared = [side is not None and side.gear_ratio in (None, 1) for side in joint.actuator.sides]
+    for motor in np.flatnonzero(np.logical_and(follow, ungeared)):
+        theta[:, motor] = nearest_turn(theta[:, motor], q)
 
 
 SAME = 1e-7

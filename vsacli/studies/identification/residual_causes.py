@@ -78,6 +78,10 @@ FRICTION = "{name}: what is left depends on its velocity: its friction has anoth
 SPRING = (
     "{name}: what is left depends on its deflection: its spring has another law, or positions were resampled"
 )
+DAMPING = (
+    "{{name}}: what is left is proportional to its velocity, and its damping, {damping:g} in the file, is "
+    "not identified: name {path} in --fit"
+)
 PLACE = "{name}: what is left depends on its position: a cable, a stop or a weight is not in the file"
 
 
@@ -117,7 +121,16 @@ def _motor_causes(
         yield _bias(name, own, equations, torque)
         of_both = [
             _gain_cause(name, own, equations),
-            *_frictions(name, own, records, [each.dtheta[:, index, motor] for each in records]),
+            *_frictions(
+                name,
+                own,
+                records,
+                [each.dtheta[:, index, motor] for each in records],
+                DAMPING.format(
+                    damping=joint.actuator.motors[motor].damping,
+                    path=f"joints.{joint.name}.actuator.motor*.damping",
+                ),
+            ),
             _law(SPRING, name, own, records, _polynomial_terms(pulled, motor, float(pulls[motor]))),
         ]
         yield from of_both
@@ -143,7 +156,8 @@ def _of_links(
         own = [each.group == name for each in equations]
         if any(each.any() for each in own):
             yield _gain_cause(name, own, equations)
-            yield from _frictions(name, own, records, [each.dq[:, index] for each in records])
+            words = DAMPING.format(damping=joint.damping, path=f"joints.{joint.name}.damping")
+            yield from _frictions(name, own, records, [each.dq[:, index] for each in records], words)
             positions = [each.q[:, index][None] for each in records]
             yield _law(PLACE, name, own, records, _polynomial_terms(positions, 0, 1.0))
 
@@ -162,12 +176,20 @@ def _gain_cause(name: str, own: Sequence[BoolArray], equations: Sequence[Equatio
 
 
 def _frictions(
-    name: str, own: Sequence[BoolArray], records: Sequence[ConditionedRecording], speeds: Sequence[FloatArray]
+    name: str,
+    own: Sequence[BoolArray],
+    records: Sequence[ConditionedRecording],
+    speeds: Sequence[FloatArray],
+    undamped: str,
 ) -> Iterator[Cause]:
-    """Yield quadratic friction, then dry and Stribeck friction."""
+    """Yield damping, then quadratic friction, then dry and Stribeck friction.
+
+    Damping that is identified leaves nothing to explain; `undamped` words the other case.
+    """
     # separate causes, since a test with fewer columns detects smaller effects
     largest = max(float(np.max(np.abs(each), initial=0.0)) for each in speeds) or 1.0
     scaled = [each / largest for each in speeds]
+    yield _law(undamped, name, own, records, [v[None] for v in scaled])
     yield _law(FRICTION, name, own, records, [(v * np.abs(v))[None] for v in scaled])
     dry = [np.sign(v) for v in scaled]  # the law of the file, so that it adds nothing where that is fitted
     falling = [sign * np.exp(-np.abs(v) / SLOW) for sign, v in zip(dry, scaled, strict=True)]

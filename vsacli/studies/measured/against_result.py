@@ -18,14 +18,16 @@ from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has_flag
 from vsacli.base.simulation_variables import COMMANDS, measured
-from vsacli.base.texts import counted
+from vsacli.base.texts import counted, listed
 from vsacli.base.variables import Variable
 from vsacli.documents.columns_file import load_columns
 from vsacli.results.store.reader import StoredResult, open_stored
-from vsacli.studies.measured.agreement import SHOWN_LAG, Agreement, Comparison
-from vsacli.studies.measured.alignment import Alignment, align
+from vsacli.studies.measured.agreement import SHOWN_LAG, Agreement, Comparison, with_error
+from vsacli.studies.measured.alignment import Alignment, align, lags_agree, mean_of_effects
 from vsacli.studies.measured.likely_causes import (
+    FEWEST_OFF,
     NOTABLE,
+    SURE,
     WILD,
     exchanged_places,
     likely_causes,
@@ -34,8 +36,10 @@ from vsacli.studies.measured.likely_causes import (
 )
 from vsacli.studies.measured.line_fit import LineFit, fit_line, root_mean_square, still_signal
 from vsacli.studies.measured.measured_columns import (
+    MOST_NAMED,
     MeasuredSignal,
     Recording,
+    nearest_turn,
     preferred,
     read_recording,
     stand_ins,
@@ -44,13 +48,13 @@ from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Computed, Pairing, i
 from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
 
 POSITIONS = ("q", "theta")
-"""Variables preferred for the alignment: positions were commanded, while torques depend on the model."""
+"""Variables preferred for the alignment: errors of the model change the first not, the others hardly."""
 
 OTHER_UNIT = 100
 """Ratio of the durations of recording and result above which the times may be in another unit."""
 
-SAME_LAG = 0.2
-"""Relative difference up to which lags are equal and may be an offset between clocks."""
+TORQUES = ("tau", "current")
+"""Beginnings of the variables that sensors of torque show, late or not."""
 
 
 def compare(
@@ -79,8 +83,9 @@ def compare(
     if not isinstance(result, StoredResult):
         with open_stored(result) as stored:
             return compare(stored, recording, time_offset, columns)
-    wanted = stand_ins(_variables(result))
-    read = read_recording(recording, result, wanted, result.robot_name, load_columns(columns))
+    wanted = list(stand_ins(_variables(result)))
+    mapping = load_columns(columns)
+    read = read_recording(recording, result, wanted, result.robot_name, mapping)
     recorded, behind = _most_direct(read)
     computed = _interpolate_signals(result, recorded.signals)
     duration = float(result.time[-1] - result.time[0])
@@ -92,9 +97,12 @@ def compare(
         _align_recording(recorded, pairings, recording) if time_offset is None else Alignment(time_offset)
     )
     overlap = _overlap(recorded.time, alignment.time_offset, duration, recording)
+    if mapping.unwrap:
+        pairings = _nearest_turns(recorded, pairings, alignment.time_offset)
     signals = _agreements(result, recorded, pairings, alignment)
     ratios = _gear_ratios(recorded, result)
     notes = (
+        *_without_torques(recorded, wanted),
         *_alignment_notes(alignment),
         *_common_lag(signals, alignment.time_offset),
         *likely_causes(signals, ratios),
@@ -161,9 +169,14 @@ def _interpolate_signals(result: StoredResult, signals: Sequence[MeasuredSignal]
 
 def _align_recording(recorded: Recording, pairings: Sequence[Pairing], path: str | Path) -> Alignment:
     groups = [_exchange_group(signal) for signal in recorded.signals]
-    of_positions = [signal.place.variable.startswith(POSITIONS) for signal in recorded.signals]
-    positions = align(list(compress(pairings, of_positions)), list(compress(groups, of_positions)))
-    alignment = positions or align(pairings, groups)
+    variables = [signal.place.variable for signal in recorded.signals]
+    of_positions = [variable.startswith(POSITIONS) for variable in variables]
+    commanded = [variable.startswith(POSITIONS[0]) for variable in variables]
+    positions = align(
+        *(list(compress(pairings, of_positions)), list(compress(groups, of_positions))),
+        list(compress(commanded, of_positions)),
+    )
+    alignment = positions or align(pairings, groups, commanded)
     if alignment is None:
         raise InputError.one(
             "matches the result at no time offset; is it the recording of this motion, and does anything "
@@ -185,6 +198,16 @@ def _other_unit(pairing: Pairing) -> str:
         return ""
     lengths = f"It lasts {lasts:.4g} s and the result {pairing.duration:.4g} s"
     return f"{lengths}: if times are in another unit, write it in the header, e.g. time[ms]. "
+
+
+def _nearest_turns(recorded: Recording, pairings: Sequence[Pairing], time_offset: float) -> list[Pairing]:
+    """Return pairings with unwrapped angles in the turn of the computed ones."""
+    return [
+        pairing._replace(measured=nearest_turn(pairing.measured, pairing.overlap(time_offset)[0]))
+        if (signal.place.unit, signal.place.gear) == ("rad", 1)
+        else pairing
+        for signal, pairing in zip(recorded.signals, pairings, strict=True)
+    ]
 
 
 def _overlap(stamps: FloatArray, time_offset: float, duration: float, path: str | Path) -> Overlap:
@@ -262,6 +285,15 @@ def _signal_agreement(
     )
 
 
+def _without_torques(recorded: Recording, wanted: Sequence[tuple[str, int, Variable]]) -> Iterator[str]:
+    """Yield a note if columns were left out, torques among them perhaps, and no torque is compared."""
+    left = listed((*recorded.table.ignored, *recorded.table.unknown_columns), MOST_NAMED)
+    variables = [name for name, *_ in wanted], [signal.place.variable for signal in recorded.signals]
+    computed, compared = (any(each.startswith(TORQUES) for each in names) for names in variables)
+    if left and computed and not compared:
+        yield f"no torque was compared; if any of {left} is one, map it with --columns"
+
+
 def _alignment_notes(alignment: Alignment) -> Iterator[str]:
     if alignment.others:
         listed = " and ".join(f"{other:.4g} s" for other in alignment.others[:3])
@@ -270,15 +302,18 @@ def _alignment_notes(alignment: Alignment) -> Iterator[str]:
 
 
 def _common_lag(signals: Sequence[Agreement], time_offset: float) -> Iterator[str]:
-    """Yield a note if all signals but positions lag equally, as if joints did not follow their commands."""
-    others = [signal for signal in signals if not signal.variable.startswith(POSITIONS)]
-    lags = [signal.lag for signal in others if math.isfinite(signal.lag)]
-    middle = float(np.median(lags)) if lags else math.nan
-    sure = all(abs(signal.lag) > 3 * signal.lag_error for signal in others if math.isfinite(signal.lag))
-    if sure and abs(middle) >= SHOWN_LAG and max(abs(lag - middle) for lag in lags) <= SAME_LAG * abs(middle):
+    """Yield a note if torques agree on a lag behind the positions on which the time offset rests."""
+    late = [each for each in signals if each.variable.startswith(TORQUES) and math.isfinite(each.lag)]
+    if len(late) < FEWEST_OFF:
+        return
+    lags, errors = (np.array([getattr(each, name) for each in late]) for name in ("lag", "lag_error"))
+    lag, error = mean_of_effects(lags, errors)
+    if lags_agree(lags, errors) and abs(lag) >= SHOWN_LAG and abs(lag) > SURE * error:
         yield (
-            f"all signals but positions lag by {1e3 * middle:+.1f} ms; if the joints did not follow their "
-            f"commands, --time-offset {time_offset + middle:.4f} may be right"
+            f"torques agree on a lag of {with_error(1e3 * lag, 1e3 * error, 'ms', '+.1f')} behind positions: "
+            "their sensors are late (vsacli identify ROBOT RECORDING removes such a delay), the model is "
+            "wrong, or joints did not follow their commands, and then --time-offset "
+            f"{time_offset + lag:.4f} is right"
         )
 
 

@@ -131,7 +131,7 @@ class Comparison(Published, TextReport):
     @property
     def title(self) -> str:
         """Names, the largest relative error, and the time offset."""
-        offset = _with_error(self.time_offset, self.time_offset_error, "s", "+.4f")
+        offset = with_error(self.time_offset, self.time_offset_error, "s", "+.4f")
         return f"{self.result}, {self.recording}: {self._worst()}; time offset {offset}"
 
     def as_text(self) -> ReportText:
@@ -173,13 +173,13 @@ def _row(signal: Agreement) -> tuple[str, ...]:
         cell(100 * signal.share, ".3g"),
         cell(signal.worst, "+.3g"),
         cell(signal.worst_time, ".3f"),
-        _with_error(signal.offset, signal.offset_error, "", "+.2g"),
-        _with_error(signal.gain, signal.gain_error, "", ".4g"),
-        _with_error(1e3 * signal.lag, 1e3 * signal.lag_error, "", "+.1f"),
+        with_error(signal.offset, signal.offset_error, "", "+.2g"),
+        with_error(signal.gain, signal.gain_error, "", ".4g"),
+        with_error(1e3 * signal.lag, 1e3 * signal.lag_error, "", "+.1f"),
     )
 
 
-def _with_error(value: float, error: float, unit: str, form: str) -> str:
+def with_error(value: float, error: float, unit: str, form: str) -> str:
     """Return a value rounded to one digit of its standard error, with it; by the form without one."""
     if not math.isfinite(value):
         return "-"

@@ -4,14 +4,16 @@ Laboratory clocks start before the motion, and a recording may end before it or 
 shift is found in two steps. A search over all shifts selects the one at which the columns together leave the
 smallest unexplained part (`pairing.py`); the part of each column is bounded. Then the lag of each column
 behind that shift is fitted, with its own offset and gain (`line_fit.py`), and the lags of columns that agree
-are averaged, weighted by their standard errors. So neither offsets, units and signs nor a minority of delayed
-or exchanged columns affect the result.
+are averaged, weighted by their standard errors. If lags differ by more than these, joint positions decide on
+which most of them agree: the motors of a result contain the errors of its model, which look like lags. So
+neither offsets, units and signs nor a minority of delayed or exchanged columns affect the result.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +56,9 @@ LONGEST_STEP = 3.0
 ROUNDS = 3
 """Number of rounds that estimate the common lag; the second hardly differs from the first."""
 
+AGREEING = 3.0
+"""Largest difference of a lag from the mean of lags that agree, in standard errors."""
+
 APART = 3.5
 """Distance from the median, in standard deviations, from which on a column is ignored."""
 
@@ -73,16 +78,19 @@ class Alignment(NamedTuple):
 
 
 @np.errstate(all="ignore")  # columns with huge values, or few of them, explain nothing
-def align(pairings: Sequence[Pairing], groups: Sequence[object]) -> Alignment | None:
+def align(
+    pairings: Sequence[Pairing], groups: Sequence[object], commanded: Sequence[bool]
+) -> Alignment | None:
     """Return the shift that explains most; None if no shift explains half, or nothing moves.
 
     Args:
         pairings: pairings of the columns to align.
         groups: group of each column; columns of a group may be exchanged with each other.
+        commanded: whether each computed signal was commanded, so that no error of the model is in it.
     """
     moving = [pairing.computed.moves and float(np.ptp(tame(pairing.measured))) > 0 for pairing in pairings]
-    pairings = [pairing for pairing, moves in zip(pairings, moving, strict=True) if moves]
-    groups = [group for group, moves in zip(groups, moving, strict=True) if moves]
+    pairings, groups = list(compress(pairings, moving)), list(compress(groups, moving))
+    commanded = list(compress(commanded, moving))
     if not pairings:
         return None
     candidates, others = _search_shifts(pairings)
@@ -92,7 +100,7 @@ def align(pairings: Sequence[Pairing], groups: Sequence[object]) -> Alignment | 
     _, shift, paired = min(refined, key=lambda each: each[0])
     if np.median([_explained(pairing, shift) for pairing in paired]) < EXPLAINED:
         return None
-    shift, error = _agreed(paired, shift)
+    shift, error = _agreed(paired, commanded, shift)
     return Alignment(shift, error, others if len(candidates) > 1 else ())
 
 
@@ -216,35 +224,54 @@ def _explained(pairing: Pairing, shift: float) -> float:
     return float(1 - (1 - product**2 / (computed * measured)) * freedom)
 
 
-def _agreed(pairings: Sequence[Pairing], shift: float) -> tuple[float, float]:
+def _agreed(pairings: Sequence[Pairing], commanded: Sequence[bool], shift: float) -> tuple[float, float]:
     """Return the time shift on which the columns agree, and its standard error."""
     error = math.nan
     for _ in range(ROUNDS):
         fits = [fit_line(pairing, shift) for pairing in pairings]
-        found = _average([fit for fit in fits if math.isfinite(fit.lag) and fit.correlation**2 >= EXPLAINED])
-        if found is None:
+        usable = [math.isfinite(fit.lag) and fit.correlation**2 >= EXPLAINED for fit in fits]
+        if not any(usable):
             break
-        shift, error = shift + found[0], found[1]
+        of_commanded = list(compress(fits, np.logical_and(usable, commanded)))
+        fits = list(compress(fits, usable))
+        sure = 2 * np.count_nonzero(_agreeing(of_commanded)) > len(of_commanded)
+        late, error = _average(of_commanded if sure and not lags_agree(*_lags(fits)) else fits)
+        shift += late
     return shift, error
 
 
-def _average(fits: Sequence[LineFit]) -> tuple[float, float] | None:
-    """Return the weighted mean lag of columns that agree, and its standard error; None without columns.
+def lags_agree(lags: FloatArray, errors: FloatArray) -> bool:
+    """Return whether lags differ from their mean by no more than their standard errors explain."""
+    return bool(np.all(np.abs(lags - mean_of_effects(lags, errors)[0]) <= AGREEING * errors))
+
+
+def _lags(fits: Sequence[LineFit]) -> tuple[FloatArray, FloatArray]:
+    return np.array([fit.lag for fit in fits]), np.array([fit.lag_error for fit in fits])
+
+
+def _average(fits: Sequence[LineFit]) -> tuple[float, float]:
+    """Return the weighted mean lag of columns that agree, and its standard error.
 
     If lags scatter more than their errors explain, all errors are increased by that scatter.
     """
+    kept = _agreeing(fits)
+    if 2 * np.count_nonzero(kept) <= len(fits):
+        kept[:] = True  # without a majority, no column can be called wrong
+    lags, errors = _lags(fits)
+    return mean_of_effects(lags[kept], errors[kept])
+
+
+def _agreeing(fits: Sequence[LineFit]) -> BoolArray:
+    """Return a mask of the columns whose lags agree with the median."""
     if not fits:
-        return None
-    lags, errors = (np.array([getattr(fit, name) for fit in fits]) for name in ("lag", "lag_error"))
+        return np.zeros(0, dtype=bool)
+    lags, errors = _lags(fits)
     bounded = np.maximum(errors, np.median(errors))
     middle = _weighted_median(lags, 1 / bounded)
     scatter = 1.4826 * _weighted_median(np.abs(lags - middle), 1 / bounded)
     of_middle = 1.25 * float(np.sqrt(1 / np.sum(1 / bounded**2)))
     wide = np.sqrt(errors**2 + max(0.0, scatter**2 - float(np.median(errors)) ** 2) + of_middle**2)
-    kept = np.abs(lags - middle) <= APART * wide
-    if 2 * np.count_nonzero(kept) <= len(fits):
-        kept[:] = True  # without a majority, no column can be called wrong
-    return _mean_of_effects(lags[kept], errors[kept])
+    return np.asarray(np.abs(lags - middle) <= APART * wide)
 
 
 def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
@@ -253,7 +280,7 @@ def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
     return float(values[order][np.searchsorted(sums, sums[-1] / 2)])
 
 
-def _mean_of_effects(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
+def mean_of_effects(values: FloatArray, errors: FloatArray) -> tuple[float, float]:
     """Return the mean of values that scatter beyond their errors, and its standard error.
 
     See R. DerSimonian, N. Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7 (1986).

@@ -9,8 +9,10 @@ import numpy as np
 import scipy
 
 from vsacli.base.arrays import FloatArray
+from vsacli.base.units import time_text
 from vsacli.studies.measured.agreement import Agreement
 from vsacli.studies.measured.pairing import FEWEST_SAMPLES, Pairing, exactness, moments_of, tame, unlikeness
+from vsacli.trajectory.recorded.faults import Faults, angle_wraps
 
 SAVED = math.log(4.0)
 """Required decrease of the log of the unexplained part of each column by an exchange."""
@@ -107,6 +109,9 @@ NOTABLE = 0.02
 """Deviation of a gain from 1, or ratio of an offset to the range, from which on it is reported: few models
 are better."""
 
+UNWRAP = "unwrap: true in the file of --columns"
+"""Way to read wrapped angles."""
+
 TORQUES = "tau_motor"
 """Variable whose gains show a wrong model."""
 
@@ -177,13 +182,13 @@ def _looks(size: float, gear_ratio: float) -> str | None:
 
 
 def mistaken(agreement: Agreement, gear_ratio: float) -> bool:
-    """Return whether a likely mistake explains an error: column, sign, unit, offset, or side of the gear.
+    """Return whether a mistake explains an error: column, sign, unit, offset, wraps, or side of the gear.
 
     Args:
         agreement: agreement of a column.
         gear_ratio: gear ratio of its motor; NaN without a motor, or if unknown.
     """
-    if agreement.follows is not None:
+    if agreement.follows is not None or _wraps(agreement):
         return True
     size = abs(agreement.gain)
     likely = abs(size - 1) < NEAR or _looks(size, gear_ratio) is not None
@@ -194,6 +199,11 @@ def _cause_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
     """Yield sentences on the likely cause of a signal's disagreement."""
     if not agreement.samples:
         yield f"{agreement.column} has no computed value: its joint is infeasible or singular throughout"
+        return
+    if wraps := _wraps(agreement):
+        jumps = "jumps by 2 pi" + ("" if wraps.count == 1 else f" {wraps.count} times, first")
+        when = time_text(float(agreement.time[wraps.at]))
+        yield f"{agreement.column} {jumps} at {when}, a wrapped angle: set {UNWRAP}"
         return
     if agreement.left_out:
         samples = "1 sample" if agreement.left_out == 1 else f"{agreement.left_out} samples"
@@ -215,6 +225,10 @@ def _cause_of(agreement: Agreement, gear_ratio: float) -> Iterator[str]:
     elif _gain_is_off(agreement, gear_ratio):
         yield f"{agreement.column} is {size:.4g} times as large as computed"
     yield from _offset(agreement)
+
+
+def _wraps(agreement: Agreement) -> Faults | None:
+    return angle_wraps(agreement.measured) if agreement.unit == "rad" else None
 
 
 def _gain_is_off(agreement: Agreement, gear_ratio: float) -> bool:

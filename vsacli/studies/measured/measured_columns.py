@@ -141,7 +141,9 @@ def read_recording(
         raise InputError(Problem(table.source.path, table.header.line, text) for text in problems)
     order = {name: number for number, name in enumerate(places)}
     signals = [
-        MeasuredSignal(name, places[name], table.values[:, index] * (factors[index] * places[name].gear))
+        MeasuredSignal(
+            name, places[name], _in_si_units(table.values[:, index], factors[index], places[name], mapping)
+        )
         for index, name in enumerate(names)
         if name in places
     ]
@@ -269,6 +271,23 @@ def _no_column(header: ColumnNames, places: Mapping[str, Place]) -> str:
 
 
 @np.errstate(over="ignore")  # an overflow to infinity means a missing sample
+def _in_si_units(values: FloatArray, factor: float, place: Place, mapping: ColumnMapping) -> FloatArray:
+    """Return values on the joint side of the gear, with angles unwrapped on demand."""
+    if mapping.unwrap and place.unit == "rad":
+        there = np.isfinite(values)
+        angles = np.array(values * factor)
+        angles[there] = np.unwrap(angles[there])
+        return np.asarray(angles * place.gear)
+    return np.asarray(values * (factor * place.gear))
+
+
+def nearest_turn(angles: FloatArray, others: FloatArray) -> FloatArray:
+    """Return unwrapped angles plus the whole turns that bring most of them nearest to others, (samples,)."""
+    apart = (angles - others)[np.isfinite(angles - others)]
+    turns = np.round(np.median(apart) / (2 * np.pi)) if apart.size else 0.0
+    return np.asarray(angles - 2 * np.pi * turns)
+
+
 def _elapsed(table: CsvTable, at: int, factors: Mapping[int, float], rate: float | None) -> FloatArray:
     """Return the times since the first sample, s; with a stated rate it stands in place of wrong stamps."""
     stamps = table.values[:, at]

@@ -47,6 +47,9 @@ MOTOR_WORDS = ("motor", "motors", "mot", "rotor")
 MOTORS = {"1": 1, "2": 2, "a": 1, "b": 2}
 """Last words of names that say which motor of a joint is meant."""
 
+SIDES_OF_JOINTS = {"l": 1, "left": 1, "r": 2, "right": 2}
+"""Words that may tell the motors of a joint apart if columns of both are there, and no joint has the word."""
+
 QUANTITY_WORDS = frozenset(word for words in QUANTITIES.values() for word in words)
 
 _Q, _R = ("|".join(sorted(words, key=len, reverse=True)) for words in (QUANTITY_WORDS, _ROLE_WORDS))
@@ -98,6 +101,20 @@ def motor_of(words: Sequence[str], joints: JointNames) -> tuple[int, tuple[str, 
     rest = tuple(word for at, word in enumerate(words) if at != telling[-1] and word not in MOTOR_WORDS)
     numbered = all(words[at].isdecimal() for at in telling[:-1])
     return (motor, rest) if numbered or joints.in_words(rest) else None
+
+
+def side_of(words: Sequence[str], joints: JointNames) -> tuple[int, tuple[str, ...]] | None:
+    """Return the motor that the word for a side indicates, and the other words; None without one such word.
+
+    Args:
+        words: words of the name without that for the quantity, such as `l 1 deg`.
+        joints: joint names of the robot.
+    """
+    sides = [word for word in words if word in SIDES_OF_JOINTS]
+    of_joints = {word for name in joints.names for word in words_of_column_name(name)}
+    if len(sides) != 1 or not of_joints.isdisjoint(SIDES_OF_JOINTS):
+        return None
+    return SIDES_OF_JOINTS[sides[0]], tuple(word for word in words if word != sides[0])
 
 
 class JointNames:

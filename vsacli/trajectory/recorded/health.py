@@ -286,7 +286,7 @@ def _stretch_faults(
         yield (
             wrapped.at,
             f"jumps by 2 pi {_format_occasions(wrapped, stamps)}: an angle that was wrapped? Set unwrap: true"
-            " under position in a trajectory file",
+            " under position in a trajectory file, or in the file of --columns",
         )
 
 
