@@ -22,7 +22,7 @@ from subjects import ROBOTS
 
 from vsacli import load_robot
 from vsacli.base.flags import Flag
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import choose_engine
 from vsacli.dynamics.inverse import InverseDynamics, compute_block
 
 
@@ -31,7 +31,7 @@ def compared(path: Path, samples: int) -> list[str]:
     robot = load_robot(path)
     motion = demands(robot, samples)
     by_numpy = compute_block(robot, motion).flags
-    engine = choose("c", InverseDynamics(robot), samples, threads=1).engine
+    engine = choose_engine("c", InverseDynamics(robot), samples, threads=1).engine
     by_c = compute_block(robot, motion, engine=engine).flags
     flagged, differing = np.count_nonzero(by_numpy), np.flatnonzero((by_numpy != by_c).ravel())
     bits = int(np.bitwise_or.reduce((by_numpy ^ by_c).ravel()))

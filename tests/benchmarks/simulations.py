@@ -74,7 +74,7 @@ def _from_text(run: Callable[..., Simulation]) -> None:
 def _first(run: Callable[..., Simulation]) -> float:
     """Seconds of a run that finds no compiled code."""
     with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, XDG_CACHE_HOME=folder):
-        libraries._loaded.clear()
+        libraries._loaded_libraries.clear()
         begin = time.perf_counter()
         run(engine="c")
         return time.perf_counter() - begin

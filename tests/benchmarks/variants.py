@@ -17,7 +17,7 @@ from vsacli.analysis.batch import Batch
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
 from vsacli.base.signals import POSITION
-from vsacli.compute.engine import Engine, choose
+from vsacli.compute.engine import Engine, choose_engine
 from vsacli.documents.record_values import with_numbers
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.variants import Variants
@@ -99,7 +99,7 @@ def _single(variants: Variants, trajectory: Trajectory) -> None:
 
 def _recursion(variants: Variants, inputs: list[FloatArray], engine: str) -> Callable[[], object]:
     kernel = variants.kernel(LinkTorques(variants.base))
-    chosen: Engine = choose(engine, kernel, VARIANTS * SAMPLES, 1).engine
+    chosen: Engine = choose_engine(engine, kernel, VARIANTS * SAMPLES, 1).engine
     return lambda: chosen.run(kernel, inputs)
 
 

@@ -24,7 +24,7 @@ from vsacli.actuators.laws.sinh import Sinh
 from vsacli.actuators.laws.tendons import Exponential, Quadratic
 from vsacli.analysis.run import Run
 from vsacli.base.flags import Flag
-from vsacli.compute.engine import choose, compiler
+from vsacli.compute.engine import choose_engine, compiler
 from vsacli.compute.engine.engines import Engine
 from vsacli.dynamics.deflection_rows import IntegratedRows
 from vsacli.dynamics.elastic_torques import LinkTorques, link_torques
@@ -49,18 +49,18 @@ def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compile without optimization, for code that is run on a few samples only."""
     flags = tuple("-O0" if flag == "-O2" else flag for flag in compiler.FLAGS)
     monkeypatch.setattr(compiler, "FLAGS", flags)
-    compiler._examined.cache_clear()
+    compiler._checked_compiler.cache_clear()
 
 
 def compiled(robot: Robot, threads: int = 1, frame: str | None = None) -> Engine:
-    return choose("c", InverseDynamics(robot, frame), 1, threads).engine
+    return choose_engine("c", InverseDynamics(robot, frame), 1, threads).engine
 
 
 @pytest.mark.usefixtures("quickly")
 @pytest.mark.parametrize("samples", [1, 7, 64, 3000])
 def test_rows_of_results_begin_at_whole_vectors_in_different_sets_of_a_cache(samples):
     kernel = LinkTorques(vsa_3r())
-    rows = choose("c", kernel, 1, 1).engine.run(kernel, list(np.ones((kernel.inputs, samples))))
+    rows = choose_engine("c", kernel, 1, 1).engine.run(kernel, list(np.ones((kernel.inputs, samples))))
     distances = np.diff([row.ctypes.data for row in rows])
     assert not rows.ctypes.data % 64
     assert set(distances % 128) == {64}  # lines of a cache: 64 bytes, an odd number of them apart
@@ -142,7 +142,7 @@ def test_other_branch_and_followed_deflections_agree():
     assert_agree(compute_block(turned, motion, engine=compiled(turned)), expected)
     integrated = {"phi": np.moveaxis(expected.phi, 0, -1).reshape(2, -1) * 1.001}
     kernel = InverseDynamics(turned, prescribed=(IntegratedRows(),))
-    engine = choose("c", kernel, 1, 1).engine
+    engine = choose_engine("c", kernel, 1, 1).engine
     found = block_of(kernel, motion, engine, integrated)
     assert_agree(found, block_of(kernel, motion, further=integrated))
 
@@ -189,7 +189,7 @@ def test_shorter_vectors_agree(processor: str, monkeypatch: pytest.MonkeyPatch):
     """2 lanes without, 4 with functions of math.h for vectors; any number of samples is left over."""
     flags = tuple(f"-march={processor}" if flag == compiler.NATIVE else flag for flag in compiler.FLAGS)
     monkeypatch.setattr(compiler, "FLAGS", flags)
-    compiler._examined.cache_clear()
+    compiler._checked_compiler.cache_clear()
     robot = one_joint(ALIKE, Cubic(k=440, k_c=2000))
     for samples in (SAMPLES, SAMPLES + 1, 3):
         motion = demands(robot, samples)
@@ -206,7 +206,8 @@ def test_results_depend_neither_on_blocks_nor_on_threads():
     kernel = InverseDynamics(robot)
     demanded = demands(robot, 8207)
     one, three = (
-        compute_block(robot, demanded, engine=choose("c", kernel, 1, threads).engine) for threads in (1, 3)
+        compute_block(robot, demanded, engine=choose_engine("c", kernel, 1, threads).engine)
+        for threads in (1, 3)
     )
     for name, array in one.arrays().items():
         np.testing.assert_array_equal(three.arrays()[name], array)

@@ -13,7 +13,7 @@ from vsacli import Motion, inverse_dynamics, link_torques, load_robot, load_traj
 from vsacli.base.arrays import FloatArray
 from vsacli.base.errors import InputError
 from vsacli.compute.engine import NUMBERS, NUMPY
-from vsacli.compute.engine.number_engine import MOST_SAMPLES, RECORDED_FROM, _recorded
+from vsacli.compute.engine.number_engine import MOST_SAMPLES, RECORDED_FROM, _recorded_kernel
 from vsacli.dynamics.inverse import InverseDynamics
 from vsacli.robot.model import Robot
 
@@ -44,7 +44,7 @@ def test_single_samples_are_those_of_numpy_to_the_last_bit(name: str) -> None:
     expected = NUMPY.run(kernel, rows)
     for _ in range(RECORDED_FROM):
         NUMBERS.run(kernel, [row[:1] for row in rows])
-    assert _recorded(kernel).called() is not None
+    assert _recorded_kernel(kernel).function_of_call() is not None
     found = np.concatenate(
         [NUMBERS.run(kernel, [row[start : start + 4] for row in rows]) for start in range(0, 200, 4)], axis=1
     )

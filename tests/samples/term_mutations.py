@@ -74,7 +74,7 @@ def _users_of(name: str, function: Any) -> list[Any]:
 PAIR, MATRIX = "actuators.pairs.pair_springs:PairSprings", "actuators.elasticity:MotorMatrix"
 BETA = f"{PAIR}.motor_accelerations"
 CURVATURE = f"{PAIR}.stiffness_curvature"
-DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:shaft_torques"
+DRIVE, TORQUES = "dynamics.drive:drive_without_limits", "dynamics.drive:shaft_torques"
 FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.motor:Windings.variables"
 RATIO, STATE = (
     "actuators.mechanisms.ratios.ratio:ratio_partials",
@@ -150,22 +150,22 @@ MUTATIONS = (
         "B_12 theta_k''",
         "serial",
         "dynamics.drive:_rotor_torques",
-        "uncoupled + coupling",
-        "uncoupled + 1.01 * coupling",
+        "own_torques + coupling",
+        "own_torques + 1.01 * coupling",
     ),
     Mutation(
         "B_12 theta_k'', sign",
         "serial",
         "dynamics.drive:_rotor_torques",
-        "uncoupled + coup",
-        "uncoupled - coup",
+        "own_torques + coup",
+        "own_torques - coup",
     ),
     Mutation(
         "spring between the motors",
         "pair",
         f"{PAIR}.tau_transmission",
-        "tau + between",
-        "tau + 1.01 * between",
+        "tau + coupling_torque",
+        "tau + 1.01 * coupling_torque",
     ),
     Mutation("motor friction", "pair", TORQUES, "+ friction.torque", "+ 1.01 * friction.torque"),
     Mutation("motor friction, sign", "pair", TORQUES, "+ friction.torque", "- friction.torque"),
@@ -175,7 +175,7 @@ MUTATIONS = (
     Mutation(
         "friction direction",
         "pair",
-        f"{FRICTION}._size",
+        f"{FRICTION}._coulomb_friction",
         "self.backward, self.forward",
         "self.forward, self.backward",
     ),
@@ -189,8 +189,8 @@ MUTATIONS = (
         "motor power",
         "pair",
         DRIVE,
-        "tau_motor * transmitted.dtheta",
-        "1.01 * tau_motor * transmitted.dtheta",
+        "tau_motor * transmission.dtheta",
+        "1.01 * tau_motor * transmission.dtheta",
     ),
     Mutation(
         "dissipated power, joint",
@@ -210,8 +210,8 @@ MUTATIONS = (
         "friction between links",
         "pair",
         "dynamics.dry_friction:joint_friction",
-        "tau=mul(size, tanh)",
-        "tau=mul(size, tanh * 1.01)",
+        "tau=mul(coulomb, tanh)",
+        "tau=mul(coulomb, tanh * 1.01)",
     ),
     Mutation(
         "damper between links",

@@ -52,8 +52,8 @@ class PairSprings(ElasticState):
         """Torque of each spring, and of the coupling, which acts on the motors in opposite directions."""
         if self._coupling is None:
             return self._one.tau, self._two.tau
-        (between,) = self._coupling(0)
-        return self._one.tau + between, self._two.tau - between
+        (coupling_torque,) = self._coupling(0)
+        return self._one.tau + coupling_torque, self._two.tau - coupling_torque
 
     @cached_property
     def matrix(self) -> MotorMatrix:
@@ -78,11 +78,11 @@ class PairSprings(ElasticState):
 
     def transmission_rates(self, rates: Components) -> tuple[FloatArray, FloatArray]:
         """Return sigma_k phi_k' of each side, with the rate of the coupling."""
-        of_one, of_two = self._one.sigma * rates[0], self._two.sigma * rates[1]
+        rate_1, rate_2 = self._one.sigma * rates[0], self._two.sigma * rates[1]
         if self._coupling is None:
-            return of_one, of_two
-        between = self._coupling(1)[1] * (rates[0] - rates[1])
-        return of_one + between, of_two - between
+            return rate_1, rate_2
+        coupling_rate = self._coupling(1)[1] * (rates[0] - rates[1])
+        return rate_1 + coupling_rate, rate_2 - coupling_rate
 
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, _dq: FloatArray) -> tuple[FloatArray, ...]:
         """Return A^-1 (tau_e', sigma'), (68)."""
@@ -112,19 +112,19 @@ class PairElasticity(Elasticity):
         tau_e = tau[..., 0] + tau[..., 1]
         if self._coupling is None:
             return SpringTorques(tau_e, tau)
-        between = self._coupling.torque(phi[..., 0] - phi[..., 1])
-        return SpringTorques(tau_e, tau + np.stack((between, -between), axis=-1))
+        coupling_torque = self._coupling.torque(phi[..., 0] - phi[..., 1])
+        return SpringTorques(tau_e, tau + np.stack((coupling_torque, -coupling_torque), axis=-1))
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the sum over all springs."""
-        of_side = self._springs.energy(phi)
-        energy = of_side[..., 0] + of_side[..., 1]
+        spring_energies = self._springs.energy(phi)
+        energy = spring_energies[..., 0] + spring_energies[..., 1]
         return energy if self._coupling is None else energy + self._coupling.energy(phi[..., 0] - phi[..., 1])
 
     def state(self, phi: FloatArray) -> ElasticState:
         """Return the springs with their derivatives."""
         springs = self._springs.state(phi)
         one, two = (SpringState(*(values[..., side] for values in springs)) for side in range(2))
-        law, apart = self._coupling, phi[..., 0] - phi[..., 1]
-        coupling = None if law is None else partial(law.derivatives, apart)
+        law, coupling_deflection = self._coupling, phi[..., 0] - phi[..., 1]
+        coupling = None if law is None else partial(law.derivatives, coupling_deflection)
         return PairSprings(one, two, partial(self.energy, phi), coupling)

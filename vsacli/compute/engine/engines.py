@@ -76,9 +76,11 @@ class NumPyEngine:
         keep_freed_memory()
         outputs = np.empty((kernel.outputs, len(rows[0])))
         with subnormals_as_zero():
-            for part in passes(rows):
-                for output, row in zip(outputs, kernel([row[part] for row in rows]), strict=True):
-                    output[part] = row
+            for pass_slice in passes(rows):
+                for output, result in zip(
+                    outputs, kernel([result[pass_slice] for result in rows]), strict=True
+                ):
+                    output[pass_slice] = result
         return outputs
 
 
@@ -112,8 +114,10 @@ class TracedEngine:
             self._workspaces[function] = function.workspace(samples_per_pass(len(rows)))
         outputs = np.empty((kernel.outputs, len(rows[0])))
         with subnormals_as_zero():
-            for part in passes(rows):
-                function([row[part] for row in rows], outputs[:, part], self._workspaces[function])
+            for pass_slice in passes(rows):
+                function(
+                    [row[pass_slice] for row in rows], outputs[:, pass_slice], self._workspaces[function]
+                )
         return outputs
 
 

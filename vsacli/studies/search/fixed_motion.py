@@ -14,7 +14,7 @@ from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.signals import STIFFNESS
 from vsacli.compute.duals import Dual
-from vsacli.dynamics.drive import driven_by
+from vsacli.dynamics.drive import drive_without_limits
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Range
@@ -95,7 +95,7 @@ class FixedMotion:
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
         joint = carrying if isinstance(rows[0], Dual) else plain
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
-            return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
+            return drive_without_limits(joint, load._replace(commanded=commanded), MIN_MARGIN)
 
     def costs_of_constants(self, constants: FloatArray, instants: IndexArray) -> FloatArray:
         """Return the cost of each constant, (constants,); infinite if a motor exceeds a limit."""

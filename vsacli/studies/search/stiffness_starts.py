@@ -8,7 +8,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.compute.duals import Dual
-from vsacli.dynamics.losses import trapezoidal
+from vsacli.dynamics.losses import trapezoidal_weights
 from vsacli.studies.search.acceptance import Range
 from vsacli.studies.search.interior_point import minimize
 from vsacli.studies.search.separable import Group, SeparableProblem, interior
@@ -72,7 +72,7 @@ def nearest_profile(
         instants=np.arange(len(time)),
         basis=basis[None],
         unknowns=np.arange(basis.shape[1]),
-        weights=trapezoidal(time)[None] / (time[-1] - time[0]),
+        weights=trapezoidal_weights(time)[None] / (time[-1] - time[0]),
         there=np.isfinite(np.stack(within)),
         scales=np.array([size]),
     )
