@@ -42,8 +42,8 @@ CASES = {
 def test_results_do_not_depend_on_the_division_into_blocks(monkeypatch, case):
     conditions = CASES[case]
     whole = simulate(vsa_3r(), short_motion(3), engine="numpy", **conditions)
-    monkeypatch.setattr(history, "BLOCK", 7)
-    monkeypatch.setattr(sensors, "DRAWN", 5)
+    monkeypatch.setattr(history, "BLOCK_SAMPLES", 7)
+    monkeypatch.setattr(sensors, "NOISE_BLOCK", 5)
     run = SimulationRun(vsa_3r(), short_motion(3), engine="numpy", **conditions)
     blocks = list(run)
     assert len(blocks) == len(whole.history.time) == 1 or len(blocks) >= 5
@@ -54,7 +54,7 @@ def test_results_do_not_depend_on_the_division_into_blocks(monkeypatch, case):
 
 
 def test_an_early_end_is_in_the_last_block_alone(monkeypatch):
-    monkeypatch.setattr(history, "BLOCK", 7)
+    monkeypatch.setattr(history, "BLOCK_SAMPLES", 7)
     stiff = short_motion(3, stiffness=(1100, 200))  # below what the load allows, from a time on
     run = SimulationRun(vsa_3r(), stiff, engine="numpy")
     *others, last = list(run)
@@ -65,7 +65,7 @@ def test_an_early_end_is_in_the_last_block_alone(monkeypatch):
 
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_duration(monkeypatch):
-    monkeypatch.setattr(history, "BLOCK", 512)
+    monkeypatch.setattr(history, "BLOCK_SAMPLES", 512)
 
     def peak(duration: float) -> int:
         motion = short_motion(3, duration=duration, rate=4000)

@@ -190,9 +190,9 @@ class Actuator(SpringAssembly, ABC):
         """Return the springs with their derivatives at unknowns and joint positions, one array for each."""
         raise NotImplementedError(f"{type(self).__name__} has no springs")
 
-    def springs_of(self, of_joint: JointVariables) -> ElasticState:
+    def springs_of(self, variables: JointVariables) -> ElasticState:
         """Return the springs with their derivatives from the motion of joint and motors."""
-        return self.springs(self.unknowns(of_joint.phi, of_joint.theta), of_joint.q)
+        return self.springs(self.unknowns(variables.phi, variables.theta), variables.q)
 
     @property
     def spring_group(self) -> Hashable:

@@ -184,8 +184,8 @@ class Drivetrain:
         """Return the torques of the springs: on links, (..., joints), and against motors, (..., springs)."""
         parts = [elasticity.torques(coordinates) for elasticity, coordinates in self.at(q, theta)]
         return SpringTorques(
-            self.by_joint([part.tau_e for part in parts], q),
-            self.of_springs([part.tau_transmission for part in parts], theta),
+            self.by_joint([group_torques.tau_e for group_torques in parts], q),
+            self.of_springs([group_torques.tau_transmission for group_torques in parts], theta),
         )
 
     def energy(self, q: FloatArray, theta: FloatArray) -> FloatArray:
@@ -275,34 +275,45 @@ class DrivetrainState:
         drivetrain: Drivetrain,
         q: FloatArray,
         theta: FloatArray,
-        parts: Sequence[tuple[ElasticState, Components]],
+        states_and_rates: Sequence[tuple[ElasticState, Components]],
     ) -> None:
-        self._drivetrain, self._q, self._theta, self._parts = drivetrain, q, theta, parts
+        self._drivetrain, self._q, self._theta, self._states_and_rates = (
+            drivetrain,
+            q,
+            theta,
+            states_and_rates,
+        )
 
     @property
     def tau_e(self) -> FloatArray:
         """Elastic torque (6)."""
-        return self._drivetrain.by_joint([part.tau_e for part, _ in self._parts], self._q)
+        return self._drivetrain.by_joint([state.tau_e for state, _ in self._states_and_rates], self._q)
 
     @property
     def dtau_e(self) -> FloatArray:
         """Rate of the elastic torque (17)."""
-        return self._drivetrain.by_joint([part.torque_rate(rates) for part, rates in self._parts], self._q)
+        return self._drivetrain.by_joint(
+            [state.torque_rate(rates) for state, rates in self._states_and_rates], self._q
+        )
 
     @property
     def stiffness(self) -> FloatArray:
         """Stiffness of the joints (11)."""
-        return self._drivetrain.by_joint([part.stiffness for part, _ in self._parts], self._q)
+        return self._drivetrain.by_joint([state.stiffness for state, _ in self._states_and_rates], self._q)
 
     @property
     def dstiffness(self) -> FloatArray:
         """Rate of the stiffness (18)."""
-        return self._drivetrain.by_joint([part.stiffness_rate(rates) for part, rates in self._parts], self._q)
+        return self._drivetrain.by_joint(
+            [state.stiffness_rate(rates) for state, rates in self._states_and_rates], self._q
+        )
 
     @property
     def tau_transmission(self) -> FloatArray:
         """Torque against each motor (62)."""
-        return self._drivetrain.by_motor([part.tau_transmission for part, _ in self._parts], self._theta)
+        return self._drivetrain.by_motor(
+            [state.tau_transmission for state, _ in self._states_and_rates], self._theta
+        )
 
     def motor_accelerations(
         self, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
@@ -315,8 +326,8 @@ class DrivetrainState:
             ddstiffness: Second derivative of the stiffness; ignored where it is not commanded.
         """
         demands = zip(*map(self._drivetrain.of_groups, (ddq, ddtau_e, ddstiffness)), strict=True)
-        parts = [
-            part.motor_accelerations(rates, *demand)
-            for (part, rates), demand in zip(self._parts, demands, strict=True)
+        accelerations = [
+            state.motor_accelerations(rates, *demand)
+            for (state, rates), demand in zip(self._states_and_rates, demands, strict=True)
         ]
-        return self._drivetrain.by_motor(parts, self._theta)
+        return self._drivetrain.by_motor(accelerations, self._theta)

@@ -49,22 +49,22 @@ class LimitCheck(NamedTuple):
         """Return the unit of the variable at a joint of this type."""
         return VARIABLES[self.variable].quantity.unit(joint_type)
 
-    def values(self, of_joint: VariablesOfJoint) -> FloatArray:
+    def values(self, variables: VariablesOfJoint) -> FloatArray:
         """Return the bounded values, (samples,), from the variables of the joint."""
-        rows = of_joint[self.variable]
+        rows = variables[self.variable]
         return rows if self.motor is None else rows[self.motor - 1]
 
-    def flags(self, of_joint: VariablesOfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
+    def flags(self, variables: VariablesOfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
         """Return the bit where values leave the range by more than rounding and an allowance; not at NaN."""
-        return marked(self.flag, self.outside(self.values(of_joint)) > self.tolerance + allowance)
+        return marked(self.flag, self.outside(self.values(variables)) > self.tolerance + allowance)
 
-    def allowance(self, of_joint: VariablesOfJoint) -> FloatArray | float:
+    def allowance(self, variables: VariablesOfJoint) -> FloatArray | float:
         """Return the excess that uncertain values are allowed, (samples,); 0 without standard deviations.
 
         It is twice the standard deviation, but at most 1 % of the range, or of the bound if there is only
         one; zero for a bit that marks infeasible samples instead of an exceeded limit.
         """
-        deviations = of_joint.get(deviation(self.variable))
+        deviations = variables.get(deviation(self.variable))
         if deviations is None:
             return 0.0
         deviation_of_motor = deviations if self.motor is None else deviations[self.motor - 1]
@@ -78,9 +78,9 @@ class LimitCheck(NamedTuple):
         width = self.range[1] - self.range[0]
         return LARGEST_ALLOWANCE * (width if np.isfinite(width) else self.largest)
 
-    def clearance(self, of_joint: VariablesOfJoint) -> FloatArray:
+    def clearance(self, variables: VariablesOfJoint) -> FloatArray:
         """Return the distance to the nearer bound relative to the larger one; negative outside the range."""
-        return self.outside(self.values(of_joint)) / -(self.largest or 1.0)
+        return self.outside(self.values(variables)) / -(self.largest or 1.0)
 
     @property
     def tolerance(self) -> float:

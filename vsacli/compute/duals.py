@@ -309,9 +309,11 @@ def _joining_function(function: Callable[..., Any]) -> Callable[..., Dual]:
 
 def _tangents_by_direction(arrays: Sequence[Any]) -> Iterator[tuple[int, list[Any]]]:
     """Yield each direction in which one of several arrays has a tangent, with those of all of them."""
-    tangents = [tangents_of(each) for each in arrays]
-    for direction in dict.fromkeys(tangent_direction for each in tangents for tangent_direction in each):
-        yield direction, [each.get(direction, 0.0) for each in tangents]
+    tangents = [tangents_of(array_tangents) for array_tangents in arrays]
+    for direction in dict.fromkeys(
+        tangent_direction for array_tangents in tangents for tangent_direction in array_tangents
+    ):
+        yield direction, [array_tangents.get(direction, 0.0) for array_tangents in tangents]
 
 
 def _broadcast_dual(array: Dual, shape: tuple[int, ...]) -> Dual:

@@ -53,19 +53,19 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
     ]
 
 
-def parallel_damper_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
+def parallel_damper_torques(joint: Joint, variables: JointVariables) -> tuple[FloatArray, FloatArray]:
     """Return the torque of a parallel damper on the motors of a joint, and its rate, each (2, samples)."""
     damping, ddamping, dphi, ddtheta = (
-        of_joint.damping,
-        of_joint.ddamping,
-        of_joint.dphi,
-        of_joint.ddtheta,
+        variables.damping,
+        variables.ddamping,
+        variables.dphi,
+        variables.ddtheta,
     )
     torque, rate = np.zeros_like(dphi), np.zeros_like(dphi)
     for motor, has_spring in enumerate(joint.actuator.has_columns(VARIABLES["phi"])):
         if has_spring:
             torque[motor] = damping * dphi[motor]
-            rate[motor] = ddamping * dphi[motor] + damping * (ddtheta[motor] - of_joint.ddq)
+            rate[motor] = ddamping * dphi[motor] + damping * (ddtheta[motor] - variables.ddq)
     return torque, rate
 
 

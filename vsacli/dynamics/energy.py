@@ -246,7 +246,9 @@ class IntervalEnergy(RobotKernel):
         flows = []
         for index, joint in enumerate(joints):
             inertia = tuple(motor.inertia for motor in joint.actuator.motors)
-            ends = [{name: of_joints[index] for name, of_joints in end.items()} for end in both_ends]
+            ends = [
+                {name: pairs_of_joints[index] for name, pairs_of_joints in end.items()} for end in both_ends
+            ]
             constants = inertia, joint.actuator.coupled_rotors
             flows.append(call(interval, _joint_flow, *constants, interval, ends, friction[index]))
         works, spent, joint_efforts = zip(*flows, strict=True)
@@ -339,7 +341,8 @@ class RunEnergy:
         meters_and_blocks = zip(self._losses, block.divided(len(self._losses)), strict=True)
         lost = [meter.add(block_of_variant) for meter, block_of_variant in meters_and_blocks]
         friction, dissipated, copper = (
-            [part for part in parts_of_kind if part is not None] for parts_of_kind in zip(*lost, strict=True)
+            [block_part for block_part in parts_of_kind if block_part is not None]
+            for parts_of_kind in zip(*lost, strict=True)
         )
         heat = np.stack(copper, axis=-2) if copper else None
         return LostEnergy(np.stack(friction, axis=-2), np.stack(dissipated, axis=-2), heat)

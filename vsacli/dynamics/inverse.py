@@ -133,13 +133,13 @@ class InverseDynamics(RobotKernel):
         of_joints: list[JointVariables] = call_at_joints(  # (61)-(74)
             rows[0], drive, joints, drive_arguments, keys=limits
         )
-        for joint, of_joint in zip(joints, of_joints, strict=True):
-            _check_limits(joint, of_joint)
+        for joint, variables in zip(joints, of_joints, strict=True):
+            _check_limits(joint, variables)
         if "dissipated_power" in self.results.shapes:
             powers = call_at_joints(rows[0], dissipated_power, joints, zip(of_joints, strict=True))
             of_joints = [
-                of_joint._replace(dissipated_power=power)
-                for of_joint, power in zip(of_joints, powers, strict=True)
+                variables._replace(dissipated_power=power)
+                for variables, power in zip(of_joints, powers, strict=True)
             ]
         return of_joints
 
@@ -150,11 +150,11 @@ class InverseDynamics(RobotKernel):
         return next((candidate for candidate in candidates if candidate is not None), None)
 
     def result_rows(
-        self, rows: Sequence[Scalar], of_joints: Sequence[JointVariables]
+        self, rows: Sequence[Scalar], joint_variables: Sequence[JointVariables]
     ) -> dict[str, Iterable[Any]]:
         """Return the rows of each result by name, from the input rows and the variables of the joints."""
-        absent_rows = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0].dtheta, np.nan)}
-        joint_arrays = [of_joint.by_name() for of_joint in of_joints]
+        absent_rows = {1: np.full_like(rows[0], np.nan), 2: np.full_like(joint_variables[0].dtheta, np.nan)}
+        joint_arrays = [variables.by_name() for variables in joint_variables]
         return {
             name: rows_of_joints(
                 [arrays.get(name, absent_rows[len(VARIABLES[name].dims)]) for arrays in joint_arrays]
@@ -163,9 +163,9 @@ class InverseDynamics(RobotKernel):
         }
 
 
-def _check_limits(joint: Joint, of_joint: JointVariables) -> None:
+def _check_limits(joint: Joint, variables: JointVariables) -> None:
     """Raise NotImplementedError for a limit on a variable that the joint lacks; it would go unchecked."""
-    arrays = of_joint.by_name()
+    arrays = variables.by_name()
     for check in limit_checks(joint):
         if check.variable not in arrays:
             raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
@@ -325,9 +325,9 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
     return motions
 
 
-def rows_of_joints(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
+def rows_of_joints(arrays: Iterable[FloatArray]) -> Iterator[FloatArray]:
     """Yield the rows (samples,) of arrays of the joints, each (samples,) or (2, samples)."""
-    for array in of_joints:
+    for array in arrays:
         yield from array if array.ndim > 1 else [array]
 
 

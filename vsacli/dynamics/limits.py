@@ -36,27 +36,27 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
     return [check for check in checks if check.exists]
 
 
-def limit_flags(joint: Joint, of_joint: VariablesOfJoint, flags: FlagArray) -> FlagArray:
+def limit_flags(joint: Joint, variables: VariablesOfJoint, flags: FlagArray) -> FlagArray:
     """Return `flags`, (samples,), with the bits of all limits on variables that are given.
 
     Where the standard deviation of a variable is given, its limit is exceeded only beyond the allowance.
     """
     for check in limit_checks(joint):
-        if check.variable in of_joint:
-            flags = flags | check.flags(of_joint, check.allowance(of_joint))
+        if check.variable in variables:
+            flags = flags | check.flags(variables, check.allowance(variables))
     return flags
 
 
-def undecided_samples(joint: Joint, of_joint: VariablesOfJoint) -> BoolArray:
+def undecided_samples(joint: Joint, variables: VariablesOfJoint) -> BoolArray:
     """Return the samples at which standard deviations decide whether limits are exceeded, (samples,).
 
     A value is beyond a limit there, but none by more than the largest allowance.
     """
-    beyond, too_far = np.zeros((2, len(of_joint["flags"])), dtype=FLAG_TYPE)
+    beyond, too_far = np.zeros((2, len(variables["flags"])), dtype=FLAG_TYPE)
     for check in limit_checks(joint):
-        if check.variable in of_joint:
-            beyond |= check.flags(of_joint)
-            too_far |= check.flags(of_joint, check.largest_allowance)
+        if check.variable in variables:
+            beyond |= check.flags(variables)
+            too_far |= check.flags(variables, check.largest_allowance)
     undecided: BoolArray = (beyond != 0) & (too_far == 0)
     return undecided
 
@@ -193,7 +193,7 @@ class Finding(Stored):
 def worst_excess(
     joint: Joint,
     check: LimitCheck,
-    of_joint: VariablesOfJoint,
+    variables: VariablesOfJoint,
     time: FloatArray,
     beyond: BoolArray,
     *,
@@ -204,12 +204,12 @@ def worst_excess(
     Args:
         joint: Joint with the limit.
         check: Limit.
-        of_joint: Variables of the joint, by name.
+        variables: Variables of the joint, by name.
         time: Times of the samples, (samples,).
         beyond: Mask of the samples to compare, (samples,).
         between: Whether the times lie between samples.
     """
-    values = check.values(of_joint)
+    values = check.values(variables)
     outside = np.nan_to_num(check.outside(values), nan=-np.inf)
     beyond = beyond & (outside > check.tolerance)
     if not beyond.any():

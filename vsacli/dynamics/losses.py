@@ -200,8 +200,8 @@ class LossMeter:
         dissipated += _friction_work(self._joint_friction, intervals, *joint_motion)
         for index, joint in enumerate(self._robot.joints):
             if joint.damper is not None:
-                of_joint = {name: rows[name][index] for name in self._names if name != "time"}
-                dissipated[index] += _damper_work(joint, intervals, of_joint)
+                variables = {name: rows[name][index] for name in self._names if name != "time"}
+                dissipated[index] += _damper_work(joint, intervals, variables)
         heat = rows.get("copper_loss")
         return LostEnergy(
             motor_friction, dissipated, None if heat is None else trapezoidal_integrals(intervals, heat)
@@ -218,10 +218,10 @@ def _damping_work(
     return damping[..., None] * integrals(intervals, velocity * velocity, 2 * velocity * acceleration)
 
 
-def _damper_work(joint: Joint, intervals: FloatArray, of_joint: Mapping[str, FloatArray]) -> FloatArray:
-    damping, d_damping, dq, ddq = (of_joint[name] for name in ("damping", "ddamping", "dq", "ddq"))
-    velocities = damper_velocities(joint, dq, of_joint["dphi"])
-    accelerations = damper_velocities(joint, ddq, of_joint["ddtheta"] - ddq)
+def _damper_work(joint: Joint, intervals: FloatArray, variables: Mapping[str, FloatArray]) -> FloatArray:
+    damping, d_damping, dq, ddq = (variables[name] for name in ("damping", "ddamping", "dq", "ddq"))
+    velocities = damper_velocities(joint, dq, variables["dphi"])
+    accelerations = damper_velocities(joint, ddq, variables["ddtheta"] - ddq)
     work = np.zeros_like(intervals)
     for velocity, acceleration in zip(velocities, accelerations, strict=True):
         rate = (d_damping * velocity + 2 * damping * acceleration) * velocity

@@ -211,8 +211,8 @@ def deviations_of_joint(
         for signal, covariance in covariances.items()
     }
     computed = _propagate(variables, motion, estimates, covariances, components)
-    of_joints = {signal: array for signal, array in covariances.items() if not signal.is_wrench}
-    of_signals = _signal_deviations(robot, estimates, of_joints)
+    joint_covariances = {signal: array for signal, array in covariances.items() if not signal.is_wrench}
+    of_signals = _signal_deviations(robot, estimates, joint_covariances)
     return Deviations(
         {**of_joint(computed.deviations, 0), **of_joint(of_signals.deviations, index)},
         {

@@ -194,8 +194,8 @@ def wrong_rows(table: CsvTable) -> Iterator[Problem]:
     deflection, path = table.values[:, 0], table.source.path
     if len(deflection) < MIN_ROWS:
         yield Problem(path, 0, f"expected at least {MIN_ROWS} rows, found {len(deflection)}")
-    elif sizes := list(_unusable_values(table)):
-        yield from sizes
+    elif problems := list(_unusable_values(table)):
+        yield from problems
     elif (steps := np.flatnonzero(np.diff(deflection) <= 0)).size:
         message = "the deflection does not increase from the row before"
         yield Problem(path, table.line_of(steps[0] + 1), message)

@@ -93,9 +93,9 @@ class CriticalCurve(NamedTuple):
         """Preload torque."""
         return (self.tau_1 - self.tau_2) / 2
 
-    def take(self, chosen: slice | IndexArray) -> CriticalCurve:
+    def take(self, points: slice | IndexArray) -> CriticalCurve:
         """Return a selection of the points."""
-        return CriticalCurve(*(values[chosen] for values in self))
+        return CriticalCurve(*(values[points] for values in self))
 
 
 class _Matches(NamedTuple):

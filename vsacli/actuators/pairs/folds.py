@@ -334,16 +334,20 @@ def _limit_slope(slope: FloatArray, chord: FloatArray) -> FloatArray:
 def _map_with_nodes(points: FoldPoints, node_indices: IndexArray) -> FoldMap:
     """Return the map with nodes at some of the points."""
     connected = np.flatnonzero(points.last[node_indices[1:]] == points.last[node_indices[:-1]])
-    before, after = np.full((2, 2, node_indices.size), np.nan)
+    slope_before, slope_after = np.full((2, 2, node_indices.size), np.nan)
     for side in range(2):
         cells = node_indices[connected], node_indices[connected + 1]
-        after[side, connected], before[side, connected + 1] = _slopes(points, side, *cells)
-    slope = np.where(np.isnan(before) | (np.abs(after) < np.abs(before)), after, before)
+        slope_after[side, connected], slope_before[side, connected + 1] = _slopes(points, side, *cells)
+    slope = np.where(
+        np.isnan(slope_before) | (np.abs(slope_after) < np.abs(slope_before)), slope_after, slope_before
+    )
     single_slope = round_to_single(slope)
     nodes = np.stack(
         (points.tau_e[node_indices], *points.phi[:, node_indices], *single_slope, points.cusp[node_indices])
     )
-    bend = np.abs(after[:, 1:] - before[:, :-1]).sum(axis=0) / np.abs(after[:, 1:]).sum(axis=0)
+    bend = np.abs(slope_after[:, 1:] - slope_before[:, :-1]).sum(axis=0) / np.abs(slope_after[:, 1:]).sum(
+        axis=0
+    )
     is_repeated = (nodes[:3, 1:] == nodes[:3, :-1]).all(axis=0) & (bend <= SAME_SLOPE_RTOL)
     return FoldMap(*np.delete(nodes, np.flatnonzero(is_repeated), axis=1))
 

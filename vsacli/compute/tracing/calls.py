@@ -153,9 +153,9 @@ def share_bodies(programs: Sequence[Program]) -> list[SharedBody]:
         groups[body.shape].append(index)
     shared: dict[int, SharedBody] = {}
     for members in groups.values():
-        common, places = _common_body(programs[members[0]], [bodies[index].constants for index in members])
+        common, paths = _common_body(programs[members[0]], [bodies[index].constants for index in members])
         for index in members:
-            shared[index] = SharedBody(common, [bodies[index].constants[place] for place in places])
+            shared[index] = SharedBody(common, [bodies[index].constants[path] for path in paths])
     return [shared[index] for index in range(len(programs))]
 
 

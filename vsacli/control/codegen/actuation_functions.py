@@ -68,7 +68,7 @@ class JointFunctions(NamedTuple):
     constants: list[list[float]]
 
 
-def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> JointFunctions | None:
+def actuation(robot: Robot, inverse: Function, free_parameters: Sequence[Parameter]) -> JointFunctions | None:
     """Return the functions of the actuation of the joints; None for one joint, or if the loop does not pay.
 
     It does not where springs are solved by iteration, which takes most of the time, where a damped
@@ -77,7 +77,7 @@ def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> J
     Args:
         robot: Robot.
         inverse: Its inverse dynamics.
-        chosen: Parameters that are an argument.
+        free_parameters: Parameters that are an argument.
     """
     damped = any(joint.damper_at("transmission") for joint in robot.joints)
     sprung = any(joint.actuator.sprung for joint in robot.joints)
@@ -85,7 +85,7 @@ def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> J
     if not (fits_loop and sprung) or damped or not _is_straight(inverse.program):
         return None
     makers = (partial(_joint_function, index=index) for index in range(len(robot.joints)))
-    functions = [with_parameters(make, robot, None, chosen) for make in makers]
+    functions = [with_parameters(make, robot, None, free_parameters) for make in makers]
     bodies = share_bodies([function.program for function in functions])
     shared_bodies = {id(body.program): body for body in bodies}
     function_indices = {identity: number for number, identity in enumerate(shared_bodies)}

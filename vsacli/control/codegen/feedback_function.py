@@ -202,7 +202,7 @@ class _Law:
 
     def _joint_flags(self, index: int, values: Arrays, singular: Any) -> Any:
         """Return the flags of a joint: torque undefined, or a limit exceeded by state or torque."""
-        joint, of_joint = self._robot.joints[index], {name: array[index] for name, array in values.items()}
-        exists = finite(of_joint["tau_motor"][: joint.actuator.motor_count])
+        joint, variables = self._robot.joints[index], {name: array[index] for name, array in values.items()}
+        exists = finite(variables["tau_motor"][: joint.actuator.motor_count])
         flags = marked(Flag.SINGULAR, singular) | not_finite_flags(~(exists | singular))
-        return limit_flags(joint, of_joint, flags)
+        return limit_flags(joint, variables, flags)

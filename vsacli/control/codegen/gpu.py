@@ -80,7 +80,7 @@ def gpu_files(
     precision: str,
     about: str,
     frame: WrenchFrame | None,
-    chosen: Sequence[Parameter],
+    free_parameters: Sequence[Parameter],
 ) -> dict[str, str]:
     """Return the texts of the files for a GPU, by file name.
 
@@ -91,17 +91,17 @@ def gpu_files(
         precision: One of `vsacli.control.codegen.scalar.PRECISIONS`.
         about: Text of the comment at the beginning.
         frame: Frame of the wrench that the functions have as an argument; None without one.
-        chosen: Parameters that they have as an argument.
+        free_parameters: Parameters that they have as an argument.
     """
 
     def make_function(make: Maker) -> Function:
-        return with_parameters(make, robot, frame, chosen)
+        return with_parameters(make, robot, frame, free_parameters)
 
     code, by_name = DeviceCode(), {function.name: function for function in functions}
     for function in functions:
         if not isinstance(function, Step):
             code.kernels[function.name] = evaluation_kernel(prefix, function)
-    joint_functions = actuation(robot, by_name["inverse_dynamics"], chosen)
+    joint_functions = actuation(robot, by_name["inverse_dynamics"], free_parameters)
     if joint_functions is not None:
         _add_actuation(code, prefix, by_name, joint_functions, scalar_dialect(precision))
     law, step = by_name.get("feedback_linearization"), by_name.get("step")

@@ -120,14 +120,14 @@ def _function_switch(prefix: str, actuation: JointFunctions, result: str) -> Ite
 
 def actuation_tables(prefix: str, actuation: JointFunctions, dialect: Dialect) -> Iterator[str]:
     """Yield the tables of the structure of each joint, and of the constants of each structure."""
-    of_joint = actuation.of_joint
-    constant_rows = [of_joint[:joint].count(index) for joint, index in enumerate(of_joint)]
-    for name, indices in (("structure_of", of_joint), ("constants_of", constant_rows)):
+    function_of_joint = actuation.of_joint
+    constant_rows = [function_of_joint[:joint].count(index) for joint, index in enumerate(function_of_joint)]
+    for name, indices in (("structure_of", function_of_joint), ("constants_of", constant_rows)):
         yield f"__constant__ const int {name}[] = {{{', '.join(map(str, indices))}}};"
     for index, function in enumerate(actuation.functions):
         members = [
             actuation.constants[joint]
-            for joint, joint_function in enumerate(of_joint)
+            for joint, joint_function in enumerate(function_of_joint)
             if joint_function == index
         ]
         if members[0]:

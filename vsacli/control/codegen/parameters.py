@@ -20,11 +20,16 @@ Maker = Callable[[Robot, WrenchFrame | None], Function]
 PARAMETERS = "parameters"
 
 
-def parameters_structure(chosen: Sequence[Parameter]) -> Structure:
+def parameters_structure(free_parameters: Sequence[Parameter]) -> Structure:
     """Return the structure of the argument, with a member for each parameter, named by its path."""
     meaning = "Parameters of the robot, by their paths in its file; the functions do not check them."
-    arrays = (Array("_".join(parameter.by_index), (), _parameter_meaning(parameter)) for parameter in chosen)
-    return Structure(PARAMETERS, meaning, tuple(arrays), tuple(parameter.value for parameter in chosen))
+    arrays = (
+        Array("_".join(parameter.by_index), (), _parameter_meaning(parameter))
+        for parameter in free_parameters
+    )
+    return Structure(
+        PARAMETERS, meaning, tuple(arrays), tuple(parameter.value for parameter in free_parameters)
+    )
 
 
 def _parameter_meaning(parameter: Parameter) -> str:
@@ -33,7 +38,7 @@ def _parameter_meaning(parameter: Parameter) -> str:
 
 
 def with_parameters(
-    make: Maker, robot: Robot, frame: WrenchFrame | None, chosen: Sequence[Parameter]
+    make: Maker, robot: Robot, frame: WrenchFrame | None, free_parameters: Sequence[Parameter]
 ) -> Function:
     """Return the function with chosen parameters as an argument, or without if it depends on none of them.
 
@@ -43,12 +48,12 @@ def with_parameters(
         NotImplementedError: a condition in the code depends on one of the parameters.
     """
     constant_function = make(robot, frame)
-    if not chosen:
+    if not free_parameters:
         return constant_function
 
     def compute(rows: Rows) -> Rows:
-        inputs, values = rows[: -len(chosen)], rows[-len(chosen) :]
-        varied_robot = with_numbers(robot, chosen, [row[0] for row in values])
+        inputs, values = rows[: -len(free_parameters)], rows[-len(free_parameters) :]
+        varied_robot = with_numbers(robot, free_parameters, [row[0] for row in values])
         try:
             return make(varied_robot, frame).compute(inputs)
         except InputError:
@@ -56,9 +61,12 @@ def with_parameters(
         except (AttributeError, TypeError, ValueError) as error:  # arrays of numbers hold no symbols
             raise NotImplementedError(f"a parameter goes into a table of numbers: {error}") from error
 
-    arguments_with_parameters = (*constant_function.arguments, (PARAMETERS, parameters_structure(chosen)))
+    arguments_with_parameters = (
+        *constant_function.arguments,
+        (PARAMETERS, parameters_structure(free_parameters)),
+    )
     function = dataclasses.replace(constant_function, arguments=arguments_with_parameters, compute=compute)
-    return function if _reads_last_inputs(function.program, len(chosen)) else constant_function
+    return function if _reads_last_inputs(function.program, len(free_parameters)) else constant_function
 
 
 def _reads_last_inputs(program: Program, count: int) -> bool:
@@ -67,7 +75,7 @@ def _reads_last_inputs(program: Program, count: int) -> bool:
     return any(isinstance(symbol, Symbol) and symbol in operands for symbol in program.inputs[-count:])
 
 
-def check_parameters(robot: Robot, frame: WrenchFrame | None, chosen: Sequence[Parameter]) -> None:
+def check_parameters(robot: Robot, frame: WrenchFrame | None, free_parameters: Sequence[Parameter]) -> None:
     """Raise an error for parameters whose values select code or enter precomputed tables.
 
     Raises:
@@ -75,7 +83,7 @@ def check_parameters(robot: Robot, frame: WrenchFrame | None, chosen: Sequence[P
         NotImplementedError: no code can be generated for the robot, even without parameters.
     """
     _ = inverse_dynamics_function(robot, frame).program
-    invalid = [parameter for parameter in chosen if not _may_vary(robot, frame, parameter)]
+    invalid = [parameter for parameter in free_parameters if not _may_vary(robot, frame, parameter)]
     reason = (
         "cannot be a parameter: its value decides which operations there are, or goes into tables that are "
         "computed when the code is written; choose other --parameters, and generate the code anew when it "

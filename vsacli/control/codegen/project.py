@@ -76,14 +76,14 @@ def generate(
     joints = counted(len(robot.joints), "joint")
     title = f"{robot.name}, {joints}, {precision}. Written by vsacli {__version__}."
     about = " ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)])
-    chosen = parameters(robot, patterns) if patterns else ()
+    free_parameters = parameters(robot, patterns) if patterns else ()
     try:
         if wrench is not None:
             check_wrench_frame(wrench, robot.tool_names)
-        functions, omitted = _generated_functions(robot, wrench, chosen)
+        functions, omitted = _generated_functions(robot, wrench, free_parameters)
         if not loops:
             _check_loops(robot, functions)
-        reference = ReferenceResults(robot, chosen, wrench)
+        reference = ReferenceResults(robot, free_parameters, wrench)
         if precision == "float":
             check_single_precision(robot, functions, reference)
         files = {
@@ -98,14 +98,14 @@ def generate(
     except NotImplementedError as error:
         raise InputError.one(f"no C code can be made of {robot.name}: {error}") from error
     digest = hashlib.sha256("".join(files.values()).encode()).hexdigest()
-    files |= gpu_files(robot, prefix, functions, precision, about, wrench, chosen)
+    files |= gpu_files(robot, prefix, functions, precision, about, wrench, free_parameters)
     files["README.md"] += filled("gpu.md", prefix)
     files_with_digest = {name: text.replace(DIGEST, f"0x{digest[:8]}u") for name, text in files.items()}
     return Project(files_with_digest, omitted, robot.warnings)
 
 
 def _generated_functions(
-    robot: Robot, wrench: WrenchFrame | None, chosen: Sequence[Parameter]
+    robot: Robot, wrench: WrenchFrame | None, free_parameters: Sequence[Parameter]
 ) -> tuple[list[Function], list[str]]:
     """Return the functions that can be generated, and the reasons for missing ones.
 
@@ -118,15 +118,15 @@ def _generated_functions(
     """
 
     def make_function(make: Maker) -> Function:
-        function = with_parameters(make, robot, wrench, chosen)
+        function = with_parameters(make, robot, wrench, free_parameters)
         _ = function.program  # raises NotImplementedError if it cannot be generated
         return function
 
     try:
         functions = [make_function(link_torques_function), make_function(inverse_dynamics_function)]
     except NotImplementedError:
-        if chosen:
-            check_parameters(robot, wrench, chosen)
+        if free_parameters:
+            check_parameters(robot, wrench, free_parameters)
         raise
     omitted = []
     try:

@@ -61,13 +61,13 @@ class ReferenceResults:
     """Inputs and results of the generated functions of a robot."""
 
     def __init__(
-        self, robot: Robot, chosen: Sequence[Parameter] = (), wrench: WrenchFrame | None = None
+        self, robot: Robot, free_parameters: Sequence[Parameter] = (), wrench: WrenchFrame | None = None
     ) -> None:
         """Draw the inputs.
 
         Args:
             robot: robot of the functions.
-            chosen: parameters that the functions have as an argument.
+            free_parameters: parameters that the functions have as an argument.
             wrench: frame of the wrench that they have as an argument; None without one.
         """
         self._robot = robot
@@ -89,7 +89,7 @@ class ReferenceResults:
                 }
                 for name, structure in wrench_argument(robot, wrench)
             },
-            PARAMETERS: _parameter_cases(chosen),
+            PARAMETERS: _parameter_cases(free_parameters),
             "input": self._draw_plant_input(command, block.tau_motor),
             "dt": {"dt": np.full(CASES, STEP_DURATION)},
         }
@@ -189,12 +189,12 @@ class ReferenceResults:
         }
 
 
-def _parameter_cases(chosen: Sequence[Parameter]) -> Arrays:
+def _parameter_cases(free_parameters: Sequence[Parameter]) -> Arrays:
     """Return nominal parameter values, and other valid ones in every second case."""
-    nominal = np.array([parameter.value for parameter in chosen])
+    nominal = np.array([parameter.value for parameter in free_parameters])
     varied = np.where(nominal == 0, ZERO_VARIATION, VARIATION * nominal)
     rows = np.where(np.arange(CASES) % 2, varied[:, None], nominal[:, None])
-    return dict(zip(parameters_structure(chosen).entries, rows, strict=True))
+    return dict(zip(parameters_structure(free_parameters).entries, rows, strict=True))
 
 
 def _gain_cases(shape: Sequence[int]) -> Arrays:
@@ -274,11 +274,11 @@ def _precision_differences(
         single_results, double_results = reference.single_results(function), reference.results(function)
         for array in function.result.arrays:
             values = single_results[array.name], double_results[array.name]
-            sizes = _relative_differences(*values, reference.comparison(function, array.name))
-            largest = np.unravel_index(sizes.argmax(), sizes.shape)
+            relative = _relative_differences(*values, reference.comparison(function, array.name))
+            largest = np.unravel_index(relative.argmax(), relative.shape)
             _, *index = map(int, largest)
             yield _PrecisionDifference(
-                float(sizes[largest]),
+                float(relative[largest]),
                 function.name,
                 array,
                 tuple(index),
@@ -291,8 +291,8 @@ def _relative_differences(single: FloatArray, double: FloatArray, comparison: Ar
     clipped_single, clipped_double = (np.minimum(array, comparison.bound) for array in (single, double))
     equal = (clipped_single == clipped_double) | (np.isnan(clipped_single) & np.isnan(clipped_double))
     with np.errstate(all="ignore"):
-        sizes = np.abs(clipped_single - clipped_double) / comparison.scale
-    return np.where(equal, 0.0, np.where(np.isnan(sizes), np.inf, sizes))
+        relative = np.abs(clipped_single - clipped_double) / comparison.scale
+    return np.where(equal, 0.0, np.where(np.isnan(relative), np.inf, relative))
 
 
 def _difference_text(difference: _PrecisionDifference) -> str:

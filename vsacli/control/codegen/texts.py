@@ -66,9 +66,12 @@ def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precis
         about=comment(_conventions_text(robot, functions)),
         joints=len(robot.joints),
         flags="\n".join(f"    {upper}_{flag.name} = {flag.value}, /* {flag.meaning} */" for flag in Flag),
-        structures="\n\n".join(structure_text(prefix, each, precision) for each in structures(functions)),
+        structures="\n\n".join(
+            structure_text(prefix, declared, precision) for declared in structures(functions)
+        ),
         functions="\n\n".join(
-            f"{comment(each.meaning)}\n{signature(prefix, each, precision)};" for each in functions
+            f"{comment(declared.meaning)}\n{signature(prefix, declared, precision)};"
+            for declared in functions
         ),
     )
 
@@ -95,7 +98,7 @@ def structure_text(prefix: str, structure: Structure, precision: str) -> str:
     name = f"{prefix}_{structure.name}"
     lines = [comment(structure.meaning), "typedef struct {"]
     for array in structure.arrays:
-        shape = "".join(f"[{size}]" for size in array.shape)
+        shape = "".join(f"[{length}]" for length in array.shape)
         number_type = "unsigned" if array.bits else precision
         lines.append(f"    {number_type} {array.name}{shape}; /* {array.meaning} */")
     lines.append(f"}} {name};")
@@ -209,9 +212,9 @@ def python_head(about: str) -> str:
 def binding_text(prefix: str, functions: Sequence[Function], precision: str, about: str) -> str:
     """Return the Python module that calls the functions; for arguments see `source_text`."""
     used_structures = structures(functions)
-    loop = next((each for each in functions if each.name == "inverse_dynamics"), functions[0])
-    definitions = [_binding_function(prefix, each) for each in functions]
-    definitions += (_nominal_binding(prefix, each) for each in used_structures if each.nominal)
+    loop = next((declared for declared in functions if declared.name == "inverse_dynamics"), functions[0])
+    definitions = [_binding_function(prefix, declared) for declared in functions]
+    definitions += (_nominal_binding(prefix, declared) for declared in used_structures if declared.nominal)
     return filled(
         "robot.py",
         prefix,
@@ -219,7 +222,7 @@ def binding_text(prefix: str, functions: Sequence[Function], precision: str, abo
         call=f"{loop.name}({_argument_list(loop)})",
         real=NUMPY_TYPES[precision],
         flags="\n".join(f"    {flag.name} = {flag.value}  # {flag.meaning}" for flag in Flag),
-        data_types="\n\n".join(_data_type(each, precision) for each in used_structures),
+        data_types="\n\n".join(_data_type(declared, precision) for declared in used_structures),
         functions="\n\n\n".join(definitions),
     )
 
@@ -267,7 +270,7 @@ NOMINAL_{structure.name.upper()} = np.frombuffer(_CONSTANT.raw, {type_name})[0]"
 
 def _wrench_sentence(robot: Robot, functions: Sequence[Function]) -> str:
     """Return the sentence on the wrenches on several tools; empty otherwise."""
-    structure = next((each for each in structures(functions) if each.name == "wrench"), None)
+    structure = next((candidate for candidate in structures(functions) if candidate.name == "wrench"), None)
     if structure is None or len(robot.tool_names) == 1:
         return ""
     members = ", ".join(f"`{array.name}`" for array in structure.arrays)
@@ -288,7 +291,7 @@ def readme_text(
         name=for_markdown(robot.name),
         warnings="".join(f"\nWarning: {for_markdown(sentence(warning))}\n" for warning in robot.warnings),
         call=_argument_list(loop),
-        arguments=", ".join(f"const {prefix}_{each.name} *{name}" for name, each in loop.arguments),
+        arguments=", ".join(f"const {prefix}_{structure.name} *{name}" for name, structure in loop.arguments),
         tolerance=TOLERANCE[precision],
         functions="\n".join(
             f"- `{' '.join(head.split()).replace('( ', '(')}`: {function.meaning}"
@@ -298,9 +301,9 @@ def readme_text(
         wrenches=_wrench_sentence(robot, functions),
         omitted="".join(f"There is {for_markdown(sentence(reason))}\n" for reason in omitted),
         numbers="".join(
-            filled("parameters.md", prefix, first=next(each.entries))
-            for each in structures(functions)
-            if each.nominal
+            filled("parameters.md", prefix, first=next(structure.entries))
+            for structure in structures(functions)
+            if structure.nominal
         ),
         costs="\n".join(
             f"| `{function.name}` | {cost.operations:,} | {cost.functions:,} | {cost.loops:,} |"

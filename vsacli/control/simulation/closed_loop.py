@@ -44,10 +44,10 @@ class Packing:
         ends = np.cumsum(
             [joint_count, joint_count, spring_count, spring_count, joint_count, joint_count]
         ).tolist()
-        self._parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+        self._slices = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
         self.entries: int = ends[-1]
         indices: AnyArray = np.arange(self.entries)
-        dq, dtheta = indices[self._parts[1]], indices[self._parts[3]]
+        dq, dtheta = indices[self._slices[1]], indices[self._slices[3]]
         self.motor_velocities = drivetrain.of_all_motors(dq, dtheta)
 
     def pack(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
@@ -61,7 +61,7 @@ class Packing:
 
     def unpack(self, vector: FloatArray) -> Phase:
         """Return the parts of vectors (..., entries), as views."""
-        q, dq, theta, dtheta, *integral = (vector[..., part] for part in self._parts)
+        q, dq, theta, dtheta, *integral = (vector[..., entries] for entries in self._slices)
         return Phase(q, dq, theta, dtheta, Integral(*integral))
 
 
@@ -109,8 +109,8 @@ class Feedforward:
         ends = np.union1d(trajectory.breakpoints, trajectory.start + internal.breakpoints)
         self._table = Table.of(columns, ends if internal.joints else trajectory.breakpoints)
         self.ending: Ending | None = None
-        if (found := self._table.first_undefined) is not None:
-            time, column = found
+        if (undefined := self._table.first_undefined) is not None:
+            time, column = undefined
             motor = column % len(drivetrain.joint)
             self.ending = Ending(time, _NO_TORQUES, Flag.INFEASIBLE, int(drivetrain.joint[motor]))
 

@@ -198,7 +198,7 @@ class CompiledLoop:
     """
 
     def __init__(self, functions: dict[str, Any], numbers: FloatArray, recording: LoopPrograms) -> None:
-        loops = [_CLoop.of(numbers, each.tables) for each in recording]
+        loops = [_CLoop.of(numbers, state_program.tables) for state_program in recording]
         self._alive = (numbers, recording, loops)  # keeps alive the arrays to which the code has pointers
         rates, torques, distances = map(byref, loops)
         self._derivatives = partial(functions["derivatives"], rates)

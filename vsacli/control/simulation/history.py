@@ -176,7 +176,9 @@ def concatenate_histories(blocks: Sequence[History]) -> History:
     """Return the variables of consecutive blocks of a run."""
     arrays = [block.arrays() for block in blocks]
     names = list(arrays[0])
-    return History(**{name: np.concatenate([each.pop(name) for each in arrays]) for name in names})
+    return History(
+        **{name: np.concatenate([block_arrays.pop(name) for block_arrays in arrays]) for name in names}
+    )
 
 
 def histories(

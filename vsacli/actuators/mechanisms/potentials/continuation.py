@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.mechanisms.potentials.potential_energy import ROWS, PotentialEnergy
+from vsacli.actuators.mechanisms.potentials.potential_energy import STIFFNESS_DERIVATIVES, PotentialEnergy
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat
 from vsacli.compute.rounding import OfRounding
@@ -128,7 +128,7 @@ class LevelCurves:
 
     def point_at(self, phi: FloatArray, s: FloatArray, q: FloatArray) -> LevelPoint:
         """Return the point at a deflection, a position of motor 2 and one of the joint."""
-        derivatives = self._potential.derivatives((phi, s, q), ROWS)
+        derivatives = self._potential.derivatives((phi, s, q), STIFFNESS_DERIVATIVES)
         matrix, (phi_width, s_width) = derivatives.matrix, self._width
         return LevelPoint(
             phi,
@@ -333,9 +333,9 @@ class ContinuedBranch:
             return (share, gain, h, *sidestep.where(is_better, point)), (share == 1) | ~(gain > LEAST_STEP)
 
         zero = np.zeros_like(tau_e)
-        initial_state = (zero, zero + 0.25, zero + 0.02, *(zero + each for each in self.start))
+        initial_state = (zero, zero + 0.25, zero + 0.02, *(zero + component for component in self.start))
         share, _, _, *values = repeat(step, initial_state, (tau_e, q), MAX_STEPS)
-        return LevelPoint(*(np.where(share == 1, each, np.nan) for each in values))
+        return LevelPoint(*(np.where(share == 1, component, np.nan) for component in values))
 
     def _walk_to_goal(
         self, seed: LevelPoint, direction: FloatArray, goal: FloatArray, tau_e: FloatArray, q: FloatArray

@@ -15,7 +15,7 @@ from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms.mechanism import Mechanism
 from vsacli.actuators.mechanisms.potentials.continuation import ContinuedBranch, LevelCurves
 from vsacli.actuators.mechanisms.potentials.potential_energy import (
-    ACCELERATIONS,
+    ACCELERATION_DERIVATIVES,
     RESERVED,
     PotentialEnergy,
     PotentialState,
@@ -124,7 +124,7 @@ class Potential(Mechanism):
         ]
         grid = np.meshgrid(*axes, [0.0], indexing="ij")
         with np.errstate(all="ignore"):
-            is_undefined = ~self._potential.derivatives(grid, ACCELERATIONS).finite[..., 0]
+            is_undefined = ~self._potential.derivatives(grid, ACCELERATION_DERIVATIVES).finite[..., 0]
         if is_undefined.any():
             distance = np.where(is_undefined, np.hypot(distances[0][:, None], distances[1]), np.inf)
             phi, s = np.unravel_index(distance.argmin(), distance.shape)
@@ -196,7 +196,7 @@ class Potential(Mechanism):
         with np.errstate(all="ignore"):
             (sine,), (stiffness,) = np.abs(start.sine), start.stiffness
             start_coordinates = np.array([[self.start.theta_1], [self.start.theta_2], [0.0]])
-            is_finite = self._potential.derivatives(start_coordinates, ACCELERATIONS).finite
+            is_finite = self._potential.derivatives(start_coordinates, ACCELERATION_DERIVATIVES).finite
         if not is_finite.all():
             reason = "the energy or one of its first four derivatives is not finite here"
         elif stiffness <= 0:

@@ -136,9 +136,9 @@ class _Nodes(NamedTuple):
             inner_slope=-reversed_nodes.inner_slope,
         )
 
-    def take(self, chosen: IndexArray | slice) -> _Nodes:
+    def take(self, nodes: IndexArray | slice) -> _Nodes:
         """Return a selection of the nodes."""
-        return _Nodes(*(values[chosen] for values in self))
+        return _Nodes(*(values[nodes] for values in self))
 
     def merged(self, added: _Nodes) -> _Nodes:
         """Return these nodes and others, sorted."""
@@ -283,8 +283,8 @@ class _CamSide:
             is_changed = is_beyond & (positive != (curve(outer).at(tau_e) > 0)[:, None])
             crossed_rows = np.flatnonzero(is_changed.any(axis=1))
             node = np.argmax(is_changed[crossed_rows], axis=1)
-            before = np.maximum(self._phi[np.maximum(node - 1, 0)], outer[crossed_rows])
-            crossing = curve.root(before, self._phi[node], tau_e[crossed_rows])
+            left_node = np.maximum(self._phi[np.maximum(node - 1, 0)], outer[crossed_rows])
+            crossing = curve.root(left_node, self._phi[node], tau_e[crossed_rows])
             is_nearer = crossing < inner[crossed_rows]
             inner[crossed_rows[is_nearer]], end[crossed_rows[is_nearer]] = crossing[is_nearer], kind
         return inner, end

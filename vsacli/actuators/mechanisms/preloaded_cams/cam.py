@@ -135,9 +135,9 @@ def _best_rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
     ]
     moment_columns = np.column_stack([times_deflection(basis).antiderivative()(phi) for basis in bases])
     basis_columns = np.column_stack([basis.antiderivative()(phi) for basis in bases])
-    least, lowest = _smallest_curvature(phi, lift), int(np.argmin(lift))
+    smallest_curvature, lowest = _smallest_curvature(phi, lift), int(np.argmin(lift))
     minimum = scipy.optimize.minimize_scalar(
-        lambda rest: _fit_weights(moment_columns - rest * basis_columns, lift, least)[1],
+        lambda rest: _fit_weights(moment_columns - rest * basis_columns, lift, smallest_curvature)[1],
         bounds=(phi[lowest - 1], phi[lowest + 1]),
         method="bounded",
         options={"xatol": float(np.finfo(float).eps * np.ptp(phi))},

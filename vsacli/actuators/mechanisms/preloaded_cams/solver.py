@@ -106,20 +106,20 @@ class CamSolver:
 
     def _branch_at_torque(self, tau_e: FloatArray) -> BranchAtTorque:
         """Return the branch between its ends."""
-        k, (least, most) = self.k, self.pretension
+        k, (smallest, largest) = self.k, self.pretension
         guess = self.branch.ends(tau_e)
         is_pretension, is_fold, is_peak = guess.end == PRETENSION, guess.end == FOLD, guess.end == PEAK
         domain_end = np.where(guess.inner < 0, *self.domain)
 
         def outer_condition(lift: Lift, _: FloatArray) -> LinearInTorque:
-            return lift.torque_error(k, most)
+            return lift.torque_error(k, largest)
 
         def inner_condition(lift: Lift, phi: FloatArray) -> LinearInTorque:
             return LinearInTorque(
                 *(
                     np.where(is_pretension, a, np.where(is_fold, b, np.where(is_peak, c, d)))
                     for a, b, c, d in zip(
-                        lift.torque_error(k, least),
+                        lift.torque_error(k, smallest),
                         lift.fold_condition(k),
                         lift.torque_peak_condition(k),
                         _distance_to_end(phi, domain_end),
@@ -132,9 +132,11 @@ class CamSolver:
         inner, inner_lift = self._correct_by_newton(guess.inner, tau_e, inner_condition)
         low, high = self.branch.torque_range
         is_carried = (tau_e >= low) & (tau_e <= high)
-        stiffness = np.where(is_pretension, inner_lift.spring(k, least).sigma, inner_lift.stiffness(k, tau_e))
+        stiffness = np.where(
+            is_pretension, inner_lift.spring(k, smallest).sigma, inner_lift.stiffness(k, tau_e)
+        )
         return BranchAtTorque(
-            BranchEnd(outer, np.where(is_carried, outer_lift.spring(k, most).sigma, np.nan)),
+            BranchEnd(outer, np.where(is_carried, outer_lift.spring(k, largest).sigma, np.nan)),
             BranchEnd(inner, np.where(is_carried, np.where(is_peak, 0.0, stiffness), np.nan)),
             is_fold,
             guess.sign,
