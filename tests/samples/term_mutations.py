@@ -90,8 +90,8 @@ MUTATIONS = (
         "tau_k (62), by the motor alone",
         "pair",
         f"{PAIR}.tau_transmission",
-        "return self._one.tau, ",
-        "return 1.01 * self._one.tau, ",
+        "return self._spring_1.tau, ",
+        "return 1.01 * self._spring_1.tau, ",
     ),
     Mutation("sigma_k (63)", "pair", f"{CUBIC}.stiffness", "3 * self", "3.03 * self"),
     Mutation("zeta_k (64)", "pair", f"{CUBIC}.slope", "6 *", "6.06 *"),
@@ -124,16 +124,21 @@ MUTATIONS = (
         Mutation(f"{term} in ({70 + row})", "pair", BETA, old, new)
         for row, term, old, new in (
             (0, "tau_e''", "ddtau_e - ", "1.01 * ddtau_e - "),
-            (0, "zeta_1 phi_1'^2", "= one.zeta * (", "= 1.01 * one.zeta * ("),
-            (0, "zeta_2 phi_2'^2", "+ two.zeta * (", "+ 1.01 * two.zeta * ("),
+            (0, "zeta_1 phi_1'^2", "= spring_1.zeta * (", "= 1.01 * spring_1.zeta * ("),
+            (0, "zeta_2 phi_2'^2", "+ spring_2.zeta * (", "+ 1.01 * spring_2.zeta * ("),
             (0, "sigma q''", "self.stiffness * ddq", "1.01 * self.stiffness * ddq"),
             (1, "sigma''", "ddstiffness - ", "1.01 * ddstiffness - "),
-            (1, "zeta q''", "(one.zeta + two.zeta) * ddq", "1.01 * (one.zeta + two.zeta) * ddq"),
+            (
+                1,
+                "zeta q''",
+                "(spring_1.zeta + spring_2.zeta) * ddq",
+                "1.01 * (spring_1.zeta + spring_2.zeta) * ddq",
+            ),
         )
     ),
     *(
         Mutation(f"eta_{side} phi_{side}'^2 in (71)", "pair", CURVATURE, term, f"1.01 * {term}")
-        for side, term in ((1, "self._one.eta"), (2, "self._two.eta"))
+        for side, term in ((1, "self._spring_1.eta"), (2, "self._spring_2.eta"))
     ),
     Mutation(
         "B_k theta_k'' (73)-(74)",

@@ -327,10 +327,10 @@ class RunEnergy:
             name: values.copy() for name, values in _select_samples(samples, slice(-1, None)).items()
         }
         self._meter.add_stored(_by_variant(np.moveaxis(block.elastic_energy, 0, -1), len(self._variants)))
-        works = [self._add_flow(before, first, lost and lost.during(slice(1)))]
+        works = [self._add_flow(before, first, lost and lost.select_intervals(slice(1)))]
         if variant_shape[-1] > 1:
             earlier, later = _select_samples(samples, slice(-1)), _select_samples(samples, slice(1, None))
-            works.append(self._add_flow(earlier, later, lost and lost.during(slice(1, None))))
+            works.append(self._add_flow(earlier, later, lost and lost.select_intervals(slice(1, None))))
         work = np.concatenate(works, axis=-1)
         return over_time(work.reshape(*work.shape[:-2], -1))
 

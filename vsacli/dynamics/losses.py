@@ -158,7 +158,7 @@ class LostEnergy(NamedTuple):
     dissipated: FloatArray
     copper: FloatArray | None
 
-    def during(self, intervals: slice) -> LostEnergy:
+    def select_intervals(self, intervals: slice) -> LostEnergy:
         """Return the losses in a slice of the intervals."""
         copper = None if self.copper is None else self.copper[..., intervals]
         return LostEnergy(self.motor_friction[..., intervals], self.dissipated[..., intervals], copper)
@@ -186,9 +186,11 @@ class LossMeter:
         rows = {name: by_joint(getattr(block, name)) for name in self._names}
         before = self._last_sample or _sample_rows(rows, 0)
         self._last_sample = _sample_rows(rows, -1)
-        return self.between({name: np.concatenate((before[name], rows[name]), axis=-1) for name in rows})
+        return self.interval_losses(
+            {name: np.concatenate((before[name], rows[name]), axis=-1) for name in rows}
+        )
 
-    def between(self, rows: Mapping[str, FloatArray]) -> LostEnergy:
+    def interval_losses(self, rows: Mapping[str, FloatArray]) -> LostEnergy:
         """Return the losses from sample to sample, from variables by name with samples on the last axis."""
         intervals = np.diff(rows["time"])
         motor_motion = [rows[name] for name in ("theta", "dtheta", "ddtheta")]

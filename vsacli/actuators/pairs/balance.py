@@ -31,9 +31,9 @@ class PairState(NamedTuple):
     @classmethod
     def of(cls, values: Values) -> PairState:
         """Return the state from its `values`."""
-        phi_1, phi_2, *springs = values
+        phi_1, phi_2, *spring_values = values
         count = len(SpringState._fields)
-        return cls(phi_1, phi_2, SpringState(*springs[:count]), SpringState(*springs[count:]))
+        return cls(phi_1, phi_2, SpringState(*spring_values[:count]), SpringState(*spring_values[count:]))
 
     @property
     def values(self) -> Values:
@@ -74,7 +74,7 @@ class PairState(NamedTuple):
         )
 
 
-def under(law: SpringLaw, torque: FloatArray) -> tuple[FloatArray, SpringState]:
+def spring_under_torque(law: SpringLaw, torque: FloatArray) -> tuple[FloatArray, SpringState]:
     """Return deflection and state of a spring under a torque, as a subroutine of compiled code."""
 
     def deflection_and_state(torque: FloatArray) -> Values:
@@ -123,7 +123,10 @@ class Balance:
 
     def state_under(self, tau_1: FloatArray, tau_2: FloatArray) -> PairState:
         """Return the state of both springs at their torques."""
-        (phi_1, one), (phi_2, two) = under(self.first, tau_1), under(self.second, tau_2)
+        (phi_1, one), (phi_2, two) = (
+            spring_under_torque(self.first, tau_1),
+            spring_under_torque(self.second, tau_2),
+        )
         return PairState(phi_1, phi_2, one, two)
 
     def state(self, phi_1: FloatArray, phi_2: FloatArray) -> PairState:

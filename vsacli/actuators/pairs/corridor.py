@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws.law import SpringState
-from vsacli.actuators.pairs.balance import Balance, PairState, under
+from vsacli.actuators.pairs.balance import Balance, PairState, spring_under_torque
 from vsacli.actuators.pairs.folds import FoldMap, outermost_fold
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, where_needed
@@ -119,11 +119,11 @@ def _evaluate_at_end(
 
     def values_at_first_end(tau_e: FloatArray) -> Values:
         phi_1 = np.full_like(tau_e, first.domain[end])
-        phi_2, two = under(second, tau_e - tau_1)
+        phi_2, two = spring_under_torque(second, tau_e - tau_1)
         return values_of(PairState(phi_1, phi_2, _broadcast_state(balance.domain_ends[0][end], tau_e), two))
 
     def values_at_second_end(tau_e: FloatArray) -> Values:
-        phi_1, one = under(first, tau_e - tau_2)
+        phi_1, one = spring_under_torque(first, tau_e - tau_2)
         phi_2 = np.full_like(tau_e, second.domain[1 - end])
         return values_of(
             PairState(phi_1, phi_2, one, _broadcast_state(balance.domain_ends[1][1 - end], tau_e))

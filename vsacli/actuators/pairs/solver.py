@@ -88,8 +88,8 @@ class _Box(NamedTuple):
     def of(cls, piece: Corridor, demand: FloatArray) -> _Box:
         """Return the box of a piece."""
         inner, outer = piece.inner, piece.outer
-        near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
-        return cls(inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, near)
+        is_near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
+        return cls(inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, is_near)
 
     def contains(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
         """Return whether deflections lie in the box, its outer sides excluded."""

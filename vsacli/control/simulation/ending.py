@@ -106,7 +106,7 @@ class Budget:
         reason = f"the budget of {counted(self.limit, 'evaluation')} of the equations of motion is used up"
         return Ending(time, reason, verdict=INCOMPLETE)
 
-    def spent(self, _time: float) -> bool:
+    def is_spent(self, _time: float) -> bool:
         """Return whether the budget is used up."""
         return self.used >= self.limit
 

@@ -71,7 +71,7 @@ def integrate_continuous(
     loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray
 ) -> Iterator[StateBlock]:
     """Integrate a run whose controller acts at every instant, on the true state; yield its blocks."""
-    for (time, states), ending in _gathered(integrator.over(times, start), loop.controller.ending):
+    for (time, states), ending in _collect_blocks(integrator.integrate(times, start), loop.controller.ending):
         yield StateBlock(time, states, loop.controller.torque(time, loop.packing.unpack(states)), ending)
 
 
@@ -89,7 +89,7 @@ def integrate_sampled(
     """
     demands: list[FloatArray] = []
     pieces = _integrate_intervals(loop, integrator, times, start, readings, demands)
-    for (time, states), ending in _gathered(pieces, loop.controller.ending):
+    for (time, states), ending in _collect_blocks(pieces, loop.controller.ending):
         demand = np.array(demands[: len(time)])
         del demands[: len(time)]
         yield StateBlock(time, states, demand, ending, held=True)
@@ -115,7 +115,7 @@ def _integrate_intervals(
     yield StateSamples(times[:1], start[None])
     state, ending = start, None
     for sample, interval in enumerate(np.stack((times[:-1], times[1:]), axis=1), 1):
-        (time, states), ending = _whole(integrator.over(interval, state))
+        (time, states), ending = _collect_samples(integrator.integrate(interval, state))
         if time[-1] == time[0]:  # the budget was used up before the first step of the interval
             break
         state = states[-1]
@@ -129,34 +129,36 @@ def _integrate_intervals(
     return ending
 
 
-def _gathered(pieces: Pieces, last: Ending | None) -> Iterator[tuple[StateSamples, Ending | None]]:
+def _collect_blocks(
+    pieces: Pieces, controller_end: Ending | None
+) -> Iterator[tuple[StateSamples, Ending | None]]:
     """Yield a run in blocks of at least `BLOCK_SAMPLES` samples, except the last one, which has the end.
 
-    Without one, it has the end of the controller's torques, `last`.
+    Without one, it has the end of the controller's torques, `controller_end`.
     """
-    gathered: list[StateSamples] = []
+    collected: list[StateSamples] = []
     count = 0
     while True:
         try:
             piece = next(pieces)
         except StopIteration as finished:
-            yield _concatenate_pieces(gathered), last if finished.value is None else finished.value
+            yield _concatenate_pieces(collected), controller_end if finished.value is None else finished.value
             return
         if count >= BLOCK_SAMPLES:
-            yield _concatenate_pieces(gathered), None
-            gathered, count = [], 0
-        gathered.append(piece)
+            yield _concatenate_pieces(collected), None
+            collected, count = [], 0
+        collected.append(piece)
         count += len(piece.time)
 
 
-def _whole(pieces: Pieces) -> tuple[StateSamples, Ending | None]:
+def _collect_samples(pieces: Pieces) -> tuple[StateSamples, Ending | None]:
     """Return all samples of a short run, and its early end."""
-    gathered: list[StateSamples] = []
+    collected: list[StateSamples] = []
     while True:
         try:
-            gathered.append(next(pieces))
+            collected.append(next(pieces))
         except StopIteration as finished:
-            return _concatenate_pieces(gathered), finished.value
+            return _concatenate_pieces(collected), finished.value
 
 
 def _concatenate_pieces(pieces: Sequence[StateSamples]) -> StateSamples:

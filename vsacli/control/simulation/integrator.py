@@ -125,7 +125,7 @@ class Integrator:
         budget, provenance = self._budget, self.equations.provenance
         return Effort(tuple(self._methods), budget.used, budget.limit, provenance)
 
-    def over(self, times: FloatArray, start: FloatArray) -> Pieces:
+    def integrate(self, times: FloatArray, start: FloatArray) -> Pieces:
         """Integrate over times, (samples,); yield those reached with the states there, in pieces.
 
         If the run ends early, the last time and state are those of its end.
@@ -184,7 +184,7 @@ class Integrator:
         atol = np.maximum(self._tolerances.atol, smallest_atol)
         options: dict[str, Any] = {"jac": jacobian, "atol": atol}  # SciPy's stubs know only scalar tolerances
         solver = partial(scipy.integrate.Radau, self.equations, **options)
-        return (yield from self._integrate_spans(times, start, self._budget.spent, solver, reserve=0))
+        return (yield from self._integrate_spans(times, start, self._budget.is_spent, solver, reserve=0))
 
     def _integrate_spans(
         self,
@@ -198,7 +198,7 @@ class Integrator:
         deadline = Deadline(self._budget, is_due, float(times[-1]), self._progress)
         events = [deadline, Edge(self.equations), *(self._sliding.switches if self._sliding else ())]
         if self._sliding:  # torques may have changed since the last call
-            self._sliding.settle(float(times[0]), start)
+            self._sliding.release_motors(float(times[0]), start)
         first_time, last_time, stop = times[0], math.nan, Stop(float(times[0]), start)
         while True:
             stop = yield from self._integrate_to_event(stop, times, events, solver, reserve)
@@ -207,7 +207,7 @@ class Integrator:
             if not isinstance(stop.event, Switch):
                 break
             times = times[times.searchsorted(stop.time, "right") :]
-            stop = stop._replace(state=stop.event.passed(stop.time, stop.state), event=None)
+            stop = stop._replace(state=stop.event.state_after_switch(stop.time, stop.state), event=None)
             if not times.size:
                 break
         if math.isnan(last_time):  # a span of zero length, or a failure of the first step

@@ -25,9 +25,9 @@ class Switch:
         """Return the sliding velocity, or the reserve of friction that holds the motor; zero at the event."""
         return float(self._sliding.distances(time, vector)[self._motor])
 
-    def passed(self, time: float, vector: FloatArray) -> FloatArray:
+    def state_after_switch(self, time: float, vector: FloatArray) -> FloatArray:
         """Return the state after the event."""
-        return self._sliding.switched(time, vector, self._motor)
+        return self._sliding.switch_motor(time, vector, self._motor)
 
 
 class StickSlip:
@@ -60,17 +60,17 @@ class StickSlip:
         """Initialize the directions in a state; return it with exactly zero velocity of motors at rest."""
         direction = sign_of_motion(vector[self._velocity_indices])
         self._loop.slip = np.where(self._laws.sharp, direction, np.nan)
-        self.settle(time, vector)
+        self.release_motors(time, vector)
         return self._with_zero_velocity(vector, self._laws.sharp & (direction == 0))
 
-    def switched(self, time: float, vector: FloatArray, motor: int) -> FloatArray:
+    def switch_motor(self, time: float, vector: FloatArray, motor: int) -> FloatArray:
         """Return the state after a motor stopped, or broke loose, with the new directions of friction."""
         slip, is_motor = self._slip, np.arange(len(self._slip)) == motor
         stops = slip[motor] != 0
         holding = self._friction(time, vector) - self._laws.offset
         self._loop.slip = np.where(is_motor, 0.0 if stops else np.sign(holding), slip)
         state = self._with_zero_velocity(vector, is_motor) if stops else vector
-        self.settle(time, state)
+        self.release_motors(time, state)
         return state
 
     def distances(self, time: float, vector: FloatArray) -> FloatArray:
@@ -102,7 +102,7 @@ class StickSlip:
         state[self._velocity_indices[motors]] = 0.0
         return state
 
-    def settle(self, time: float, vector: FloatArray) -> None:
+    def release_motors(self, time: float, vector: FloatArray) -> None:
         """Release held motors, one after the other, that friction cannot hold under the present torques."""
         while True:
             breakaway = self._laws.direction_beyond(self._friction(time, vector)) * (self._slip == 0)
