@@ -298,8 +298,7 @@ def _relative_differences(single: FloatArray, double: FloatArray, comparison: Ar
 def _difference_text(difference: _PrecisionDifference) -> str:
     name = f"{difference.array.name} of {difference.function}"
     if difference.array.bits:
-        single, double = map(_flag_names, (difference.single, difference.double))
-        return f"{name} are {single}, in double precision {double}"
+        return f"{name} are {_labels(difference.single)}, in double precision {_labels(difference.double)}"
     values = f"{name} is {difference.single:.4g}, in double precision {difference.double:.4g}"
     if np.isinf(difference.size):
         return values
@@ -309,5 +308,5 @@ def _difference_text(difference: _PrecisionDifference) -> str:
     return f"{values}, off by {share_text} of its largest value, where {allowed_text} may be lost"
 
 
-def _flag_names(bits: float) -> str:
+def _labels(bits: float) -> str:
     return " and ".join(flag.label for flag in Flag if flag & int(bits)) or "none"
