@@ -67,7 +67,7 @@ def _cases() -> dict[str, Callable[..., Simulation]]:
 
 def _from_text(run: Callable[..., Simulation]) -> None:
     """Without anything recorded."""
-    with patch.object(RecordedEquations, "_improve", lambda *_: None):
+    with patch.object(RecordedEquations, "_change_backend", lambda *_: None):
         run(engine="numpy")
 
 
