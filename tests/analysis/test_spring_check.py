@@ -36,7 +36,7 @@ class Faulty:
 def test_a_program_that_is_wrong_in_a_stretch_is_found_apart_from_it(first: int, monkeypatch):
     """A 199th of the 4001 steps, which are in one block; finite differences do not show it."""
     choice = ChosenEngine(Faulty(first, 21), "a fault")
-    monkeypatch.setattr("vsacli.analysis.batch.choose", lambda *_, **_keywords: choice)
+    monkeypatch.setattr("vsacli.analysis.batch.choose_engine", lambda *_, **_keywords: choice)
     monkeypatch.setattr(
         "vsacli.analysis.self_check.ladder", lambda _: (np.zeros(1), np.full(1, LADDER_BOUND))
     )
