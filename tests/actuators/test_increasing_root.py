@@ -11,7 +11,7 @@ from samples.mechanisms import DEVICES
 from vsacli import mechanisms
 from vsacli.actuators.mechanisms.ratios.scales import MAX_STEPS, increasing_root
 from vsacli.compute.tracing import Kind, trace
-from vsacli.compute.tracing.single_precision import in_single_precision
+from vsacli.compute.tracing.single_precision import run_in_single_precision
 
 SAMPLES = 500
 
@@ -27,11 +27,11 @@ def solved(mechanism: mechanisms.VariableRatio, ratio: np.ndarray) -> tuple[np.n
     start: Any = np.where(ratio < high, ratio, high / 2)
     state, steps, going = [start, low, high], np.zeros(SAMPLES), np.ones(SAMPLES, dtype=bool)
     for _ in range(MAX_STEPS):
-        *following, done = in_single_precision(body, [*state, ratio])
+        *following, done = run_in_single_precision(body, [*state, ratio])
         state = [np.where(going, *pair) for pair in zip(following, state, strict=True)]
         steps += going
         going &= ~done
-    np.testing.assert_array_equal(state[0], in_single_precision(program, [low, high, ratio])[0])
+    np.testing.assert_array_equal(state[0], run_in_single_precision(program, [low, high, ratio])[0])
     return state[0], steps
 
 

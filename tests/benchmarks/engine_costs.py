@@ -102,7 +102,9 @@ def interval_energy(robot: Robot) -> IntervalEnergy:
     """Return the second kernel of a run, which has two branches for each joint."""
     actuators = [joint.actuator for joint in robot.joints]
     inertia = tuple(tuple(motor.inertia for motor in actuator.motors) for actuator in actuators)
-    return IntervalEnergy(inertia, tuple(actuator.coupled_rotors for actuator in actuators), rubbing=False)
+    return IntervalEnergy(
+        inertia, tuple(actuator.coupled_rotors for actuator in actuators), with_friction=False
+    )
 
 
 def rows() -> Iterator[str]:

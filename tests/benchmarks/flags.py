@@ -21,7 +21,7 @@ from samples.engines import demands
 from subjects import ROBOTS
 
 from vsacli import Flag, load_robot
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import choose_engine
 from vsacli.dynamics.inverse import InverseDynamics, compute_block
 
 
@@ -30,7 +30,7 @@ def compared(path: Path, samples: int) -> list[str]:
     robot = load_robot(path)
     motion = demands(robot, samples)
     by_numpy = compute_block(robot, motion).flags
-    engine = choose("c", InverseDynamics(robot), samples, threads=1).engine
+    engine = choose_engine("c", InverseDynamics(robot), samples, threads=1).engine
     by_c = compute_block(robot, motion, engine=engine).flags
     flagged, differing = np.count_nonzero(by_numpy), np.flatnonzero((by_numpy != by_c).ravel())
     bits = int(np.bitwise_or.reduce((by_numpy ^ by_c).ravel()))

@@ -18,7 +18,7 @@ from timing import Seconds, cpu_seconds, medians
 
 from vsacli import Robot, Trajectory, load_robot, load_trajectory, optimize
 from vsacli.base.arrays import evenly
-from vsacli.dynamics.losses import trapezoidal
+from vsacli.dynamics.losses import trapezoidal_weights
 from vsacli.studies.search.acceptance import Acceptance, checked_range
 from vsacli.studies.search.loads import joint_loads, periods, rests
 from vsacli.studies.search.splines import SplineSpace
@@ -97,7 +97,7 @@ def programs_of(robot: Robot, trajectory: Trajectory) -> list[Program]:
         space = (SplineSpace.periodic if repeating else SplineSpace.at_rest)(span, PIECES)
         admissible = checked_range(rule, joint, period)
         asked = np.clip(period.command.commanded["stiffness"], 1.05 * admissible.low, admissible.high)
-        weights = trapezoidal(period.time) / (span[1] - span[0])
+        weights = trapezoidal_weights(period.time) / (span[1] - span[0])
         start = space.fitted(period.time, asked)
         basis = space.basis(period.time, 3)
         programs.append(Program(joint, period.command, admissible, basis, weights, start))

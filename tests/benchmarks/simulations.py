@@ -67,14 +67,14 @@ def _cases() -> dict[str, Callable[..., Simulation]]:
 
 def _from_text(run: Callable[..., Simulation]) -> None:
     """Without anything recorded."""
-    with patch.object(RecordedEquations, "_improve", lambda *_: None):
+    with patch.object(RecordedEquations, "_change_backend", lambda *_: None):
         run(engine="numpy")
 
 
 def _first(run: Callable[..., Simulation]) -> float:
     """Seconds of a run that finds no compiled code."""
     with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, XDG_CACHE_HOME=folder):
-        libraries._loaded.clear()
+        libraries._loaded_libraries.clear()
         begin = time.perf_counter()
         run(engine="c")
         return time.perf_counter() - begin

@@ -6,7 +6,7 @@ from subjects import motion, seven_joints
 from timing import Seconds, cpu_seconds, medians
 
 from vsacli import link_torques
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import choose_engine
 from vsacli.dynamics.elastic_torques import LinkTorques
 
 SIZES = (1e-105, 1e-160, 1e-200, 1e-310)
@@ -22,7 +22,7 @@ def compare(samples: int, repeats: int) -> dict[str, Seconds]:
     }
     found = {}
     for name in ("numpy", "c"):
-        engine = choose(name, LinkTorques(robot), samples, threads=1).engine
+        engine = choose_engine(name, LinkTorques(robot), samples, threads=1).engine
         ways = {
             size: cpu_seconds(
                 lambda moving=moving, engine=engine: link_torques(robot, *moving, engine=engine)

@@ -14,7 +14,7 @@ from vsacli import Robot, Trajectory, link_torques, load_trajectory
 from vsacli.analysis.run import Run
 from vsacli.base.outputs import Outputs
 from vsacli.base.variables import Block
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import choose_engine
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics, compute_block, usual_block
 from vsacli.results.store.writer import ResultWriter
@@ -48,8 +48,8 @@ def split(samples: int, repeats: int, engine: str) -> Stages:
     starts = range(0, trajectory.samples, of_block)
     motions = [trajectory.block(start, start + of_block) for start in starts]
     blocks = list(Run(robot, trajectory))
-    links = choose(engine, LinkTorques(robot), samples, threads=1).engine
-    whole = choose(engine, InverseDynamics(robot), samples, threads=1).engine
+    links = choose_engine(engine, LinkTorques(robot), samples, threads=1).engine
+    whole = choose_engine(engine, InverseDynamics(robot), samples, threads=1).engine
 
     ways = {
         "sample": lambda: _each(trajectory.block(start, start + of_block) for start in starts),

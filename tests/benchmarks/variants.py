@@ -16,7 +16,7 @@ from vsacli import Motion, Robot, Trajectory
 from vsacli.analysis.batch import Batch
 from vsacli.analysis.run import Run
 from vsacli.base.signals import POSITION
-from vsacli.compute.engine import Engine, choose
+from vsacli.compute.engine import Engine, choose_engine
 from vsacli.documents.record_values import with_numbers
 from vsacli.dynamics.elastic_torques import LinkTorques
 from vsacli.dynamics.variants import Variants
@@ -96,7 +96,7 @@ def _single(variants: Variants, trajectory: Trajectory) -> None:
 
 def _recursion(variants: Variants, inputs: list[np.ndarray], engine: str) -> Callable[[], object]:
     kernel = variants.kernel(LinkTorques(variants.base))
-    chosen: Engine = choose(engine, kernel, VARIANTS * SAMPLES, 1).engine
+    chosen: Engine = choose_engine(engine, kernel, VARIANTS * SAMPLES, 1).engine
     return lambda: chosen.run(kernel, inputs)
 
 

@@ -20,7 +20,7 @@ from samples.trees import hand
 
 from vsacli import Robot
 from vsacli.compute.control_flow import Keyed, call, repeat
-from vsacli.compute.engine import NUMPY, choose
+from vsacli.compute.engine import NUMPY, choose_engine
 from vsacli.compute.engine.compiler import FLAGS, Library
 from vsacli.compute.engine.engines import Kernel, TracedEngine, kernel_program
 from vsacli.compute.engine.lanes import batch_source
@@ -223,7 +223,7 @@ def test_links_of_a_long_chain_agree_with_numpy():
     kernel = LinkTorques(random_chain(100))
     rows = list(np.random.default_rng(1).uniform(-1, 1, (kernel.inputs, 50)))
     expected = NUMPY.run(kernel, rows)
-    found = choose("c", kernel, 1, 2).engine.run(kernel, rows)
+    found = choose_engine("c", kernel, 1, 2).engine.run(kernel, rows)
     assert (np.abs(found - expected) <= 1e-13 * np.abs(expected).max(axis=0)).all()
 
 

@@ -16,7 +16,7 @@ from samples.robots import MotionArrays, random_motion, random_robot, vsa_3r
 
 from vsacli import Antagonistic, Flag, Robot, laws, link_torques, load_robot
 from vsacli.analysis.run import Run
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import choose_engine
 from vsacli.compute.engine.engines import Engine
 from vsacli.dynamics.deflection_rows import IntegratedRows
 from vsacli.dynamics.inverse import InverseDynamics, block_of, compute_block
@@ -46,7 +46,7 @@ def quickly(programs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def compiled(robot: Robot, threads: int = 1, frame: str | None = None) -> Engine:
-    return choose("c", InverseDynamics(robot, frame), 1, threads).engine
+    return choose_engine("c", InverseDynamics(robot, frame), 1, threads).engine
 
 
 def one_joint(*two_laws: laws.SpringLaw) -> Robot:
@@ -124,7 +124,7 @@ def test_other_branch_and_followed_deflections_agree():
     assert_agree(compute_block(turned, motion, engine=compiled(turned)), expected)
     integrated = {"phi": np.moveaxis(expected.phi, 0, -1).reshape(2, -1) * 1.001}
     kernel = InverseDynamics(turned, prescribed=(IntegratedRows(),))
-    engine = choose("c", kernel, 1, 1).engine
+    engine = choose_engine("c", kernel, 1, 1).engine
     found = block_of(kernel, motion, engine, integrated)
     assert_agree(found, block_of(kernel, motion, further=integrated))
 
@@ -186,7 +186,8 @@ def test_results_depend_neither_on_blocks_nor_on_threads():
     kernel = InverseDynamics(robot)
     demanded = demands(robot, 8207)
     one, three = (
-        compute_block(robot, demanded, engine=choose("c", kernel, 1, threads).engine) for threads in (1, 3)
+        compute_block(robot, demanded, engine=choose_engine("c", kernel, 1, threads).engine)
+        for threads in (1, 3)
     )
     for name, array in one.arrays().items():
         np.testing.assert_array_equal(three.arrays()[name], array)

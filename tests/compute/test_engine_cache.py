@@ -18,7 +18,7 @@ from samples.system_errors import fail_with
 
 from vsacli import link_torques
 from vsacli.base.storage import staging_name
-from vsacli.compute.engine import cache, choose
+from vsacli.compute.engine import cache, choose_engine
 from vsacli.compute.engine.cache import (
     CHECKSUM,
     LIBRARY,
@@ -26,7 +26,7 @@ from vsacli.compute.engine.cache import (
     CacheError,
     open_cache,
 )
-from vsacli.compute.engine.libraries import _loaded
+from vsacli.compute.engine.libraries import _loaded_libraries
 from vsacli.dynamics.elastic_torques import LinkTorques
 
 KERNEL = LinkTorques(vsa_3r())
@@ -37,15 +37,15 @@ MOTION = random_motion(vsa_3r(), 50, seed=1)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The cache folder."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    _loaded.clear()
+    _loaded_libraries.clear()
     return tmp_path / "cache" / "vsacli"
 
 
 def warnings() -> tuple[str, ...]:
     """What is said on the way to right results, in a process that has loaded nothing yet."""
-    _loaded.clear()
+    _loaded_libraries.clear()
     said: list[str] = []
-    chosen = choose("c", KERNEL, 1, 1, said.append)
+    chosen = choose_engine("c", KERNEL, 1, 1, said.append)
     found, expected = (link_torques(vsa_3r(), *MOTION, engine=engine) for engine in (chosen.engine, "numpy"))
     # Rounding of some thousand operations that the compiler may contract and reorder.
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())

@@ -20,13 +20,13 @@ from samples.robots import random_motion, vsa_3r
 from samples.shipped import shipped_robot
 
 from vsacli import InputError, Robot, link_torques
-from vsacli.compute.engine import NUMPY, choice, choose, compiler
+from vsacli.compute.engine import NUMPY, choice, choose_engine, compiler
 from vsacli.compute.engine.cache import CHECKSUM, LIBRARY, open_cache
-from vsacli.compute.engine.choice import LOOK_FROM, in_usual_blocks, settle
+from vsacli.compute.engine.choice import LOOK_FROM, settle_engine, usual_block_samples
 from vsacli.compute.engine.compiled_engine import CompiledEngine, kernel_code
 from vsacli.compute.engine.compiler import CompilerError, system_compiler
 from vsacli.compute.engine.engines import kernel_program
-from vsacli.compute.engine.libraries import Code, _loaded, load
+from vsacli.compute.engine.libraries import Code, _loaded_libraries, load
 from vsacli.compute.engine.trial import Trial
 from vsacli.compute.tracing import is_of_calls
 from vsacli.dynamics.balances import BalancedDynamics
@@ -41,18 +41,18 @@ KERNEL = LinkTorques(vsa_3r())
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.delenv("CC", raising=False)
-    _loaded.clear()
+    _loaded_libraries.clear()
     return tmp_path / "cache"
 
 
 def test_unknown_engine_is_refused_with_the_nearest_one():
     with pytest.raises(InputError, match="unknown engine 'nunpy'; did you mean 'numpy'"):
-        choose("nunpy", KERNEL, 1)
+        choose_engine("nunpy", KERNEL, 1)
 
 
 @pytest.mark.parametrize("name", ["numpy", "auto"])
 def test_few_samples_are_left_to_numpy_and_nothing_is_compiled(name: str, own_cache: Path):
-    assert choose(name, KERNEL, LOOK_FROM - 1).engine is NUMPY
+    assert choose_engine(name, KERNEL, LOOK_FROM - 1).engine is NUMPY
     assert not own_cache.exists()
 
 
@@ -61,11 +61,12 @@ def test_few_samples_are_left_to_numpy_and_nothing_is_compiled(name: str, own_ca
 def test_auto_compiles_for_many_samples_and_remembers_it_for_fewer():
     rarely, often = LOOK_FROM, 10_000_000
     assert (
-        choose("auto", KERNEL, rarely).reason == f"NumPy computes: {rarely} samples would not repay compiling"
+        choose_engine("auto", KERNEL, rarely).reason
+        == f"NumPy computes: {rarely} samples would not repay compiling"
     )
-    assert choose("auto", KERNEL, often, 2).reason == "C code computes, compiled now, in 2 threads"
-    _loaded.clear()  # as in another process
-    assert choose("auto", KERNEL, rarely, 1).reason == "C code computes, compiled before, in 1 thread"
+    assert choose_engine("auto", KERNEL, often, 2).reason == "C code computes, compiled now, in 2 threads"
+    _loaded_libraries.clear()  # as in another process
+    assert choose_engine("auto", KERNEL, rarely, 1).reason == "C code computes, compiled before, in 1 thread"
 
 
 @pytest.mark.slow
@@ -75,7 +76,7 @@ def test_threads_are_as_many_as_processors_unless_given():
     usable = os.sched_getaffinity(0)
     for processors in ({min(usable)}, usable):
         os.sched_setaffinity(0, processors)
-        assert f"in {len(processors)} thread" in choose("c", KERNEL, 1).reason
+        assert f"in {len(processors)} thread" in choose_engine("c", KERNEL, 1).reason
 
 
 @pytest.mark.parametrize(
@@ -99,12 +100,12 @@ def test_compiler_that_does_not_work(
         program(tmp_path, "nocc", text)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     monkeypatch.setenv("CC", "nocc")
-    chosen = choose("auto", KERNEL, 10_000_000)
+    chosen = choose_engine("auto", KERNEL, 10_000_000)
     assert not isinstance(chosen.engine, CompiledEngine)
     assert chosen.reason.startswith("NumPy computes: ")
     assert reason in chosen.reason
     with pytest.raises(InputError, match="the engine numpy needs none") as raised:
-        choose("c", KERNEL, 1)
+        choose_engine("c", KERNEL, 1)
     assert reason in str(raised.value)
     assert not [path for path in own_cache.rglob("*") if path.is_file()]
 
@@ -117,9 +118,9 @@ def without_cc(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
 def test_without_a_compiler_the_message_says_how_to_get_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     without_cc(monkeypatch, tmp_path)
     reason = "there is no C compiler 'cc' (pip install 'vsacli[compiler]' gets one)"
-    assert choose("auto", KERNEL, 10_000_000).reason == f"NumPy computes: {reason}"
+    assert choose_engine("auto", KERNEL, 10_000_000).reason == f"NumPy computes: {reason}"
     with pytest.raises(InputError) as raised:
-        choose("c", KERNEL, 1)
+        choose_engine("c", KERNEL, 1)
     assert str(raised.value) == f"{reason}; the engine numpy needs none"
 
 
@@ -140,7 +141,7 @@ def test_the_compiler_of_a_package_is_found_where_the_system_has_none(
     monkeypatch.delitem(sys.modules, "ziglang")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    chosen = choose("c", KERNEL, 1, 1)
+    chosen = choose_engine("c", KERNEL, 1, 1)
     assert chosen.reason.startswith("C code computes, compiled now")
     assert re.fullmatch(r"python -m ziglang cc \S+", chosen.compiler)
 
@@ -154,7 +155,7 @@ def test_link_torques_refuse_an_unknown_engine():
 @needs_compiler
 def test_link_torques_take_an_engine_that_was_chosen_before():
     motion = random_motion(vsa_3r(), 20, seed=1)
-    chosen = choose("c", KERNEL, 1).engine
+    chosen = choose_engine("c", KERNEL, 1).engine
     np.testing.assert_array_equal(
         link_torques(vsa_3r(), *motion, engine=chosen), link_torques(vsa_3r(), *motion, engine="c")
     )
@@ -194,15 +195,15 @@ def test_no_threads_are_refused(vsacli, motion):
 
 def test_long_chains_are_worth_a_look_with_fewer_samples():
     """NumPy takes short blocks of them, in which its calls count, so a sample takes longer for each joint."""
-    few, many = (in_usual_blocks(10_000, 5 * joints) for joints in (3, 1000))
+    few, many = (usual_block_samples(10_000, 5 * joints) for joints in (3, 1000))
     assert few == 10_000
     assert LOOK_FROM < many < 50 * few
 
 
 def test_compiling_repays_neither_for_little_work_nor_for_long_code():
     short, arm, long = (Code("", sum(functions), functions) for functions in ((200,), (4_500,), (100_000,)))
-    assert [choice._repays(code, 1_000_000) for code in (short, arm, long)] == [False, True, False]
-    assert choice._repays(Code("", 100_000, (500,) * 200), 1_000_000)
+    assert [choice._repays_compiling(code, 1_000_000) for code in (short, arm, long)] == [False, True, False]
+    assert choice._repays_compiling(Code("", 100_000, (500,) * 200), 1_000_000)
 
 
 @pytest.mark.slow
@@ -210,10 +211,10 @@ def test_compiling_repays_neither_for_little_work_nor_for_long_code():
 def test_measured_springs_are_left_to_numpy_until_tracing_repays():
     """48,000 to 96,000 samples take NumPy 0.1 to 0.2 s, and tracing alone 0.2 s, compiled before or not."""
     kernel = BalancedDynamics(InverseDynamics(shipped_robot("measured_1r")))
-    assert choose("c", kernel, 1).reason.startswith("C code computes, compiled now")
+    assert choose_engine("c", kernel, 1).reason.startswith("C code computes, compiled now")
     for samples in (48_000, 96_000):
-        assert choose("auto", kernel, samples).engine is NUMPY
-    assert choose("auto", kernel, 200_000).reason.startswith("C code computes")
+        assert choose_engine("auto", kernel, samples).engine is NUMPY
+    assert choose_engine("auto", kernel, 200_000).reason.startswith("C code computes")
 
 
 @pytest.mark.slow
@@ -223,23 +224,23 @@ def test_what_rarely_runs_counts_little():
     assert not code.straight
     assert code.operations < sum(code.functions) / 4
     # NumPy takes 1.3 us a sample, and the compiler 4 s
-    assert not choice._repays(code, 1_000_000)
-    assert choice._repays(code, 10_000_000)
+    assert not choice._repays_compiling(code, 1_000_000)
+    assert choice._repays_compiling(code, 10_000_000)
 
 
 @needs_compiler
 def test_the_choice_is_the_same_again():
     kernel = BalancedDynamics(InverseDynamics(shipped_robot("vsa_3r")))
-    chosen = [settle("auto", kernel, samples) for samples in (200_000, 900_000, 5_000_000)]
+    chosen = [settle_engine("auto", kernel, samples) for samples in (200_000, 900_000, 5_000_000)]
     kernel_code.cache_clear()
-    assert [settle("auto", kernel, samples) for samples in (200_000, 900_000, 5_000_000)] == chosen
+    assert [settle_engine("auto", kernel, samples) for samples in (200_000, 900_000, 5_000_000)] == chosen
     assert [each.name for each in chosen] == ["numpy", "numpy", "c"]
 
 
 @pytest.mark.parametrize(("joints", "shares"), [(10, False), (100, True)])
 def test_long_chains_of_branches_share_functions(joints: int, shares: bool):
     """Written out, 100 joints took the compiler 13 s."""
-    kernel = IntervalEnergy(_chain(shipped_robot("tendon_1r"), joints), rubbing=False)
+    kernel = IntervalEnergy(_chain(shipped_robot("tendon_1r"), joints), with_friction=False)
     assert is_of_calls(kernel_program(kernel)) is shares
     assert kernel_code(kernel).compiling_seconds < 4
 
@@ -273,9 +274,9 @@ def _chain(robot: Robot, joints: int) -> Robot:
 )
 def test_compiler_that_is_not_taken(command: str, reason: str, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("CC", command)
-    assert re.search(reason, choose("auto", KERNEL, 10_000_000).reason)
+    assert re.search(reason, choose_engine("auto", KERNEL, 10_000_000).reason)
     with pytest.raises(InputError, match=reason):
-        choose("c", KERNEL, 1)
+        choose_engine("c", KERNEL, 1)
 
 
 @needs_compiler
@@ -283,23 +284,23 @@ def test_compiler_that_is_not_taken(command: str, reason: str, monkeypatch: pyte
 def test_without_a_folder_for_temporary_files(folder: str, temporary_files: Any):
     temporary_files(folder)
     reason = "folder for temporary files: cannot be used: "
-    assert reason in choose("auto", KERNEL, 10_000_000).reason
+    assert reason in choose_engine("auto", KERNEL, 10_000_000).reason
     with pytest.raises(InputError, match=reason):
-        choose("c", KERNEL, 1)
+        choose_engine("c", KERNEL, 1)
 
 
 @pytest.mark.slow
 @needs_compiler
 def test_a_cached_library_that_cannot_be_loaded_is_compiled_anew(own_cache: Path):
     """As from a folder from which nothing may be run."""
-    choose("c", KERNEL, 1)
+    choose_engine("c", KERNEL, 1)
     (library,) = own_cache.rglob(LIBRARY)
     library.unlink()  # this process has loaded it: another file takes its place
     library.write_bytes(b"no program")
     library.with_name(CHECKSUM).write_text(hashlib.sha256(b"no program").hexdigest())
     _loaded.clear()
     said: list[str] = []
-    assert choose("c", KERNEL, 1, tell=said.append).reason.startswith("C code computes, compiled now")
+    assert choose_engine("c", KERNEL, 1, tell=said.append).reason.startswith("C code computes, compiled now")
     (sentence,) = said
     assert "cannot be loaded: " in sentence
     assert sentence.endswith("; it is compiled anew")
@@ -328,7 +329,7 @@ def test_a_compiler_that_hangs_is_left(tmp_path: Path, monkeypatch: pytest.Monke
     program(tmp_path, "slowcc", "exec sleep 60")
     monkeypatch.setenv("CC", str(tmp_path / "slowcc"))
     monkeypatch.setattr(compiler, "TIMEOUT", 0.2)
-    assert choose("auto", KERNEL, 10_000_000).reason.endswith("took more than 0.2 s")
+    assert choose_engine("auto", KERNEL, 10_000_000).reason.endswith("took more than 0.2 s")
 
 
 def test_a_relative_cache_folder_does_not_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

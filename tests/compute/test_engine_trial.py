@@ -12,9 +12,9 @@ from samples.robots import random_motion, vsa_3r
 from samples.simulated import short_motion
 
 from vsacli import InputError, link_torques, simulate
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import choose_engine
 from vsacli.compute.engine.cache import LIBRARY
-from vsacli.compute.engine.libraries import _loaded
+from vsacli.compute.engine.libraries import _loaded_libraries
 from vsacli.dynamics.elastic_torques import LinkTorques
 
 pytestmark = needs_compiler
@@ -27,7 +27,7 @@ KERNEL = LinkTorques(ARM)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The cache folder."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    _loaded.clear()
+    _loaded_libraries.clear()
     return tmp_path / "cache" / "vsacli"
 
 
@@ -58,9 +58,11 @@ def test_faulty_code_is_neither_used_nor_kept(
     statement, message = FAULTS[fault]
     monkeypatch.setenv("CC", faulty_compiler(tmp_path, "run", statement))
     with pytest.raises(InputError, match=f"what the C compiler made {message}; the engine numpy needs none"):
-        choose("c", KERNEL, 1)
+        choose_engine("c", KERNEL, 1)
     assert not list(folder.rglob(LIBRARY))
-    assert choose("auto", KERNEL, 1_000_000_000).reason.startswith("NumPy computes: what the C compiler made")
+    assert choose_engine("auto", KERNEL, 1_000_000_000).reason.startswith(
+        "NumPy computes: what the C compiler made"
+    )
     monkeypatch.delenv("CC")
     motion = random_motion(ARM, 50, seed=1)
     found, expected = (link_torques(ARM, *motion, engine=each) for each in ("c", "numpy"))
@@ -88,9 +90,9 @@ def test_the_key_names_the_compiler(tmp_path: Path, folder: Path, monkeypatch: p
         script.chmod(0o755)
         monkeypatch.setenv("CC", str(script))
         monkeypatch.setenv("PATH", f"{tmp_path}{len(text)}", prepend=":")  # as in another process
-        assert choose("c", KERNEL, 1).reason.startswith("compiled now")
+        assert choose_engine("c", KERNEL, 1).reason.startswith("compiled now")
     monkeypatch.delenv("CC")
-    assert choose("c", KERNEL, 1).reason.startswith("compiled now")
+    assert choose_engine("c", KERNEL, 1).reason.startswith("compiled now")
     assert len(list(folder.rglob(LIBRARY))) == 3
-    _loaded.clear()
-    assert choose("c", KERNEL, 1).reason.startswith("C code computes, compiled before")
+    _loaded_libraries.clear()
+    assert choose_engine("c", KERNEL, 1).reason.startswith("C code computes, compiled before")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from vsacli.compute.control_flow import look_up, repeat, subroutine, where_needed
-from vsacli.compute.rounding import OfRounding, single
+from vsacli.compute.rounding import OfRounding, single_constant
 from vsacli.compute.tracing import Kind, trace
-from vsacli.compute.tracing.single_precision import in_single_precision
+from vsacli.compute.tracing.single_precision import run_in_single_precision
 
 X = np.array([0.3, -2.5, 0.75, 1e6, 7.0])
 
@@ -18,7 +18,7 @@ X = np.array([0.3, -2.5, 0.75, 1e6, 7.0])
 def found(function: Any, *rows: np.ndarray) -> list[Any]:
     """The results of a function of rows of samples."""
     program = trace(lambda given: list(function(*given)), [Kind.REAL] * len(rows), short=True)
-    return in_single_precision(program, rows)
+    return run_in_single_precision(program, rows)
 
 
 def test_each_operation_rounds() -> None:
@@ -65,10 +65,10 @@ def test_branches_tables_subroutines_and_choices() -> None:
 
 
 def test_what_becomes_of_constants() -> None:
-    assert single(0.0) == 0
-    assert single(-1e-300) == -float(np.finfo(np.float32).tiny)
-    assert single(1e300) == np.inf
-    assert single(OfRounding(1e-10, power=0.5)) == pytest.approx(1e-10 * 2**14.5)
+    assert single_constant(0.0) == 0
+    assert single_constant(-1e-300) == -float(np.finfo(np.float32).tiny)
+    assert single_constant(1e300) == np.inf
+    assert single_constant(OfRounding(1e-10, power=0.5)) == pytest.approx(1e-10 * 2**14.5)
     tolerance = OfRounding(1e-17)
     (below,) = found(lambda x: [np.where(np.abs(x) < tolerance, 1.0, 0.0)], np.array([1e-9, 1e-8]))
     np.testing.assert_array_equal(below, [1, 0])  # 5.4e-9

@@ -10,7 +10,7 @@ from samples.shipped import shipped_robot
 
 from vsacli import Robot
 from vsacli.compute.control_flow import where_needed
-from vsacli.compute.engine import NUMPY, choose
+from vsacli.compute.engine import NUMPY, choose_engine
 from vsacli.compute.engine.choice import TRACE_FROM
 from vsacli.compute.engine.engines import TracedEngine, kernel_program
 from vsacli.compute.rows import RowKernel, RowLayout
@@ -85,5 +85,5 @@ def test_a_kernel_with_branches_runs_as_it_is():
 
 def test_tracing_has_to_repay():
     kernel = LinkTorques(shipped_robot("vsa_3r"))
-    assert choose("numpy", kernel, TRACE_FROM - 1).engine is NUMPY
-    assert isinstance(choose("numpy", kernel, TRACE_FROM).engine, TracedEngine)
+    assert choose_engine("numpy", kernel, TRACE_FROM - 1).engine is NUMPY
+    assert isinstance(choose_engine("numpy", kernel, TRACE_FROM).engine, TracedEngine)

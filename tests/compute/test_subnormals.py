@@ -14,7 +14,7 @@ from samples.marks import needs_compiler
 from samples.robots import random_motion, vsa_3r
 
 from vsacli import Robot, link_torques
-from vsacli.compute.engine import NUMPY, choose
+from vsacli.compute.engine import NUMPY, choose_engine
 from vsacli.compute.engine.engines import Engine, TracedEngine
 from vsacli.compute.subnormals import subnormals_as_zero
 from vsacli.dynamics.elastic_torques import LinkTorques
@@ -31,7 +31,9 @@ def product_of_small_numbers() -> float:
 
 
 def engines() -> Any:
-    compiled = pytest.param(lambda kernel: choose("c", kernel, 1, 1).engine, marks=needs_compiler, id="c")
+    compiled = pytest.param(
+        lambda kernel: choose_engine("c", kernel, 1, 1).engine, marks=needs_compiler, id="c"
+    )
     return [
         pytest.param(lambda _: NUMPY, id="numpy"),
         pytest.param(lambda _: TracedEngine(), id="traced"),
@@ -101,6 +103,6 @@ assert all(limit.smallest_subnormal > 0 for limit in limits)
 
 
 def test_elsewhere_nothing_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("vsacli.compute.subnormals._mathematics", lambda: None)
+    monkeypatch.setattr("vsacli.compute.subnormals._math_library", lambda: None)
     with subnormals_as_zero():
         assert product_of_small_numbers() > 0

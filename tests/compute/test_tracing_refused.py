@@ -12,7 +12,7 @@ from samples.marks import needs_compiler
 from samples.shipped import shipped_robot
 
 from vsacli import InputError, Robot, laws
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import choose_engine
 from vsacli.control.codegen.project import generate
 from vsacli.dynamics.inverse import InverseDynamics, compute_block
 
@@ -47,12 +47,12 @@ def test_no_c_code_is_made(robot: Robot) -> None:
 @needs_compiler
 def test_the_engine_c_is_refused(robot: Robot) -> None:
     with pytest.raises(InputError, match=f"this cannot be compiled: {REASON}; take the engine numpy"):
-        choose("c", InverseDynamics(robot), 1)
+        choose_engine("c", InverseDynamics(robot), 1)
 
 
 @pytest.mark.parametrize("name", ["auto", "numpy"])
 def test_numpy_computes(name: str, robot: Robot) -> None:
-    choice = choose(name, InverseDynamics(robot), 10_000_000)
+    choice = choose_engine(name, InverseDynamics(robot), 10_000_000)
     assert choice.reason.startswith("NumPy computes")
     motion = motion_of(commands(robot, 50, seed=1))
     block, expected = (compute_block(robot, motion, **given) for given in ({"engine": choice.engine}, {}))

@@ -15,7 +15,7 @@ from samples.shipped import shipped_robot
 from samples.springs import SPRINGS
 
 from vsacli import Flag, InputError, Robot, motor_torques
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import choose_engine
 from vsacli.control.codegen.feedback_function import feedback_linearization_function
 from vsacli.control.codegen.interface import Function
 from vsacli.control.codegen.project import generate
@@ -152,7 +152,7 @@ def test_all_that_computes_agrees_on_what_is_not_finite(name: str, tmp_path: Pat
     found, _ = compiled_robot(tmp_path / "c", robot, [function], "double")(function, command)
     with np.errstate(all="ignore"):
         by_numpy = motor_torques(robot, motion_of(command))
-    compiled = choose("c", InverseDynamics(robot), len(rows)).engine
+    compiled = choose_engine("c", InverseDynamics(robot), len(rows)).engine
     by_c = motor_torques(robot, motion_of(command), engine=compiled)
     for name_of, values in found.items():
         for block in (by_numpy, by_c):

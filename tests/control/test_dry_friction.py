@@ -78,7 +78,7 @@ def pushed(
     start = slides.start(0.0, start)
     equations = LoopEquations(loop, [], Budget(None, times))
     integrator = Integrator(equations, Tolerances(), lambda _: None, slides)
-    reached, states = map(np.concatenate, zip(*integrator.over(times, start), strict=True))
+    reached, states = map(np.concatenate, zip(*integrator.integrate(times, start), strict=True))
     np.testing.assert_array_equal(reached, times)
     return states[:, 0], states[:, 1]
 

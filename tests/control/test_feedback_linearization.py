@@ -80,7 +80,7 @@ def test_the_decoupled_derivatives_are_the_linear_control(frame, mixed):
     state, reference = random_state(robot, 5, seed=1), random_reference(robot, 5, seed=2, wrench=wrench)
     law = FeedbackLinearization(robot, GAINS, frame)
     rates = state_derivative(robot, state, law(state, reference), wrench)
-    link = law.law.link_motion(*law.plant.unpacked(state), wrench)
+    link = law.law.link_motion(*law.plant.unpack_state(state), wrench)
 
     assert rates.ddq == pytest.approx(link.ddq, rel=1e-12)  # the same formula (34)
     actual = (state.q, state.dq, link.ddq, link.d3q)

@@ -50,9 +50,9 @@ def equations(case: Loop, engine: str) -> RecordedEquations:
     made = RecordedEquations(
         case.loop, case.boundaries, Budget(None, np.array([0.0, 1.0])), Computing(engine)
     )
-    while np.isfinite(made._due):
-        made.budget.used = int(made._due) + 1
-        made._improve(*next(iter(case.states(1))))
+    while np.isfinite(made._next_change):
+        made.budget.used = int(made._next_change) + 1
+        made._change_backend(*next(iter(case.states(1))))
     return made
 
 
@@ -159,7 +159,7 @@ def _run(engine, **conditions):
 
 def _run_text(**conditions):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(RecordedEquations, "_improve", lambda *_: None)
+        patch.setattr(RecordedEquations, "_change_backend", lambda *_: None)
         return _run("numpy", **conditions)
 
 

@@ -35,7 +35,10 @@ def divide(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     """Set the samples of a block; their noise is drawn for some fewer at a time."""
 
     def into(samples: int) -> None:
-        for module, name, size in ((history, "BLOCK", samples), (sensors, "DRAWN", samples - 2)):
+        for module, name, size in (
+            (history, "BLOCK_SAMPLES", samples),
+            (sensors, "NOISE_BLOCK", samples - 2),
+        ):
             monkeypatch.setattr(module, name, size)
 
     return into

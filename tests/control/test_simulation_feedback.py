@@ -111,7 +111,7 @@ def test_accelerations_and_jerks_are_the_derivatives_of_the_simulated_motion(fra
     past, state = linearized_run(robot, robot, trajectory, GAINS, InitialError(0.02, 20))
     law = FeedbackLinearization(robot, GAINS, frame)
     wrench = trajectory.at(past.time).wrench
-    link = law.law.link_motion(*law.plant.unpacked(state), wrench)
+    link = law.law.link_motion(*law.plant.unpack_state(state), wrench)
     # Sixth-order differences over 1 ms: 1e-9 of local error over 1e-3 s, 1e-6 of the peak
     for values, derivative in ((past.dq, link.ddq), (link.ddq, link.d3q)):
         assert np.abs(difference(values, 1e-3) - derivative[3:-3]).max() < 3e-6 * np.abs(derivative).max()

@@ -114,7 +114,7 @@ def test_a_boundary_lies_where_its_distance_is_no_number_any_more():
     trajectory, robot = short_motion(3), vsa_3r()
     reference = TabulatedReference(trajectory)
     loop = ClosedLoop(robot, Feedforward(robot, trajectory), reference)
-    start = loop.packing.pack(*loop.plant.unpacked(start_state(robot, trajectory, InitialError())))
+    start = loop.packing.pack(*loop.plant.unpack_state(start_state(robot, trajectory, InitialError())))
     boundary = Singularity(loop, start)
     assert boundary.distance(start) == pytest.approx(1 - 1e-4, rel=1e-12)
     assert boundary.distance(np.where(np.arange(len(start)) == 7, np.nan, start)) == -1

@@ -142,7 +142,7 @@ def start_apart(name: str, apart: float, damping: float) -> tuple[np.ndarray, np
     begin = springs.equilibrium(demand(time[:1]))
     away = springs.deflections_at_spread(springs.spread(begin) + apart, begin, demand(time[:1]))
     march = March(springs, demand)
-    ways = [march.through(time[[0, -1]], start).phi for start in (begin, away)]
+    ways = [march.solve_cells(time[[0, -1]], start).phi for start in (begin, away)]
     assert all(way is not None for way in ways)
     return time, np.diff([springs.spread(way.at(time)) for way in ways if way], axis=0)[0]
 
@@ -344,7 +344,13 @@ def test_last_coefficients_count_relative_to_the_largest_deflection():
     demand = Command(*np.ones((6, 1)), commanded={})
     peaks = _Peaks(_Springs(), demand, np.ones((2, 1)))
     found = _CellSolution(
-        np.ones((2, 1)), np.zeros((2, 1)), torque=1.0, damping=0.0, constants=1.0, rounding=0.0, slope=1.0
+        np.ones((2, 1)),
+        np.zeros((2, 1)),
+        torque=1.0,
+        damping=0.0,
+        time_constants=1.0,
+        rounding=0.0,
+        slope=1.0,
     )
     phi = np.array([[1e-3, 1e-4, 1e-7, 1e-8], [1e-3, 0, 0, 0]])
     assert peaks.share(phi, np.zeros((2, 2)), found) == pytest.approx(1e-4, rel=1e-15)

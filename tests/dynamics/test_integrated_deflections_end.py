@@ -111,8 +111,8 @@ def test_end_of_a_spring_is_not_singular():
 def test_another_sign_of_the_determinant_is_beyond_the_singular_set():
     task, joints, time = DeflectionEquation(ARM, motion()), (0, 1), np.linspace(0, 2, 5)
     roots = task.roots(joints, time)
-    assert not task.hindrances(joints, time, roots).any()
-    assert (task.hindrances(joints, time, roots[:, ::-1]) == SINGULAR).all()
+    assert not task.stop_reasons(joints, time, roots).any()
+    assert (task.stop_reasons(joints, time, roots[:, ::-1]) == SINGULAR).all()
 
 
 @pytest.mark.slow
@@ -121,7 +121,7 @@ def test_integration_that_stalls_ends_at_the_joint_to_blame(monkeypatch):
     expected = softened().stops[1]
     monkeypatch.setattr(
         DeflectionEquation,
-        "hindrances",
+        "stop_reasons",
         lambda _task, joints, time, _phi: np.zeros((len(joints), time.size), int),
     )
     base, shoulder = integrate_deflections(ARM, trajectory, COARSE).stops

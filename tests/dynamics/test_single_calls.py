@@ -20,7 +20,7 @@ from vsacli import (
     motor_torques,
 )
 from vsacli.compute.engine import NUMBERS, NUMPY
-from vsacli.compute.engine.number_engine import MOST_SAMPLES, RECORDED_FROM, _recorded
+from vsacli.compute.engine.number_engine import MOST_SAMPLES, RECORDED_FROM, _recorded_kernel
 from vsacli.dynamics.inverse import InverseDynamics
 
 ROBOTS = REPOSITORY / "robots"
@@ -50,7 +50,7 @@ def test_single_samples_are_those_of_numpy_to_the_last_bit(name: str) -> None:
     expected = NUMPY.run(kernel, rows)
     for _ in range(RECORDED_FROM):
         NUMBERS.run(kernel, [row[:1] for row in rows])
-    assert _recorded(kernel).called() is not None
+    assert _recorded_kernel(kernel).function_of_call() is not None
     found = np.concatenate(
         [NUMBERS.run(kernel, [row[start : start + 4] for row in rows]) for start in range(0, 200, 4)], axis=1
     )

@@ -66,7 +66,7 @@ def loop_of(
         else LinearizingFeedback(believed, reference, gains)
     )
     loop = ClosedLoop(robot, controller, reference)
-    start = loop.packing.pack(*loop.plant.unpacked(start_state(robot, trajectory, InitialError())))
+    start = loop.packing.pack(*loop.plant.unpack_state(start_state(robot, trajectory, InitialError())))
     first, last = trajectory.times.span
     return Loop(loop, list(boundaries(loop, start)), start, (float(first), float(last)))
 

@@ -82,7 +82,7 @@ def serve(*options: str) -> None:
     """Run commands of clients until standard input is closed."""
     import_everything()
     if ONE_PROCESS in options:
-        importlib.import_module("vsacli.studies.sweeps.executors").processors = lambda: 1
+        importlib.import_module("vsacli.studies.sweeps.executors").processor_count = lambda: 1
     with socket.socket(socket.AF_UNIX) as server:
         server.bind("socket")
         server.listen()

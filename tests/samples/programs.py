@@ -52,7 +52,7 @@ def _result(operation: str, operands: Values) -> Any:
         one = _repeated if operation == "loop" else _branched
         samples = [one(nested, [row[k] for row in rows]) for k in range(len(rows[0]))]
         columns = [np.array(column) for column in zip(*samples, strict=True)]
-        return dict(zip(nested.numbers, columns, strict=True))
+        return dict(zip(nested.indices, columns, strict=True))
     return MEANING.get(operation, getattr(np, operation, None))(*operands)
 
 

@@ -14,7 +14,7 @@ from vsacli.base.signals import WRENCH
 from vsacli.control.simulation.boundaries import boundaries
 from vsacli.control.simulation.closed_loop import ClosedLoop, LinearizingFeedback
 from vsacli.control.simulation.ending import Budget
-from vsacli.control.simulation.history import History, concatenate_histories, continuous, histories
+from vsacli.control.simulation.history import History, concatenate_histories, histories, integrate_continuous
 from vsacli.control.simulation.integrator import Integrator
 from vsacli.control.simulation.loop_equations import Computing, RecordedEquations
 from vsacli.control.simulation.tabulated import TabulatedReference
@@ -74,12 +74,12 @@ def linearized_run(
     """What happens under feedback linearization, and the states (samples first)."""
     reference = TabulatedReference(trajectory)
     loop = ClosedLoop(robot, LinearizingFeedback(robot, reference, gains), reference)
-    start = loop.packing.pack(*loop.plant.unpacked(start_of(robot, paired, trajectory, error)))
+    start = loop.packing.pack(*loop.plant.unpack_state(start_of(robot, paired, trajectory, error)))
     times = trajectory.times.block(0, trajectory.samples)
     budget = Budget(None, times)
     equations = RecordedEquations(loop, list(boundaries(loop, start)), budget, Computing("auto"))
     integrator = Integrator(equations, Tolerances(), lambda _: None)
-    integrated = continuous(loop, integrator, times, start)
+    integrated = integrate_continuous(loop, integrator, times, start)
     past = concatenate_histories(list(histories(robot, loop, integrated, 0.0)))
     return past, State(past.q, past.dq, past.theta, past.dtheta)
 

@@ -76,7 +76,7 @@ def _users_of(name: str, function: Any) -> list[Any]:
 PAIR, MATRIX = "actuators.pairs.pair_springs:PairSprings", "actuators.elasticity:MotorMatrix"
 BETA = f"{PAIR}.motor_accelerations"
 CURVATURE = f"{PAIR}.stiffness_curvature"
-DRIVE, TORQUES = "dynamics.drive:driven_by", "dynamics.drive:shaft_torques"
+DRIVE, TORQUES = "dynamics.drive:drive_without_limits", "dynamics.drive:shaft_torques"
 FRICTION, WINDINGS = "actuators.friction:FrictionLaws", "actuators.motor:Windings.variables"
 RATIO, STATE = (
     "actuators.mechanisms.ratios.ratio:ratio_partials",
@@ -92,8 +92,8 @@ MUTATIONS = (
         "tau_k (62), by the motor alone",
         "pair",
         f"{PAIR}.tau_transmission",
-        "return self._one.tau, ",
-        "return 1.01 * self._one.tau, ",
+        "return self._spring_1.tau, ",
+        "return 1.01 * self._spring_1.tau, ",
     ),
     Mutation("sigma_k (63)", "pair", f"{CUBIC}.stiffness", "3 * self", "3.03 * self"),
     Mutation("zeta_k (64)", "pair", f"{CUBIC}.slope", "6 *", "6.06 *"),
@@ -126,16 +126,21 @@ MUTATIONS = (
         Mutation(f"{term} in ({70 + row})", "pair", BETA, old, new)
         for row, term, old, new in (
             (0, "tau_e''", "ddtau_e - ", "1.01 * ddtau_e - "),
-            (0, "zeta_1 phi_1'^2", "= one.zeta * (", "= 1.01 * one.zeta * ("),
-            (0, "zeta_2 phi_2'^2", "+ two.zeta * (", "+ 1.01 * two.zeta * ("),
+            (0, "zeta_1 phi_1'^2", "= spring_1.zeta * (", "= 1.01 * spring_1.zeta * ("),
+            (0, "zeta_2 phi_2'^2", "+ spring_2.zeta * (", "+ 1.01 * spring_2.zeta * ("),
             (0, "sigma q''", "self.stiffness * ddq", "1.01 * self.stiffness * ddq"),
             (1, "sigma''", "ddstiffness - ", "1.01 * ddstiffness - "),
-            (1, "zeta q''", "(one.zeta + two.zeta) * ddq", "1.01 * (one.zeta + two.zeta) * ddq"),
+            (
+                1,
+                "zeta q''",
+                "(spring_1.zeta + spring_2.zeta) * ddq",
+                "1.01 * (spring_1.zeta + spring_2.zeta) * ddq",
+            ),
         )
     ),
     *(
         Mutation(f"eta_{side} phi_{side}'^2 in (71)", "pair", CURVATURE, term, f"1.01 * {term}")
-        for side, term in ((1, "self._one.eta"), (2, "self._two.eta"))
+        for side, term in ((1, "self._spring_1.eta"), (2, "self._spring_2.eta"))
     ),
     Mutation(
         "B_k theta_k'' (73)-(74)",
@@ -152,22 +157,22 @@ MUTATIONS = (
         "B_12 theta_k''",
         "serial",
         "dynamics.drive:_rotor_torques",
-        "uncoupled + coupling",
-        "uncoupled + 1.01 * coupling",
+        "own_torques + coupling",
+        "own_torques + 1.01 * coupling",
     ),
     Mutation(
         "B_12 theta_k'', sign",
         "serial",
         "dynamics.drive:_rotor_torques",
-        "uncoupled + coup",
-        "uncoupled - coup",
+        "own_torques + coup",
+        "own_torques - coup",
     ),
     Mutation(
         "spring between the motors",
         "pair",
         f"{PAIR}.tau_transmission",
-        "tau + between",
-        "tau + 1.01 * between",
+        "tau + coupling_torque",
+        "tau + 1.01 * coupling_torque",
     ),
     Mutation("motor friction", "pair", TORQUES, "+ friction.torque", "+ 1.01 * friction.torque"),
     Mutation("motor friction, sign", "pair", TORQUES, "+ friction.torque", "- friction.torque"),
@@ -177,7 +182,7 @@ MUTATIONS = (
     Mutation(
         "friction direction",
         "pair",
-        f"{FRICTION}._size",
+        f"{FRICTION}._coulomb_friction",
         "self.backward, self.forward",
         "self.forward, self.backward",
     ),
@@ -191,8 +196,8 @@ MUTATIONS = (
         "motor power",
         "pair",
         DRIVE,
-        "tau_motor * transmitted.dtheta",
-        "1.01 * tau_motor * transmitted.dtheta",
+        "tau_motor * transmission.dtheta",
+        "1.01 * tau_motor * transmission.dtheta",
     ),
     Mutation(
         "dissipated power, joint",
@@ -212,8 +217,8 @@ MUTATIONS = (
         "friction between links",
         "pair",
         "dynamics.dry_friction:joint_friction",
-        "tau=mul(size, tanh)",
-        "tau=mul(size, tanh * 1.01)",
+        "tau=mul(coulomb, tanh)",
+        "tau=mul(coulomb, tanh * 1.01)",
     ),
     Mutation(
         "damper between links",

@@ -27,7 +27,7 @@ from vsacli.actuators.reach import margin
 from vsacli.actuators.transmission import Command
 from vsacli.base.signals import commanded_names
 from vsacli.compute.vector import SymmetricTensor, Vector
-from vsacli.dynamics.drive import driven_by
+from vsacli.dynamics.drive import drive_without_limits
 from vsacli.dynamics.elastic_torques import joint_state, link_constants
 from vsacli.dynamics.recursion import recursion
 from vsacli.robot.kinematics import base_gravity
@@ -131,7 +131,7 @@ def command(actuator, samples=40, seed=0):
 
 def variables(joint, demand):
     with np.errstate(all="ignore"):
-        driven = driven_by(joint, demand, 0.01)
+        driven = drive_without_limits(joint, demand, 0.01)
     gap = margin(driven.stiffness, driven.stiffness_min, driven.stiffness_max)
     return {"tau_motor": driven.tau_motor, "theta": driven.theta, "margin": gap}
 

@@ -149,16 +149,16 @@ class Actuator(SpringAssembly, ABC):
     def limits(self) -> tuple[LimitCheck, ...]:
         """All limits of motors and springs, finite or not."""
         return tuple(
-            LimitCheck(flag, variable, number, (-bound, bound))
-            for number, (motor, deflection) in enumerate(
+            LimitCheck(flag, variable, motor_number, (-largest, largest))
+            for motor_number, (motor, deflection) in enumerate(
                 zip(self.motors, self.max_deflections, strict=True), 1
             )
-            for flag, variable, bound in (
+            for flag, variable, largest in (
                 (Flag.DEFLECTION_LIMIT, "phi", deflection),
                 (Flag.MOTOR_VELOCITY_LIMIT, "dtheta", motor.max_velocity),
                 (Flag.MOTOR_TORQUE_LIMIT, "tau_motor", motor.max_torque),
-                (Flag.CURRENT_LIMIT, "current", _bound_of(motor.max_current)),
-                (Flag.VOLTAGE_LIMIT, "voltage", _bound_of(motor.max_voltage)),
+                (Flag.CURRENT_LIMIT, "current", _bound_or_infinity(motor.max_current)),
+                (Flag.VOLTAGE_LIMIT, "voltage", _bound_or_infinity(motor.max_voltage)),
             )
         )
 
@@ -190,9 +190,9 @@ class Actuator(SpringAssembly, ABC):
         """Return the springs with their derivatives at unknowns and joint positions, one array for each."""
         raise NotImplementedError(f"{type(self).__name__} has no springs")
 
-    def springs_of(self, of_joint: JointVariables) -> ElasticState:
+    def springs_of(self, variables: JointVariables) -> ElasticState:
         """Return the springs with their derivatives from the motion of joint and motors."""
-        return self.springs(self.unknowns(of_joint.phi, of_joint.theta), of_joint.q)
+        return self.springs(self.unknowns(variables.phi, variables.theta), variables.q)
 
     @property
     def spring_group(self) -> Hashable:
@@ -220,6 +220,6 @@ class Actuator(SpringAssembly, ABC):
     """Path to the branch field."""
 
 
-def _bound_of(largest: float | None) -> float:
+def _bound_or_infinity(limit: float | None) -> float:
     """Return a largest value, infinite if there is none."""
-    return math.inf if largest is None else largest
+    return math.inf if limit is None else limit

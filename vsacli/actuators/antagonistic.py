@@ -55,8 +55,10 @@ class Antagonistic(VariableStiffness):
         # theta_1 - theta_2 is no result variable, so a limit on it could not be flagged.
         if self.coupling.domain != (-math.inf, math.inf):
             low, high = self.coupling.domain
-            ends = f"holds from {low:.4g} to {high:.4g} only, but the motors may be any distance apart"
-            yield FieldProblem(("coupling",), f"{ends}; take a law without an end, as polynomial or sinh")
+            range_text = f"holds from {low:.4g} to {high:.4g} only, but the motors may be any distance apart"
+            yield FieldProblem(
+                ("coupling",), f"{range_text}; take a law without an end, as polynomial or sinh"
+            )
         elif math.isfinite(self.coupling.max_deflection):
             reason = "is not known of a spring between motors; bound the springs of both sides"
             yield FieldProblem(("coupling", "max_deflection"), reason)
@@ -110,18 +112,18 @@ class Antagonistic(VariableStiffness):
     @property
     def spring_elements(self) -> tuple[SpringElement, ...]:
         """The springs of both sides, and the coupling."""
-        one, two = self.laws
-        sides = (SpringElement(one, -1.0, (1.0, 0.0)), SpringElement(two, -1.0, (0.0, 1.0)))
+        law_1, law_2 = self.laws
+        sides = (SpringElement(law_1, -1.0, (1.0, 0.0)), SpringElement(law_2, -1.0, (0.0, 1.0)))
         return sides if self.coupling is None else (*sides, SpringElement(self.coupling, 0.0, (1.0, -1.0)))
 
     def springs(self, unknowns: Components, _q: FloatArray) -> PairSprings:
         """Return both springs at their deflections, with the coupling at the difference."""
-        one, two = (law.state(phi) for law, phi in zip(self.laws, unknowns, strict=True))
-        law, apart = self.coupling, unknowns[0] - unknowns[1]
-        coupling = None if law is None else partial(law.derivatives, apart)
-        return PairSprings(one, two, partial(self._energy, unknowns), coupling)
+        spring_1, spring_2 = (law.state(phi) for law, phi in zip(self.laws, unknowns, strict=True))
+        law, coupling_deflection = self.coupling, unknowns[0] - unknowns[1]
+        coupling = None if law is None else partial(law.derivatives, coupling_deflection)
+        return PairSprings(spring_1, spring_2, partial(self._total_energy, unknowns), coupling)
 
-    def _energy(self, unknowns: Components) -> FloatArray:
+    def _total_energy(self, unknowns: Components) -> FloatArray:
         first, second = self.laws
         energy = first.energy(unknowns[0]) + second.energy(unknowns[1])
         return energy if self.coupling is None else energy + self.coupling.energy(unknowns[0] - unknowns[1])

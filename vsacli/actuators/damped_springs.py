@@ -77,14 +77,14 @@ class DampedSprings:
 
     def __init__(self, actuator: Actuator) -> None:
         self._actuator = actuator
-        self._motors = actuator.motor_count
-        self._sets_stiffness = STIFFNESS.key in actuator.commanded
-        self._has_spring = np.array(actuator.has_columns(VARIABLES["phi"])[: self._motors], dtype=float)
+        self._motor_count = actuator.motor_count
+        self._stiffness_commanded = STIFFNESS.key in actuator.commanded
+        self._has_spring = np.array(actuator.has_columns(VARIABLES["phi"])[: self._motor_count], dtype=float)
 
     def spread(self, phi: FloatArray) -> FloatArray:
         """Return the spread: the sum of the deflections parallel to the damper."""
-        parts = [factor * row for factor, row in zip(self._has_spring, phi, strict=False)]
-        return reduce(operator.add, parts)
+        terms = [factor * row for factor, row in zip(self._has_spring, phi, strict=False)]
+        return reduce(operator.add, terms)
 
     def slope(self, phi: FloatArray, q: FloatArray) -> FloatArray:
         """Return dT/d(spread) at constant stiffness: positive where the internal motion is stable."""
@@ -93,7 +93,7 @@ class DampedSprings:
     def laws_hold(self, phi: FloatArray) -> BoolArray:
         """Return where the springs' laws hold."""
         lowest, highest = np.array(self._actuator.phi_ranges).T[..., None]
-        inside: BoolArray = (phi[: self._motors] >= lowest) & (phi[: self._motors] <= highest)
+        inside: BoolArray = (phi[: self._motor_count] >= lowest) & (phi[: self._motor_count] <= highest)
         return np.asarray(np.all(inside, axis=0))
 
     def deflections_at_spread(self, spread: FloatArray, phi: FloatArray, command: Command) -> FloatArray:
@@ -101,7 +101,7 @@ class DampedSprings:
         spread_error = (spread - self.spread(phi)) / sum(self._has_spring)
         shares = zip_longest(phi, self._has_spring, fillvalue=0.0)
         phi = np.stack([row + spread_error * share for row, share in shares])
-        if not self._sets_stiffness:
+        if not self._stiffness_commanded:
             return phi
         stiffness = command.commanded[STIFFNESS.key]
         direction = self._rates_at_constant_spread(spread)
@@ -113,15 +113,15 @@ class DampedSprings:
 
     def equilibrium(self, command: Command, spread: float | None = None) -> FloatArray:
         """Return the deflections at which the springs carry the torque alone; or with a spread, if given."""
-        if self._sets_stiffness:
+        if self._stiffness_commanded:
             phi = self._actuator.solve(command.tau_e, command.commanded[STIFFNESS.key], command.q).deflections
         else:
             phi = self._actuator.transmit(command, SINGULAR_MARGIN, None).phi
         if spread is None:
             return phi
-        begin = self.spread(phi)
+        start_spread = self.spread(phi)
         for share in np.linspace(0, 1, CONTINUATION_STEPS + 1)[1:]:
-            phi = self.deflections_at_spread(begin + (spread - begin) * share, phi, command)
+            phi = self.deflections_at_spread(start_spread + (spread - start_spread) * share, phi, command)
         return phi
 
     def damper_motion(self, phi: FloatArray, command: Command) -> tuple[FloatArray, FloatArray]:
@@ -144,53 +144,55 @@ class DampedSprings:
         if rate is None or acceleration is None:
             rate, acceleration = self.damper_motion(phi, command)
         springs = self.springs_at(phi, command.q)
-        lower, upper, reached = self._range_and_reach(springs, phi, command, min_margin)
-        velocity = np.where(reached.singular | reached.infeasible, np.nan, rate)
+        lower, upper, reach = self._attainable_range_and_reach(springs, phi, command, min_margin)
+        velocity = np.where(reach.singular | reach.infeasible, np.nan, rate)
         dtheta = self._motor_velocities(springs, velocity, command)
         rates = self._coordinate_rates(command.dq, dtheta)
         ddtheta = self._motor_accelerations(springs, acceleration, rates, command)
-        none = np.full_like(command.q, np.nan)
+        absent = np.full_like(command.q, np.nan)
 
-        def of_motors(values: Components) -> FloatArray:
-            rows = [values[0], values[1] if self._motors > 1 else none]
-            return np.where(reached.infeasible, np.nan, np.stack(rows))
+        def mask_infeasible(values: Components) -> FloatArray:
+            rows = [values[0], values[1] if self._motor_count > 1 else absent]
+            return np.where(reach.infeasible, np.nan, np.stack(rows))
 
-        unstable = ~reached.infeasible & ~(springs.slope > 0)
+        unstable = ~reach.infeasible & ~(springs.slope > 0)
         has_spring = self._has_spring[:, None] > 0
-        stiffness = zip(STIFFNESS.names, self._stiffness(springs, rates, ddtheta, command), strict=True)
+        stiffness = zip(
+            STIFFNESS.names, self._stiffness_derivatives(springs, rates, ddtheta, command), strict=True
+        )
         return command.variables()._replace(
             **dict(stiffness),
-            phi=np.where(has_spring, of_motors(phi), np.nan),
-            dphi=np.where(has_spring, of_motors(rates), np.nan),
-            theta=of_motors(self._motor_positions(phi, command.q)),
-            dtheta=of_motors(dtheta),
-            ddtheta=of_motors(ddtheta),
-            tau_transmission=of_motors(springs.state.tau_transmission),
-            elastic_energy=np.where(reached.infeasible, np.nan, springs.state.energy),
-            det_A=np.where(reached.infeasible, np.nan, springs.state.determinant),
+            phi=np.where(has_spring, mask_infeasible(phi), np.nan),
+            dphi=np.where(has_spring, mask_infeasible(rates), np.nan),
+            theta=mask_infeasible(self._motor_positions(phi, command.q)),
+            dtheta=mask_infeasible(dtheta),
+            ddtheta=mask_infeasible(ddtheta),
+            tau_transmission=mask_infeasible(springs.state.tau_transmission),
+            elastic_energy=np.where(reach.infeasible, np.nan, springs.state.energy),
+            det_A=np.where(reach.infeasible, np.nan, springs.state.determinant),
             stiffness_min=lower,
             stiffness_max=upper,
-            flags=reached.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
+            flags=reach.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
         )
 
-    def _range_and_reach(
+    def _attainable_range_and_reach(
         self, springs: _DampedState, phi: FloatArray, command: Command, min_margin: float
     ) -> tuple[FloatArray, FloatArray, Reach]:
         """Return minimum and maximum stiffness at the torque of the springs, and the reach of the samples."""
-        lost, none = ~np.isfinite(phi[0]), np.full_like(command.q, np.nan)
-        never = np.zeros_like(lost)
-        if not self._sets_stiffness:
-            return none, none, Reach(lost, never, never, never)
+        is_lost, absent = ~np.isfinite(phi[0]), np.full_like(command.q, np.nan)
+        nowhere = np.zeros_like(is_lost)
+        if not self._stiffness_commanded:
+            return absent, absent, Reach(is_lost, nowhere, nowhere, nowhere)
         stiffness = command.commanded[STIFFNESS.key]
         solution = self._actuator.solve(springs.state.tau_e, stiffness, command.q)
-        reached = classify_stiffness(stiffness, solution, min_margin)
+        reach = classify_stiffness(stiffness, solution, min_margin)
         margin = self._margin(springs, stiffness)
         return (
             solution.lower,
             solution.upper,
             Reach(
-                infeasible=reached.infeasible | lost,
-                slack=reached.slack,
+                infeasible=reach.infeasible | is_lost,
+                slack=reach.slack,
                 singular=margin <= SINGULAR_MARGIN,
                 near_singular=(margin > SINGULAR_MARGIN) & (margin < min_margin),
             ),
@@ -204,57 +206,62 @@ class DampedSprings:
         divisor = 2 * stiffness * np.abs(curvature)
         return springs.pivot * springs.pivot / np.where(divisor > 0, divisor, np.nan)
 
-    def _rates_at_constant_spread(self, like: FloatArray) -> FloatArray:
+    def _rates_at_constant_spread(self, samples: FloatArray) -> FloatArray:
         """Return motor velocities that leave the spread unchanged, (motors, samples)."""
-        return np.stack((0 * like - self._has_spring[1], 0 * like + self._has_spring[0]))
+        return np.stack((0 * samples - self._has_spring[1], 0 * samples + self._has_spring[0]))
 
     def _motor_velocities(self, springs: _DampedState, velocity: FloatArray, command: Command) -> FloatArray:
-        still = self._coordinate_rates(command.dq, np.zeros((self._motors, 1)) * command.dq)
-        rate = command.commanded[STIFFNESS.names[1]] - springs.state.stiffness_rate(still)
-        return self._solve_spreading(springs, velocity + sum(self._has_spring) * command.dq, rate)
+        rates_at_rest = self._coordinate_rates(command.dq, np.zeros((self._motor_count, 1)) * command.dq)
+        rate = command.commanded[STIFFNESS.names[1]] - springs.state.stiffness_rate(rates_at_rest)
+        return self._solve_motor_rows(springs, velocity + sum(self._has_spring) * command.dq, rate)
 
     def _motor_accelerations(
         self, springs: _DampedState, acceleration: FloatArray, rates: Components, command: Command
     ) -> FloatArray:
-        still = self._coordinate_rates(command.ddq, np.zeros((self._motors, 1)) * command.ddq)
+        acceleration_rates = self._coordinate_rates(
+            command.ddq, np.zeros((self._motor_count, 1)) * command.ddq
+        )
         state = springs.state
-        bias = state.stiffness_curvature(rates) + state.stiffness_rate(still)
+        bias = state.stiffness_curvature(rates) + state.stiffness_rate(acceleration_rates)
         remainder = command.commanded[STIFFNESS.names[2]] - bias
-        return self._solve_spreading(springs, acceleration + sum(self._has_spring) * command.ddq, remainder)
+        return self._solve_motor_rows(springs, acceleration + sum(self._has_spring) * command.ddq, remainder)
 
-    def _solve_spreading(
-        self, springs: _DampedState, of_spread: FloatArray, of_stiffness: FloatArray
+    def _solve_motor_rows(
+        self, springs: _DampedState, spread_row: FloatArray, stiffness_row: FloatArray
     ) -> FloatArray:
         """Return the solution of both rows; of the first alone if there is one motor."""
         if springs.spreading is None:
-            return of_spread[None]
-        return np.stack(springs.spreading.solve(of_spread, of_stiffness))
+            return spread_row[None]
+        return np.stack(springs.spreading.solve(spread_row, stiffness_row))
 
-    def _stiffness(
+    def _stiffness_derivatives(
         self, springs: _DampedState, rates: Components, ddtheta: FloatArray, command: Command
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the commanded stiffness, or that of the springs, with its derivatives."""
-        if self._sets_stiffness:
+        if self._stiffness_commanded:
             stiffness, rate, acceleration = (command.commanded[name] for name in STIFFNESS.names)
             return stiffness, rate, acceleration
-        state, turning = springs.state, self._coordinate_rates(command.ddq, ddtheta)
-        acceleration = state.stiffness_curvature(rates) + state.stiffness_rate(turning)
+        state, acceleration_rates = springs.state, self._coordinate_rates(command.ddq, ddtheta)
+        acceleration = state.stiffness_curvature(rates) + state.stiffness_rate(acceleration_rates)
         return state.stiffness, state.stiffness_rate(rates), acceleration
 
     def springs_at(self, phi: FloatArray, q: FloatArray) -> _DampedState:
         """Return the state of the springs at deflections and joint positions."""
         state = self._elastic_state(phi, q)
-        if not self._sets_stiffness:
+        if not self._stiffness_commanded:
             return _DampedState(state, None)
-        (one, two), decoupling = self._has_spring, state.matrix
-        return _DampedState(state, MotorMatrix(one, two, decoupling.stiffness_1, decoupling.stiffness_2))
+        (spread_1, spread_2), decoupling_matrix = self._has_spring, state.matrix
+        return _DampedState(
+            state,
+            MotorMatrix(spread_1, spread_2, decoupling_matrix.stiffness_1, decoupling_matrix.stiffness_2),
+        )
 
     def _elastic_state(self, phi: FloatArray, q: FloatArray) -> ElasticState:
         theta = self._motor_positions(phi, q)
         return self._actuator.springs(self._actuator.unknowns(theta - q, theta), q)
 
     def _motor_positions(self, phi: FloatArray, q: FloatArray) -> FloatArray:
-        return self._actuator.motor_positions(phi[: self._motors], q)
+        return self._actuator.motor_positions(phi[: self._motor_count], q)
 
     def _coordinate_rates(self, dq: FloatArray, dtheta: FloatArray) -> Components:
         """Return the rates of the coordinates of the springs from velocities of joint and motors."""

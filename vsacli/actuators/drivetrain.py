@@ -35,39 +35,45 @@ class Rotors:
 
     def __init__(self, actuators: Sequence[Actuator]) -> None:
         motors = [
-            (motor.inertia, each.coupled_rotors, 1 - 2 * side)
-            for each in actuators
-            for side, motor in enumerate(each.motors)
+            (motor.inertia, actuator.coupled_rotors, 1 - 2 * side)
+            for actuator in actuators
+            for side, motor in enumerate(actuator.motors)
         ]
-        inertia, coupling, to_other = zip(*motors, strict=True) if motors else ((), (), ())
+        inertia, coupling, offset_to_other = zip(*motors, strict=True) if motors else ((), (), ())
         self._inertia = np.stack(inertia) if inertia else np.zeros(0)
         self._coupling = np.stack(coupling) if coupling else np.zeros(0)
-        self._coupled = np.flatnonzero([not is_zero(each) for each in coupling])
-        self._other = self._coupled + np.array(to_other, dtype=np.intp)[self._coupled]
+        self._coupled_rotors = np.flatnonzero([not is_zero(actuator) for actuator in coupling])
+        self._other_rotor = (
+            self._coupled_rotors + np.array(offset_to_other, dtype=np.intp)[self._coupled_rotors]
+        )
 
     def torques(self, ddtheta: FloatArray) -> FloatArray:
         """Return B theta''."""
         torques: FloatArray = self._inertia * ddtheta
-        if self._coupled.size:
-            torques[..., self._coupled] += self._coupling[self._coupled] * ddtheta[..., self._other]
+        if self._coupled_rotors.size:
+            torques[..., self._coupled_rotors] += (
+                self._coupling[self._coupled_rotors] * ddtheta[..., self._other_rotor]
+            )
         return torques
 
     def accelerations(self, torques: FloatArray) -> FloatArray:
         """Return theta'' = B^-1 of the torques that accelerate the rotors."""
         accelerations: FloatArray = torques / self._inertia
-        if self._coupled.size:
-            coupled, other = self._coupled, self._other
-            share = self._coupling[coupled] / self._inertia[other]
-            effective = self._inertia[coupled] - share * self._coupling[coupled]
-            accelerations[..., coupled] = (torques[..., coupled] - share * torques[..., other]) / effective
+        if self._coupled_rotors.size:
+            coupled, other = self._coupled_rotors, self._other_rotor
+            coupling_ratio = self._coupling[coupled] / self._inertia[other]
+            effective_inertia = self._inertia[coupled] - coupling_ratio * self._coupling[coupled]
+            accelerations[..., coupled] = (
+                torques[..., coupled] - coupling_ratio * torques[..., other]
+            ) / effective_inertia
         return accelerations
 
     def accelerations_with_held(self, torques: FloatArray, held: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Return theta'' with some motors held, and the holding torques, 0 for others; (..., motors)."""
         held_or_coupled = held.copy()
-        held_or_coupled[..., self._coupled] |= held[..., self._other]
-        moving = np.where(held_or_coupled, torques / self._inertia, self.accelerations(torques))
-        accelerations = np.where(held, 0.0, moving)
+        held_or_coupled[..., self._coupled_rotors] |= held[..., self._other_rotor]
+        free_accelerations = np.where(held_or_coupled, torques / self._inertia, self.accelerations(torques))
+        accelerations = np.where(held, 0.0, free_accelerations)
         return accelerations, np.where(held, torques - self.torques(accelerations), 0.0)
 
 
@@ -123,15 +129,15 @@ class Drivetrain:
         self._rigid_joints = np.flatnonzero(self.rigid)
         groups = indices_of_equals([each.spring_group if each.sprung else None for each in actuators])
         self._groups = [self._make_group(joints, actuators) for group, joints in groups if group is not None]
-        self._is_one_group = len(self._groups) == 1 and not self.rigid.any()
+        self._is_single_group = len(self._groups) == 1 and not self.rigid.any()
         sprung = [actuator for actuator in actuators if actuator.sprung]
-        ends = [np.stack(each) for actuator in sprung for each in actuator.phi_ranges]
-        self.domain: FloatArray = np.stack(ends).T if ends else np.zeros((2, 0))
+        phi_limits = [np.stack(each) for actuator in sprung for each in actuator.phi_ranges]
+        self.domain: FloatArray = np.stack(phi_limits).T if phi_limits else np.zeros((2, 0))
 
     def _make_group(self, joints: Sequence[int], actuators: Sequence[Actuator]) -> _SpringGroup:
         springs = np.stack([np.flatnonzero(self.spring_joint == joint) for joint in joints])
-        members = [actuators[joint] for joint in joints]
-        return _SpringGroup(type(members[0]).elasticity(members), np.array(joints), springs)
+        group_actuators = [actuators[joint] for joint in joints]
+        return _SpringGroup(type(group_actuators[0]).elasticity(group_actuators), np.array(joints), springs)
 
     def limited(self, torque: FloatArray) -> FloatArray:
         """Return the torques that the motors exert, (..., motors): commanded ones, at most the largest."""
@@ -143,9 +149,9 @@ class Drivetrain:
 
     def of_joints(self, values: FloatArray) -> FloatArray:
         """Return (..., joints, 2) from (..., motors), NaN where there is no motor."""
-        result = np.full_like(values, np.nan, shape=(*values.shape[:-1], *self.present.shape))
-        result[..., self.present] = values
-        return result
+        by_joint = np.full_like(values, np.nan, shape=(*values.shape[:-1], *self.present.shape))
+        by_joint[..., self.present] = values
+        return by_joint
 
     def of_motors_by_joint(self, sprung: FloatArray, rigid: FloatArray) -> FloatArray:
         """Return (..., joints, 2) from values of sprung motors, (..., springs), and of joints, (..., joints).
@@ -169,81 +175,93 @@ class Drivetrain:
 
     def ranged(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return the coordinates that `domain` bounds, (..., springs), at positions of joints and motors."""
-        parts = [each.ranged(*positions) for each, positions in self._positions(q, theta)]
-        return self.of_springs(parts, theta)
+        coordinates_of_groups = [
+            elasticity.ranged(*positions) for elasticity, positions in self._group_positions(q, theta)
+        ]
+        return self.of_springs(coordinates_of_groups, theta)
 
     def torques(self, q: FloatArray, theta: FloatArray) -> SpringTorques:
         """Return the torques of the springs: on links, (..., joints), and against motors, (..., springs)."""
-        parts = [elasticity.torques(at) for elasticity, at in self.at(q, theta)]
+        parts = [elasticity.torques(coordinates) for elasticity, coordinates in self.at(q, theta)]
         return SpringTorques(
-            self.by_joint([part.tau_e for part in parts], q),
-            self.of_springs([part.tau_transmission for part in parts], theta),
+            self.by_joint([group_torques.tau_e for group_torques in parts], q),
+            self.of_springs([group_torques.tau_transmission for group_torques in parts], theta),
         )
 
     def energy(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return the elastic energy of each joint, (..., joints)."""
-        return self.by_joint([elasticity.energy(at) for elasticity, at in self.at(q, theta)], q)
+        return self.by_joint(
+            [elasticity.energy(coordinates) for elasticity, coordinates in self.at(q, theta)], q
+        )
 
     def stiffness(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return the stiffness (11) of the joints, (..., joints), 0 without springs."""
-        return self.by_joint([each.state(at).stiffness for each, at in self.at(q, theta)], q)
+        return self.by_joint([elasticity.state(at).stiffness for elasticity, at in self.at(q, theta)], q)
 
     def determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return det A (67), (..., joints), NaN where no stiffness is commanded."""
-        determinants = self.by_joint([each.state(at).determinant for each, at in self.at(q, theta)], q)
+        determinants = self.by_joint(
+            [elasticity.state(at).determinant for elasticity, at in self.at(q, theta)], q
+        )
         return np.where(self.rigid, np.nan, determinants)
 
     def state(self, q: FloatArray, theta: FloatArray, dq: FloatArray, dtheta: FloatArray) -> DrivetrainState:
         """Return the springs with their derivatives, at positions and velocities of joints and motors."""
-        parts = [elasticity.state(at) for elasticity, at in self.at(q, theta)]
-        rates = [[at[..., number] for number in range(at.shape[-1])] for _, at in self.at(dq, dtheta)]
-        return DrivetrainState(self, q, theta, list(zip(parts, rates, strict=True)))
+        states = [elasticity.state(coordinate_rates) for elasticity, coordinate_rates in self.at(q, theta)]
+        rates = [
+            [coordinate_rates[..., coordinate] for coordinate in range(coordinate_rates.shape[-1])]
+            for _, coordinate_rates in self.at(dq, dtheta)
+        ]
+        return DrivetrainState(self, q, theta, list(zip(states, rates, strict=True)))
 
     def of_groups(self, values: FloatArray) -> list[FloatArray]:
         """Return the part of each group of actuators, (..., joints), of (..., joints)."""
-        return [values if self._is_one_group else values[..., group.joints] for group in self._groups]
+        return [values if self._is_single_group else values[..., group.joints] for group in self._groups]
 
-    def by_joint(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
+    def by_joint(self, parts: Sequence[FloatArray], template: FloatArray) -> FloatArray:
         """Return (..., joints) from the parts of the groups; 0 for joints without springs."""
-        if self._is_one_group:
+        if self._is_single_group:
             return parts[0]
-        result = np.zeros_like(like)
-        for group, part in zip(self._groups, parts, strict=True):
-            result[..., group.joints] = part
+        result = np.zeros_like(template)
+        for group, values in zip(self._groups, parts, strict=True):
+            result[..., group.joints] = values
         return result
 
-    def of_springs(self, parts: Sequence[FloatArray], like: FloatArray) -> FloatArray:
+    def of_springs(self, parts: Sequence[FloatArray], template: FloatArray) -> FloatArray:
         """Return (..., springs) from the parts of the groups, (..., joints, motors)."""
-        if self._is_one_group:
-            return parts[0].reshape(*like.shape)
-        result = np.empty_like(like)
-        for group, part in zip(self._groups, parts, strict=True):
-            result[..., group.springs] = part
+        if self._is_single_group:
+            return parts[0].reshape(*template.shape)
+        result = np.empty_like(template)
+        for group, values in zip(self._groups, parts, strict=True):
+            result[..., group.springs] = values
         return result
 
-    def by_motor(self, parts: Sequence[Components], like: FloatArray) -> FloatArray:
+    def by_motor(self, parts: Sequence[Components], template: FloatArray) -> FloatArray:
         """Return (..., springs) from the parts of the groups, one array (..., joints) for each motor."""
-        result = np.empty_like(like)
-        for group, part in zip(self._groups, parts, strict=True):
-            for number, of_motor in enumerate(part):
-                springs = slice(number, None, len(part)) if self._is_one_group else group.springs[:, number]
+        result = np.empty_like(template)
+        for group, rows in zip(self._groups, parts, strict=True):
+            for motor, of_motor in enumerate(rows):
+                springs = slice(motor, None, len(rows)) if self._is_single_group else group.springs[:, motor]
                 result[..., springs] = of_motor
         return result
 
     def at(self, q: FloatArray, theta: FloatArray) -> list[tuple[Elasticity, FloatArray]]:
         """Return the springs of each group with their coordinates (..., joints, coordinates), or rates."""
-        return [(each, each.coordinates(*positions)) for each, positions in self._positions(q, theta)]
+        return [
+            (elasticity, elasticity.coordinates(*positions))
+            for elasticity, positions in self._group_positions(q, theta)
+        ]
 
-    def _positions(
+    def _group_positions(
         self, q: FloatArray, theta: FloatArray
     ) -> Iterator[tuple[Elasticity, tuple[FloatArray, FloatArray]]]:
         """Yield the springs of each group with the positions of joints and motors, (..., joints, motors)."""
-        for group, of_joints in zip(self._groups, self.of_groups(q), strict=True):
-            if self._is_one_group:
-                of_motors = theta.reshape(*theta.shape[:-1], *group.springs.shape)
+        for group, group_q in zip(self._groups, self.of_groups(q), strict=True):
+            if self._is_single_group:
+                group_theta = theta.reshape(*theta.shape[:-1], *group.springs.shape)
             else:
-                of_motors = theta[..., group.springs]
-            yield group.elasticity, (of_joints, of_motors)
+                group_theta = theta[..., group.springs]
+            yield group.elasticity, (group_q, group_theta)
 
 
 class DrivetrainState:
@@ -257,34 +275,45 @@ class DrivetrainState:
         drivetrain: Drivetrain,
         q: FloatArray,
         theta: FloatArray,
-        parts: Sequence[tuple[ElasticState, Components]],
+        states_and_rates: Sequence[tuple[ElasticState, Components]],
     ) -> None:
-        self._drivetrain, self._q, self._theta, self._parts = drivetrain, q, theta, parts
+        self._drivetrain, self._q, self._theta, self._states_and_rates = (
+            drivetrain,
+            q,
+            theta,
+            states_and_rates,
+        )
 
     @property
     def tau_e(self) -> FloatArray:
         """Elastic torque (6)."""
-        return self._drivetrain.by_joint([part.tau_e for part, _ in self._parts], self._q)
+        return self._drivetrain.by_joint([state.tau_e for state, _ in self._states_and_rates], self._q)
 
     @property
     def dtau_e(self) -> FloatArray:
         """Rate of the elastic torque (17)."""
-        return self._drivetrain.by_joint([part.torque_rate(rates) for part, rates in self._parts], self._q)
+        return self._drivetrain.by_joint(
+            [state.torque_rate(rates) for state, rates in self._states_and_rates], self._q
+        )
 
     @property
     def stiffness(self) -> FloatArray:
         """Stiffness of the joints (11)."""
-        return self._drivetrain.by_joint([part.stiffness for part, _ in self._parts], self._q)
+        return self._drivetrain.by_joint([state.stiffness for state, _ in self._states_and_rates], self._q)
 
     @property
     def dstiffness(self) -> FloatArray:
         """Rate of the stiffness (18)."""
-        return self._drivetrain.by_joint([part.stiffness_rate(rates) for part, rates in self._parts], self._q)
+        return self._drivetrain.by_joint(
+            [state.stiffness_rate(rates) for state, rates in self._states_and_rates], self._q
+        )
 
     @property
     def tau_transmission(self) -> FloatArray:
         """Torque against each motor (62)."""
-        return self._drivetrain.by_motor([part.tau_transmission for part, _ in self._parts], self._theta)
+        return self._drivetrain.by_motor(
+            [state.tau_transmission for state, _ in self._states_and_rates], self._theta
+        )
 
     def motor_accelerations(
         self, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
@@ -296,9 +325,9 @@ class DrivetrainState:
             ddtau_e: Second derivative of the elastic torque.
             ddstiffness: Second derivative of the stiffness; ignored where it is not commanded.
         """
-        wanted = zip(*map(self._drivetrain.of_groups, (ddq, ddtau_e, ddstiffness)), strict=True)
-        parts = [
-            part.motor_accelerations(rates, *of_part)
-            for (part, rates), of_part in zip(self._parts, wanted, strict=True)
+        demands = zip(*map(self._drivetrain.of_groups, (ddq, ddtau_e, ddstiffness)), strict=True)
+        accelerations = [
+            state.motor_accelerations(rates, *demand)
+            for (state, rates), demand in zip(self._states_and_rates, demands, strict=True)
         ]
-        return self._drivetrain.by_motor(parts, self._theta)
+        return self._drivetrain.by_motor(accelerations, self._theta)

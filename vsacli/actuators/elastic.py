@@ -26,7 +26,7 @@ from vsacli.base.flags import Flag, has_flag
 from vsacli.documents.fields import POSITIVE, OneOf, RecordOf, number, value
 from vsacli.documents.record_checks import construct_unchecked
 
-EXAMPLE_STIFFNESS = {"revolute": 1000, "prismatic": 10000}
+EXAMPLE_STIFFNESSES = {"revolute": 1000, "prismatic": 10000}
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Elastic(Actuator):
         """Return a motor and a spring: a linear one, or one of the law."""
         motor = Motor.example(joint_type)
         if mechanism is None:
-            return {"motor": motor, "stiffness": EXAMPLE_STIFFNESS[joint_type]}
+            return {"motor": motor, "stiffness": EXAMPLE_STIFFNESSES[joint_type]}
         return {"motor": motor, "spring": {"type": mechanism, **LAWS[mechanism].examples[joint_type]}}
 
     @classmethod
@@ -98,10 +98,10 @@ class Elastic(Actuator):
     @cached_property
     def limits(self) -> tuple[LimitCheck, ...]:
         """The limits of every actuator, and the torques that the spring can carry."""
-        return *super().limits, self._carriable
+        return *super().limits, self._torque_limit
 
     @property
-    def _carriable(self) -> LimitCheck:
+    def _torque_limit(self) -> LimitCheck:
         endless = (-math.inf, math.inf)
         torques = endless if self.spring is None else self.spring.torque_range
         return LimitCheck(Flag.INFEASIBLE, "tau_e", None, torques)
@@ -113,14 +113,14 @@ class Elastic(Actuator):
 
         NaN where tau_e cannot be carried; derivatives, which require 1/sigma, also where sigma is zero.
         """
-        infeasible = has_flag(self._carriable.flags(command.arrays()), Flag.INFEASIBLE)
+        infeasible = has_flag(self._torque_limit.flags(command.arrays()), Flag.INFEASIBLE)
         solution = self.solve(command.tau_e, np.full_like(command.tau_e, np.nan), command.q)
         phi = np.where(infeasible, np.nan, solution.phi_1)
         spring = self.springs((phi,), command.q)
         rates = spring.rates(command.dtau_e, command.q, command.dq)
         still = np.zeros_like(command.q)
         (ddphi,) = spring.motor_accelerations(rates, still, command.ddtau_e, still)
-        reached = Reach(
+        reach = Reach(
             infeasible=infeasible,
             slack=infeasible & self.law.pulls_only & (command.tau_e < 0),
             singular=spring.stiffness == 0,
@@ -138,7 +138,7 @@ class Elastic(Actuator):
             ddtheta=ddphi + command.ddq,
             tau_transmission=spring.tau_transmission[0],
             elastic_energy=spring.energy,
-            flags=reached.flags,
+            flags=reach.flags,
         )
 
     def springs(self, unknowns: Components, _q: FloatArray) -> SingleSpring:
@@ -147,14 +147,14 @@ class Elastic(Actuator):
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, _q: FloatArray) -> PairSolution:
         """Return the deflection at which the spring carries the torque; the stiffness cannot be chosen."""
-        never = np.zeros_like(tau_e, dtype=bool)
+        nowhere = np.zeros_like(tau_e, dtype=bool)
         deflection = self.law.deflection(tau_e)
-        return PairSolution(stiffness, stiffness, never, never, never, deflection, stiffness)
+        return PairSolution(stiffness, stiffness, nowhere, nowhere, nowhere, deflection, stiffness)
 
     @classmethod
     def elasticity(cls, actuators: Sequence[Self]) -> Elasticity:
         """Return the springs of several joints."""
-        linear = [actuator.stiffness for actuator in actuators if actuator.stiffness is not None]
-        if len(linear) == len(actuators):
-            return SingleSprings(LinearRows(linear))
+        linear_stiffnesses = [actuator.stiffness for actuator in actuators if actuator.stiffness is not None]
+        if len(linear_stiffnesses) == len(actuators):
+            return SingleSprings(LinearRows(linear_stiffnesses))
         return SingleSprings(SpringRows([(actuator.law,) for actuator in actuators]))

@@ -27,12 +27,12 @@ def indices_of_equals(keys: Sequence[_Key]) -> Iterator[tuple[_Key, list[int]]]:
 
     While parameters are symbols, whose values are unknown, only one and the same object equals itself.
     """
-    rest = list(range(len(keys)))
-    while rest:
-        first = keys[rest[0]]
-        equal = [index for index in rest if _is_equal(keys[index], first)]
-        yield first, equal
-        rest = [index for index in rest if index not in equal]
+    remaining = list(range(len(keys)))
+    while remaining:
+        first_key = keys[remaining[0]]
+        equal_indices = [index for index in remaining if _is_equal(keys[index], first_key)]
+        yield first_key, equal_indices
+        remaining = [index for index in remaining if index not in equal_indices]
 
 
 def _is_equal(key: object, other: object) -> bool:

@@ -57,9 +57,9 @@ class Friction(DeclaredRecord):
         It is not checked: values were checked on the shaft, or are duals.
         """
         backward, forward = self.coulomb
-        swapped = backward is not forward and ratio < 0
+        is_reversed = backward is not forward and ratio < 0
         geared = {
-            "coulomb": tuple(abs(ratio) * size for size in self.coulomb[:: -1 if swapped else 1]),
+            "coulomb": tuple(abs(ratio) * coulomb for coulomb in self.coulomb[:: -1 if is_reversed else 1]),
             "offset": ratio * self.offset + 0.0,  # without the sign of zero
             "width": self.width / abs(ratio),
         }
@@ -86,17 +86,17 @@ class FrictionLaws(NamedTuple):
     @classmethod
     def of(cls, frictions: Sequence[Friction | None]) -> FrictionLaws | None:
         """Return the laws, one per entry on the last axis; None if no entry has friction."""
-        laws = cls.over_samples(frictions)
-        return laws and cls(*(values[:, 0] for values in laws))
+        law_rows = cls.over_samples(frictions)
+        return law_rows and cls(*(values[:, 0] for values in law_rows))
 
     @classmethod
     def over_samples(cls, frictions: Sequence[Friction | None]) -> FrictionLaws | None:
         """Return the laws, one per entry on the first axis, before an axis of samples; see `of`."""
         if not any(frictions):
             return None
-        laws = [friction or NO_FRICTION for friction in frictions]
-        rows = [(*law.coulomb, law.offset, law.width) for law in laws]
-        return cls(*map(stack_constants, zip(*rows, strict=True)))
+        entries = [friction or NO_FRICTION for friction in frictions]
+        constants = [(*law.coulomb, law.offset, law.width) for law in entries]
+        return cls(*map(stack_constants, zip(*constants, strict=True)))
 
     @property
     def sharp(self) -> BoolArray:
@@ -122,24 +122,26 @@ class FrictionLaws(NamedTuple):
         sign = sign_of_motion(velocity)
         if direction is not None:
             sign = np.where(np.isnan(direction), sign, direction)
-        smooth = np.tanh(velocity / np.where(self.width > 0, self.width, 1.0))
-        return self._size(velocity, sign) * np.where(self.width > 0, smooth, sign) + self.offset
+        tanh = np.tanh(velocity / np.where(self.width > 0, self.width, 1.0))
+        return self._coulomb_friction(velocity, sign) * np.where(self.width > 0, tanh, sign) + self.offset
 
     def direction_beyond(self, torque: FloatArray) -> FloatArray:
         """Return 1 where a torque exceeds the holding friction, -1 where it is below its negative, else 0."""
-        coulomb = torque - self.offset
-        outside = np.where(coulomb > self.forward, 1.0, np.where(coulomb < -self.backward, -1.0, 0.0))
-        return np.where(self.sharp, outside, 0.0)
+        excess_torque = torque - self.offset
+        direction = np.where(
+            excess_torque > self.forward, 1.0, np.where(excess_torque < -self.backward, -1.0, 0.0)
+        )
+        return np.where(self.sharp, direction, 0.0)
 
     def power(self, velocity: FloatArray, acceleration: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return power and rate of smooth friction, offset included; of sharp friction, of the offset."""
         width = np.where(self.width > 0, self.width, 1.0)
-        smooth = np.tanh(velocity / width)
-        size = np.where(self.width > 0, self._size(velocity, smooth), 0.0)
-        torque = size * smooth + self.offset
-        return torque * velocity, (torque + size * (1 - smooth * smooth) / width * velocity) * acceleration
+        tanh = np.tanh(velocity / width)
+        coulomb = np.where(self.width > 0, self._coulomb_friction(velocity, tanh), 0.0)
+        torque = coulomb * tanh + self.offset
+        return torque * velocity, (torque + coulomb * (1 - tanh * tanh) / width * velocity) * acceleration
 
-    def _size(self, velocity: FloatArray, sign: FloatArray) -> FloatArray:
+    def _coulomb_friction(self, velocity: FloatArray, sign: FloatArray) -> FloatArray:
         """Return the Coulomb friction: by the direction if sharp, else by the velocity."""
         return np.where(np.where(self.width > 0, velocity, sign) < 0, self.backward, self.forward)
 

@@ -31,29 +31,33 @@ def mechanisms_of(kind: str) -> tuple[str, ...]:
     """Return the mechanisms or spring laws of which new actuators of a kind can be made."""
     from vsacli.actuators.laws import LAWS  # imports NumPy, which a help text does not need
 
-    of_kinds = {
+    mechanisms_by_kind = {
         "antagonistic": tuple(LAWS),
         "elastic": tuple(law for law in LAWS if law not in TENDONS),
         "serial": tuple(MECHANISMS),
     }
-    return of_kinds.get(kind, ())
+    return mechanisms_by_kind.get(kind, ())
 
 
-def kind_and_mechanism(words: str) -> tuple[str, str | None]:
+def kind_and_mechanism(text: str) -> tuple[str, str | None]:
     """Return a kind of actuator and its mechanism or spring law; None for the usual one.
 
     Args:
-        words: `KIND` or `KIND:MECHANISM`; a mechanism alone is one of a serial actuator.
+        text: `KIND` or `KIND:MECHANISM`; a mechanism alone is one of a serial actuator.
 
     Raises:
         InputError: There is no such kind, or it has no such mechanism.
     """
-    kind, colon, mechanism = words.partition(":")
+    kind, colon, mechanism = text.partition(":")
     if kind in MECHANISMS and not colon:
         return "serial", kind
     if kind not in ACTUATORS:
-        homes = [f"{home}:{kind}" for home in ACTUATORS if kind in mechanisms_of(home)]
-        hint = f"; write {' or '.join(homes)}" if homes else did_you_mean(kind, (*ACTUATORS, *MECHANISMS))
+        suggestions = [f"{owner}:{kind}" for owner in ACTUATORS if kind in mechanisms_of(owner)]
+        hint = (
+            f"; write {' or '.join(suggestions)}"
+            if suggestions
+            else did_you_mean(kind, (*ACTUATORS, *MECHANISMS))
+        )
         raise InputError.one(f"{kind!r} is not a kind of actuator{hint}")
     names = mechanisms_of(kind) if colon else ()
     if colon and mechanism not in names:
@@ -62,17 +66,17 @@ def kind_and_mechanism(words: str) -> tuple[str, str | None]:
     return kind, mechanism or None
 
 
-def example(words: str, joint_type: str) -> dict[str, Any]:
+def example(text: str, joint_type: str) -> dict[str, Any]:
     """Return plausible values of a joint's key `actuator`.
 
     Args:
-        words: Kind of actuator and its mechanism, as in `kind_and_mechanism`.
+        text: Kind of actuator and its mechanism, as in `kind_and_mechanism`.
         joint_type: Type of the joint.
 
     Raises:
         InputError: There is no such kind or mechanism, or it does not drive such joints.
     """
-    kind, mechanism = kind_and_mechanism(words)
+    kind, mechanism = kind_and_mechanism(text)
     if mechanism is not None and not _has_example(mechanism, joint_type):
         if mechanism in MECHANISMS and joint_type not in MECHANISMS[mechanism].joint_types:
             reason = f"{mechanism} turns about an axis, and drives no {joint_type} joint"

@@ -29,9 +29,9 @@ from vsacli.documents.record_checks import DeclaredRecord, fault_of_number
 JOINT, SHAFT = "joint", "shaft"
 """Sides of a gear."""
 
-_ON_SIDE = "joint side of the gear unless side is shaft"
+_SIDE_TEXT = "joint side of the gear unless side is shaft"
 
-_ON_EITHER_SIDE = {
+_REFLECTED = {
     "inertia": units.MOTOR_INERTIA,
     "damping": units.DAMPING,
     "max_torque": units.TORQUE,
@@ -42,7 +42,7 @@ _ON_EITHER_SIDE = {
 }
 """Quantities of the values that are given on either side of the gear."""
 
-NEEDED = {
+REQUIRED_WITH = {
     "torque_constant": ("gear_ratio",),
     "resistance": ("torque_constant",),
     "max_current": ("torque_constant",),
@@ -89,17 +89,17 @@ class JointMotor:
 class Motor(DeclaredRecord):
     """A motor as declared: on the joint side of its gear, or with `side: shaft` on its own shaft."""
 
-    inertia: float = number(units.MOTOR_INERTIA, f"inertia of the drive, {_ON_SIDE}", check=POSITIVE)
-    damping: float = number(units.DAMPING, f"viscous damping, {_ON_SIDE}", check=NON_NEGATIVE, default=0.0)
+    inertia: float = number(units.MOTOR_INERTIA, f"inertia of the drive, {_SIDE_TEXT}", check=POSITIVE)
+    damping: float = number(units.DAMPING, f"viscous damping, {_SIDE_TEXT}", check=NON_NEGATIVE, default=0.0)
     max_torque: float = number(
         units.TORQUE,
-        f"largest |torque|, {_ON_SIDE}; flagged beyond",
+        f"largest |torque|, {_SIDE_TEXT}; flagged beyond",
         check=POSITIVE_OR_INFINITE,
         default=math.inf,
     )
     max_velocity: float = number(
         units.VELOCITY,
-        f"largest |velocity|, {_ON_SIDE}; flagged beyond",
+        f"largest |velocity|, {_SIDE_TEXT}; flagged beyond",
         check=POSITIVE_OR_INFINITE,
         default=math.inf,
     )
@@ -117,7 +117,7 @@ class Motor(DeclaredRecord):
         "N m, rad/s at any joint",
         default=None,
     )
-    friction: Friction | None = value(RecordOf(Friction), f"dry friction, {_ON_SIDE}", default=None)
+    friction: Friction | None = value(RecordOf(Friction), f"dry friction, {_SIDE_TEXT}", default=None)
     torque_constant: float | None = number(
         units.TORQUE_CONSTANT,
         "ratio of torque to current, and so of voltage to velocity, on the motor shaft; requires "
@@ -156,41 +156,43 @@ class Motor(DeclaredRecord):
         if ratio is None:
             return
         if self.side is None and ratio != 1:
-            yield self._without_side(ratio)
+            yield self._missing_side_problem(ratio)
             return
         inertia = self.at_joint.inertia
         if fault_of_number(inertia, POSITIVE):
             reason = f"makes the inertia on the joint side {inertia:g}, too far from anything built"
             yield FieldProblem(("gear_ratio",), reason)
 
-    def _without_side(self, ratio: float) -> FieldProblem:
+    def _missing_side_problem(self, ratio: float) -> FieldProblem:
         """Return the problem of a motor with a gear but no side, with both meanings of its values."""
-        values, of_shaft, of_joint = map(
-            _format_constants, (vars(self), self._reflected(ratio), self._reflected(1 / ratio))
+        values, on_joint_side, on_shaft_side = map(
+            _constant_texts, (vars(self), self._reflected_values(ratio), self._reflected_values(1 / ratio))
         )
         meanings: list[str] = []
         quantities: list[Quantity] = []
-        for (name, quantity, size), (*_, at_joint), (*_, on_shaft) in zip(
-            values, of_shaft, of_joint, strict=True
+        for (name, quantity, text), (*_, joint_text), (*_, shaft_text) in zip(
+            values, on_joint_side, on_shaft_side, strict=True
         ):
-            rotary = constant(quantity.revolute)
+            rotary_unit = constant(quantity.revolute)
             if not meanings:  # says once which number is where
-                first = f"{size} {{}} at the shaft = {at_joint} {{}} at the joint"
-                meanings.append(f"{name} {first}, or {size} {{}} at the joint = {on_shaft} {{}} at the shaft")
-                quantities += (rotary, quantity, quantity, rotary)
+                meaning_of_first = f"{text} {{}} at the shaft = {joint_text} {{}} at the joint"
+                meanings.append(
+                    f"{name} {meaning_of_first}, or {text} {{}} at the joint = {shaft_text} {{}} at the shaft"
+                )
+                quantities += (rotary_unit, quantity, quantity, rotary_unit)
             else:
-                meanings.append(f"{name} {size} {{}} = {at_joint} {{}}, or = {on_shaft} {{}}")
-                quantities += (rotary, quantity, rotary)
+                meanings.append(f"{name} {text} {{}} = {joint_text} {{}}, or = {shaft_text} {{}}")
+                quantities += (rotary_unit, quantity, rotary_unit)
         reason = "; ".join((f"{ratio:g} needs side: {SHAFT} or {JOINT}", *meanings))
         return FieldProblem(("gear_ratio",), reason, quantities=tuple(quantities))
 
     def _missing_keys(self) -> Iterator[FieldProblem]:
         """Yield the keys missing for constants of the windings."""
-        for name, needed in NEEDED.items():
-            missing = [key for key in needed if getattr(self, key) is None]
+        for name, required_keys in REQUIRED_WITH.items():
+            missing = [key for key in required_keys if getattr(self, key) is None]
             if getattr(self, name) is not None and missing:
-                direct = " (1 for a direct drive)" if "gear_ratio" in missing else ""
-                reason = f"needs {' and '.join(missing)}{direct}, without which {_UNKNOWN[name]} is not known"
+                hint = " (1 for a direct drive)" if "gear_ratio" in missing else ""
+                reason = f"needs {' and '.join(missing)}{hint}, without which {_UNKNOWN[name]} is not known"
                 yield FieldProblem((name,), reason)
 
     @staticmethod
@@ -200,21 +202,21 @@ class Motor(DeclaredRecord):
         return {"inertia": 0.5, "damping": 0.01} if revolute else {"inertia": 10, "damping": 0.1}
 
     @property
-    def _ratio(self) -> float:
+    def _gear_ratio_or_one(self) -> float:
         """Gear ratio; 1 without a gear."""
         return 1.0 if self.gear_ratio is None else self.gear_ratio
 
     @property
     def ratio_of_side(self) -> float:
         """Motion of the declared side over that on the joint side: 1 or the gear ratio."""
-        return 1.0 if self.side == JOINT else self._ratio
+        return 1.0 if self.side == JOINT else self._gear_ratio_or_one
 
     @cached_property
     def at_joint(self) -> JointMotor:
         """Motor on the joint side: inertia and damping times the ratio squared, torques times the ratio."""
-        ratio = self._ratio
+        ratio = self._gear_ratio_or_one
         return JointMotor(
-            **self._reflected(self.ratio_of_side),
+            **self._reflected_values(self.ratio_of_side),
             gear_ratio=self.gear_ratio,
             torque_constant=None if self.torque_constant is None else ratio * self.torque_constant,
             resistance=self.resistance,
@@ -222,27 +224,27 @@ class Motor(DeclaredRecord):
             max_voltage=self.max_voltage,
         )
 
-    def _reflected(self, signed: float) -> dict[str, Any]:
-        """Return the values on the other side of a gear whose declared side moves `signed` times as far."""
-        ratio = abs(signed)
+    def _reflected_values(self, signed_ratio: float) -> dict[str, Any]:
+        """Return the values beyond a gear whose declared side moves `signed_ratio` times as far."""
+        ratio = abs(signed_ratio)
         return {
             "inertia": self.inertia * ratio * ratio,
             "damping": self.damping * ratio * ratio,
             "max_torque": self.max_torque * ratio,
             "max_velocity": self.max_velocity / ratio,
-            "friction": self.friction and self.friction.geared(signed),
+            "friction": self.friction and self.friction.geared(signed_ratio),
         }
 
 
-def _format_constants(values: Mapping[str, Any]) -> Iterator[tuple[str, Quantity, str]]:
-    """Yield name, quantity and text of the values of `_ON_EITHER_SIDE` that are neither zero nor infinite."""
+def _constant_texts(values: Mapping[str, Any]) -> Iterator[tuple[str, Quantity, str]]:
+    """Yield name, quantity and text of the values of `_REFLECTED` that are neither zero nor infinite."""
     friction = values["friction"] or NO_FRICTION
-    for name, quantity in _ON_EITHER_SIDE.items():
-        part = name.removeprefix("friction.")
-        content = values[name] if part == name else getattr(friction, part)
-        sizes = dict.fromkeys(content if isinstance(content, tuple) else (content,))
-        if any(0 < abs(size) < math.inf for size in sizes):
-            texts = [f"{size:.4g}" for size in sizes]
+    for name, quantity in _REFLECTED.items():
+        field = name.removeprefix("friction.")
+        numbers = values[name] if field == name else getattr(friction, field)
+        distinct_numbers = dict.fromkeys(numbers if isinstance(numbers, tuple) else (numbers,))
+        if any(0 < abs(number) < math.inf for number in distinct_numbers):
+            texts = [f"{number:.4g}" for number in distinct_numbers]
             yield name, quantity, texts[0] if len(texts) == 1 else f"[{', '.join(texts)}]"
 
 

@@ -26,7 +26,7 @@ LIMIT_ROUNDING = 1e-9
 ALLOWED_DEVIATIONS, LARGEST_ALLOWANCE = 2.0, 0.01
 """Allowed excess of an uncertain value: standard deviations, and at most this share of the limit's range."""
 
-OfJoint = Mapping[str, AnyArray]
+VariablesOfJoint = Mapping[str, AnyArray]
 """Variables of one joint by name: (samples,), or (2, samples) for those of its motors."""
 
 
@@ -49,26 +49,26 @@ class LimitCheck(NamedTuple):
         """Return the unit of the variable at a joint of this type."""
         return VARIABLES[self.variable].quantity.unit(joint_type)
 
-    def values(self, of_joint: OfJoint) -> FloatArray:
+    def values(self, variables: VariablesOfJoint) -> FloatArray:
         """Return the bounded values, (samples,), from the variables of the joint."""
-        rows = of_joint[self.variable]
+        rows = variables[self.variable]
         return rows if self.motor is None else rows[self.motor - 1]
 
-    def flags(self, of_joint: OfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
+    def flags(self, variables: VariablesOfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
         """Return the bit where values leave the range by more than rounding and an allowance; not at NaN."""
-        return marked(self.flag, self.outside(self.values(of_joint)) > self.tolerance + allowance)
+        return marked(self.flag, self.outside(self.values(variables)) > self.tolerance + allowance)
 
-    def allowance(self, of_joint: OfJoint) -> FloatArray | float:
+    def allowance(self, variables: VariablesOfJoint) -> FloatArray | float:
         """Return the excess that uncertain values are allowed, (samples,); 0 without standard deviations.
 
         It is twice the standard deviation, but at most 1 % of the range, or of the bound if there is only
         one; zero for a bit that marks infeasible samples instead of an exceeded limit.
         """
-        deviations = of_joint.get(deviation(self.variable))
+        deviations = variables.get(deviation(self.variable))
         if deviations is None:
             return 0.0
-        of_motor = deviations if self.motor is None else deviations[self.motor - 1]
-        return np.minimum(ALLOWED_DEVIATIONS * np.nan_to_num(of_motor), self.largest_allowance)
+        deviation_of_motor = deviations if self.motor is None else deviations[self.motor - 1]
+        return np.minimum(ALLOWED_DEVIATIONS * np.nan_to_num(deviation_of_motor), self.largest_allowance)
 
     @property
     def largest_allowance(self) -> float:
@@ -78,9 +78,9 @@ class LimitCheck(NamedTuple):
         width = self.range[1] - self.range[0]
         return LARGEST_ALLOWANCE * (width if np.isfinite(width) else self.largest)
 
-    def clearance(self, of_joint: OfJoint) -> FloatArray:
+    def clearance(self, variables: VariablesOfJoint) -> FloatArray:
         """Return the distance to the nearer bound relative to the larger one; negative outside the range."""
-        return self.outside(self.values(of_joint)) / -(self.largest or 1.0)
+        return self.outside(self.values(variables)) / -(self.largest or 1.0)
 
     @property
     def tolerance(self) -> float:
@@ -90,7 +90,7 @@ class LimitCheck(NamedTuple):
     @property
     def largest(self) -> float:
         """Largest absolute value of the finite bounds; 0 if there is none."""
-        return reduce(np.maximum, (abs(end) for end in self.range if _is_bound(end)), 0.0)
+        return reduce(np.maximum, (abs(bound) for bound in self.range if _is_bound(bound)), 0.0)
 
     @property
     def exists(self) -> bool:
@@ -134,8 +134,8 @@ class Reach(NamedTuple):
     def flags(self) -> FlagArray:
         """The bits of the same names."""
         bits = (Flag.INFEASIBLE, Flag.SLACK, Flag.SINGULAR, Flag.NEAR_SINGULAR)
-        first, *further_bits = (marked(flag, where) for flag, where in zip(bits, self, strict=True))
-        return reduce(operator.or_, further_bits, first)
+        first_bits, *further_bits = (marked(flag, mask) for flag, mask in zip(bits, self, strict=True))
+        return reduce(operator.or_, further_bits, first_bits)
 
 
 def classify_stiffness(
@@ -144,15 +144,17 @@ def classify_stiffness(
     """Compare a stiffness with its attainable range; margins below `min_margin` count as near-singular."""
     # At a critical end A is singular. The other ends, of a law's domain, are feasible and regular. Singular
     # samples are found by their margin, since det A has no scale; it is zero exactly only at the end.
-    gap = margin(stiffness, solution.lower, solution.upper)
+    relative_margin = margin(stiffness, solution.lower, solution.upper)
     at_lower = stiffness - solution.lower <= solution.upper - stiffness
     critical = np.where(at_lower, solution.lower_critical, solution.upper_critical)
-    infeasible = ~((gap >= -SINGULAR_MARGIN) & (stiffness > 0))  # negated, so that NaN is infeasible
+    infeasible = ~(
+        (relative_margin >= -SINGULAR_MARGIN) & (stiffness > 0)
+    )  # negated, so that NaN is infeasible
     return Reach(
         infeasible=infeasible,
         slack=infeasible & at_lower & solution.slack_below,
-        singular=critical & (np.abs(gap) <= SINGULAR_MARGIN),
-        near_singular=critical & (gap > SINGULAR_MARGIN) & (gap < min_margin),
+        singular=critical & (np.abs(relative_margin) <= SINGULAR_MARGIN),
+        near_singular=critical & (relative_margin > SINGULAR_MARGIN) & (relative_margin < min_margin),
     )
 
 
@@ -163,11 +165,11 @@ def deflections_within_reach(
 
     Prescribed deflections replace those of the solution; samples where they are NaN are infeasible.
     """
-    reached = classify_stiffness(stiffness, solution, min_margin)
+    reach = classify_stiffness(stiffness, solution, min_margin)
     if prescribed is not None:
-        reached = reached._replace(infeasible=reached.infeasible | np.isnan(prescribed[0]))
+        reach = reach._replace(infeasible=reach.infeasible | np.isnan(prescribed[0]))
     phi = solution.deflections if prescribed is None else prescribed
-    return np.where(reached.infeasible, np.nan, phi), reached
+    return np.where(reach.infeasible, np.nan, phi), reach
 
 
 def reach_flags(stiffness: FloatArray, solution: PairSolution, min_margin: float = MIN_MARGIN) -> FlagArray:

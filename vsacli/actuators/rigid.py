@@ -38,18 +38,18 @@ class Rigid(Actuator):
         self, command: Command, _min_margin: float, _prescribed: FloatArray | None
     ) -> JointVariables:
         """Return zero deflection; stiffness and its derivatives are NaN."""
-        still, none = np.zeros_like(command.q), np.full_like(command.q, np.nan)
+        zero, absent = np.zeros_like(command.q), np.full_like(command.q, np.nan)
         return single_motor(
             command,
-            stiffness=none,
-            dstiffness=none,
-            ddstiffness=none,
-            phi=still,
-            dphi=still,
+            stiffness=absent,
+            dstiffness=absent,
+            ddstiffness=absent,
+            phi=zero,
+            dphi=zero,
             theta=command.q,
             dtheta=command.dq,
             ddtheta=command.ddq,
             tau_transmission=command.tau_e,
-            elastic_energy=still * command.tau_e / 2,
-            flags=np.zeros(still.shape, dtype=FLAG_TYPE),
+            elastic_energy=zero * command.tau_e / 2,
+            flags=np.zeros(zero.shape, dtype=FLAG_TYPE),
         )

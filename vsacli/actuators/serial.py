@@ -48,11 +48,11 @@ class Serial(VariableStiffness):
 
     def _problems(self) -> Iterator[FieldProblem]:
         first, second = (motor.inertia for motor in self.motors)
-        largest = largest_coupling(first, second)
-        if not abs(self.coupled_rotors) < largest:
+        bound = largest_coupling(first, second)
+        if not abs(self.coupled_rotors) < bound:
             reason = (
                 f"is {self.coupled_rotors:g} on the joint side of the gears; its size must be below "
-                f"{largest:.4g}, the root of the product of both inertias, or B is not positive definite"
+                f"{bound:.4g}, the root of the product of both inertias, or B is not positive definite"
             )
             yield FieldProblem(("coupled_inertia",), reason)
 
@@ -64,7 +64,9 @@ class Serial(VariableStiffness):
     @classmethod
     def example(cls, joint_type: str, mechanism: str | None = None) -> dict[str, Any]:
         """Return equal motors and the named mechanism; by default the first that drives such joints."""
-        word = mechanism or next(name for name, each in MECHANISMS.items() if joint_type in each.joint_types)
+        word = mechanism or next(
+            name for name, mechanism_class in MECHANISMS.items() if joint_type in mechanism_class.joint_types
+        )
         example = {"type": word, **MECHANISMS[word].example(joint_type)}
         return {"motor": Motor.example(joint_type), "mechanism": example}
 
@@ -83,7 +85,9 @@ class Serial(VariableStiffness):
         """Return the mechanism as the problem, if it rotates and the joint does not."""
         if joint_type in self.mechanism.joint_types:
             return None
-        alternatives = [name for name, each in MECHANISMS.items() if joint_type in each.joint_types]
+        alternatives = [
+            name for name, mechanism_class in MECHANISMS.items() if joint_type in mechanism_class.joint_types
+        ]
         reason = f"turns about an axis, and drives no {joint_type} joint; {' or '.join(alternatives)} can"
         return FieldProblem(("mechanism", "type"), reason)
 
@@ -178,4 +182,4 @@ class _MechanismElasticity(Elasticity):
 
     def state(self, coordinates: FloatArray) -> MechanismState:
         """Return the potential with its derivatives."""
-        return self._mechanism.state(*(coordinates[..., number] for number in range(3)))
+        return self._mechanism.state(*(coordinates[..., coordinate] for coordinate in range(3)))

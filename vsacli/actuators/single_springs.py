@@ -66,16 +66,16 @@ class SingleSpring(ElasticState):
 
     def rates(self, dtau_e: FloatArray, _dstiffness: FloatArray, _dq: FloatArray) -> tuple[FloatArray]:
         """Return tau_e'/sigma; NaN where sigma is zero."""
-        return (dtau_e / self._divisor,)
+        return (dtau_e / self._nonzero_stiffness,)
 
     def motor_accelerations(
         self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, _ddstiffness: FloatArray
     ) -> tuple[FloatArray]:
         """Return (tau_e'' - zeta phi'^2)/sigma + q'', (70) alone."""
-        return ((ddtau_e - self._spring.zeta * rates[0] * rates[0]) / self._divisor + ddq,)
+        return ((ddtau_e - self._spring.zeta * rates[0] * rates[0]) / self._nonzero_stiffness + ddq,)
 
     @property
-    def _divisor(self) -> FloatArray:
+    def _nonzero_stiffness(self) -> FloatArray:
         return np.where(self.stiffness == 0, np.nan, self.stiffness)
 
 
@@ -96,8 +96,8 @@ class LinearRows:
 
     def state(self, phi: FloatArray) -> SpringState:
         """Return the state of a spring of torque K phi."""
-        torque, none = self.torque(phi), np.zeros_like(phi)
-        return SpringState(torque, np.broadcast_to(self._stiffness, torque.shape), none, none)
+        torque, zero = self.torque(phi), np.zeros_like(phi)
+        return SpringState(torque, np.broadcast_to(self._stiffness, torque.shape), zero, zero)
 
 
 class SingleSprings(Elasticity):

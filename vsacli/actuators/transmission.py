@@ -46,14 +46,14 @@ class Command(NamedTuple):
     @classmethod
     def at_rest(cls, tau_e: FloatArray, q: FloatArray) -> Command:
         """Return the command of a joint at rest under torques, (samples,), without commanded signals."""
-        still = np.zeros_like(tau_e)
-        return cls(q, still, still, tau_e, still, still, {})
+        zero = np.zeros_like(tau_e)
+        return cls(q, zero, zero, tau_e, zero, zero, {})
 
     def variables(self) -> JointVariables:
         """Return the record of the joint that has only these variables."""
         fields = {name: array for name, array in self.commanded.items() if name in JointVariables._fields}
-        further = {name: array for name, array in self.commanded.items() if name not in fields}
-        return JointVariables(*self[:-1], **fields, further=further)
+        other_signals = {name: array for name, array in self.commanded.items() if name not in fields}
+        return JointVariables(*self[:-1], **fields, further=other_signals)
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return all arrays by name."""
@@ -138,9 +138,11 @@ def single_motor(command: Command, **variables: AnyArray) -> JointVariables:
         variables: Variables `stiffness` with its derivatives, `phi`, `dphi`, `theta`, `dtheta`, `ddtheta`,
             `tau_transmission`, `elastic_energy` and `flags`, each (samples,).
     """
-    none = np.full_like(variables["phi"], np.nan)
-    transmitted: dict[str, AnyArray] = {
-        name: np.stack((values, none)) if "motor" in VARIABLES[name].dims else values
+    absent = np.full_like(variables["phi"], np.nan)
+    motor_variables: dict[str, AnyArray] = {
+        name: np.stack((values, absent)) if "motor" in VARIABLES[name].dims else values
         for name, values in variables.items()
     }
-    return command.variables()._replace(**transmitted, det_A=none, stiffness_min=none, stiffness_max=none)
+    return command.variables()._replace(
+        **motor_variables, det_A=absent, stiffness_min=absent, stiffness_max=absent
+    )

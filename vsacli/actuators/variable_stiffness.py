@@ -46,11 +46,11 @@ class VariableStiffness(Actuator):
         """
         stiffness, dstiffness, ddstiffness = (command.commanded[name] for name in STIFFNESS.names)
         solution = self.solve(command.tau_e, stiffness, command.q)  # (14)
-        unknowns, reached = deflections_within_reach(stiffness, solution, min_margin, prescribed)  # (61)
+        unknowns, reach = deflections_within_reach(stiffness, solution, min_margin, prescribed)  # (61)
         # (62)-(64), (66); `springs.matrix` is A with its determinant (67). Unknowns of a pair: phi_1, phi_2.
         springs = self.springs(unknowns, command.q)
         rates = np.stack(springs.rates(command.dtau_e, dstiffness, command.dq))  # (68)
-        rates = np.where(reached.singular, np.nan, rates)
+        rates = np.where(reach.singular, np.nan, rates)
         ddtheta = springs.motor_accelerations(rates, command.ddq, command.ddtau_e, ddstiffness)  # (70)-(72)
         return command.variables()._replace(
             phi=self.deflections(unknowns),
@@ -63,5 +63,5 @@ class VariableStiffness(Actuator):
             det_A=springs.determinant,  # (67)
             stiffness_min=solution.lower,
             stiffness_max=solution.upper,
-            flags=reached.flags,
+            flags=reach.flags,
         )

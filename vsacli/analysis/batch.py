@@ -26,7 +26,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.flags import MIN_MARGIN, Flag, check_min_margin, has_flag
 from vsacli.base.progress import Tell, unheard
 from vsacli.base.variables import TIP_COMPLIANCE, Block
-from vsacli.compute.engine import Engine, choose
+from vsacli.compute.engine import Engine, choose_engine
 from vsacli.dynamics.balances import BALANCES
 from vsacli.dynamics.energy import RunEnergy
 from vsacli.dynamics.inverse import adapt_trajectory, usual_block
@@ -107,7 +107,7 @@ class Batch:
         self._ahead = trajectory.samples > self._block_samples and not is_long
         busy = int(self._ahead)  # one thread updates the summaries while the others compute
         samples = kernel_samples or trajectory.samples * len(variants)
-        self.choice = choose(engine, self._dynamics.kernel, samples, threads, tell, busy=busy)
+        self.choice = choose_engine(engine, self._dynamics.kernel, samples, threads, tell, busy=busy)
         self._dynamics.engine = self.choice.engine
         self._uncertainty = _prepare_uncertainty(robot, trajectory, asked, self.choice.engine)
         self._minima_search = MinimaSearch(self._dynamics, min_margin, self._uncertainty)

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from vsacli.actuators.reach import LimitCheck, OfJoint, margin, nearer_end
+from vsacli.actuators.reach import LimitCheck, VariablesOfJoint, margin, nearer_end
 from vsacli.base import units
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.flags import SINGULAR_MARGIN, Flag
@@ -45,7 +45,7 @@ class Bounded(NamedTuple):
         """Bits that a sample may have for this quantity."""
         return REACH if self.limit is None else self.limit.flag
 
-    def clearance(self, of_joint: OfJoint) -> FloatArray:
+    def clearance(self, of_joint: VariablesOfJoint) -> FloatArray:
         """Return the relative distance to the nearer bound, (samples,), negative beyond it.
 
         It is -inf where the springs cannot carry the torque at all, and +inf where a motor variable does not
@@ -66,7 +66,7 @@ class Bounded(NamedTuple):
             if math.isfinite(bound):
                 yield sign, sign * bound, size, tolerance, math.inf, math.inf
 
-    def signed_values(self, of_joint: OfJoint, sign: float) -> FloatArray:
+    def signed_values(self, of_joint: VariablesOfJoint, sign: float) -> FloatArray:
         """Return the values with a sign, (samples,), with missing ones replaced as in `clearance`."""
         if self.limit is None:
             return self.clearance(of_joint)

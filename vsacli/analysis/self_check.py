@@ -152,7 +152,7 @@ class RunCheck:
         """Return the largest scaled residuals of springs and shafts, (variants,), NaN where a value is."""
         probed = {name: np.concatenate([part[name] for part in self._excerpts]) for name in self._excerpts[0]}
         variant = self._of_probed[: len(probed["q"])]
-        joints = self._dynamics.variants.robot_over(variant).joints
+        joints = self._dynamics.variants.robot_with_rows(variant).joints
         of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(joints))]
         recomputed = balance_errors(joints, of_joints)
         largest_probed = (
@@ -275,7 +275,7 @@ def _derivative_errors(
         grid = times[part] + steps[:, None, part] * OFFSETS[:, None, None]
         variant = np.broadcast_to(variants, grid.shape).ravel()
         block = dynamics.at(grid.ravel(), variant)
-        robot = dynamics.variants.robot_over(variant)
+        robot = dynamics.variants.robot_with_rows(variant)
         smooth = _motors_move_smoothly(block, grid.shape)
         everywhere &= np.all(np.any(smooth, axis=0), axis=(0, 2))
         for rung, of_rung in zip(RUNGS, differences, strict=False):

@@ -101,42 +101,44 @@ class Keyed:
 @singledispatch
 def repeat_on(_: Any, step: Step, state: Values, constants: Values, limit: int) -> Values:
     """Run `repeat` on NumPy arrays."""
-    found = _repeated(step, _flat(state), _flat(constants), limit)
-    return _shaped(found, state[0].shape)
+    final_state = _repeat_step(step, _ravel_all(state), _ravel_all(constants), limit)
+    return _reshape_all(final_state, state[0].shape)
 
 
-def _repeated(step: Step, state: Values, constants: Values, limit: int) -> Values:
+def _repeat_step(step: Step, state: Values, constants: Values, limit: int) -> Values:
     # Samples that are done keep their state. Once they are half of all, the others continue without them.
     result = state
-    over: BoolArray = np.zeros(state[0].size, dtype=bool)
-    while limit and 2 * np.count_nonzero(over) < over.size:
+    finished: BoolArray = np.zeros(state[0].size, dtype=bool)
+    while limit and 2 * np.count_nonzero(finished) < finished.size:
         state, done = step(state, constants)
-        result = _kept(over, result, state)
-        over = over | done
+        result = _keep_finished(finished, result, state)
+        finished = finished | done
         limit -= 1
-    going = np.flatnonzero(~over)
-    if not limit or not going.size:
+    unfinished = np.flatnonzero(~finished)
+    if not limit or not unfinished.size:
         return result
-    rest = _repeated(step, _taken(result, going), _taken(constants, going), limit)
-    return _put(result, going, rest)
+    continued = _repeat_step(step, _samples_at(result, unfinished), _samples_at(constants, unfinished), limit)
+    return _replace_samples(result, unfinished, continued)
 
 
-def _kept(over: BoolArray, result: Values, latest: Values) -> Values:
-    if not over.any():
+def _keep_finished(finished: BoolArray, result: Values, latest: Values) -> Values:
+    if not finished.any():
         return latest
-    return tuple(np.where(over, *pair) for pair in zip(result, latest, strict=True))
+    return tuple(np.where(finished, *pair) for pair in zip(result, latest, strict=True))
 
 
 @singledispatch
 def where_needed_on(mask: Any, function: Function, arguments: Values, otherwise: Values) -> Values:
     """Run `where_needed` on NumPy arrays."""
-    samples = np.flatnonzero(mask)
-    if not samples.size:
+    indices = np.flatnonzero(mask)
+    if not indices.size:
         return otherwise
-    if samples.size == mask.size:
+    if indices.size == mask.size:
         return function(*arguments)
-    found = _put(_flat(otherwise), samples, function(*_taken(_flat(arguments), samples)))
-    return _shaped(found, mask.shape)
+    results = _replace_samples(
+        _ravel_all(otherwise), indices, function(*_samples_at(_ravel_all(arguments), indices))
+    )
+    return _reshape_all(results, mask.shape)
 
 
 @singledispatch
@@ -164,20 +166,20 @@ def cell_on(position: Any, count: int) -> IndexArray:
     return cell
 
 
-def _flat(arrays: Values) -> Values:
+def _ravel_all(arrays: Values) -> Values:
     return tuple(values.ravel() for values in arrays)
 
 
-def _shaped(arrays: Values, shape: tuple[int, ...]) -> Values:
+def _reshape_all(arrays: Values, shape: tuple[int, ...]) -> Values:
     return tuple(values.reshape(shape) for values in arrays)
 
 
-def _taken(arrays: Values, samples: IndexArray) -> Values:
+def _samples_at(arrays: Values, samples: IndexArray) -> Values:
     return tuple(values[samples] for values in arrays)
 
 
-def _put(arrays: Values, samples: IndexArray, latest: Values) -> Values:
+def _replace_samples(arrays: Values, samples: IndexArray, replacement: Values) -> Values:
     result = tuple(np.array(values) for values in arrays)
-    for values, each in zip(result, latest, strict=True):
-        values[samples] = each
+    for values, replaced in zip(result, replacement, strict=True):
+        values[samples] = replaced
     return result

@@ -43,24 +43,24 @@ class Dual(NDArrayOperatorsMixin):
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or options:
             raise NotImplementedError(f"numpy.{ufunc.__name__}.{method} carries no derivatives along")
-        if ufunc in FREQUENT:
-            return FREQUENT[ufunc](*inputs)
-        values = [value_of(each) for each in inputs]
-        if ufunc in FLAT:
+        if ufunc in ARITHMETIC_OPERATORS:
+            return ARITHMETIC_OPERATORS[ufunc](*inputs)
+        values = [value_of(operand) for operand in inputs]
+        if ufunc in PIECEWISE_CONSTANT:
             return ufunc(*values)
-        if ufunc not in SLOPES:
+        if ufunc not in PARTIAL_DERIVATIVES:
             raise NotImplementedError(f"numpy.{ufunc.__name__} carries no derivatives along")
         result = ufunc(*values)
-        return Dual(result, _chained(SLOPES[ufunc](result, *values), inputs))
+        return Dual(result, _chain_rule(PARTIAL_DERIVATIVES[ufunc](result, *values), inputs))
 
     def __array_function__(
         self, function: Callable[..., Any], _types: Any, arguments: tuple[Any, ...], options: dict[str, Any]
     ) -> Any:
         if function in SHAPE_FUNCTIONS:
             return function(*map(value_of, arguments), **options)
-        if function not in ARRANGED:
+        if function not in ARRANGING_FUNCTIONS:
             raise NotImplementedError(f"numpy.{function.__name__} carries no derivatives along")
-        return ARRANGED[function](*arguments, **options)
+        return ARRANGING_FUNCTIONS[function](*arguments, **options)
 
     # Operators of the recursion, without NumPy's protocol: a fifth of the time.
 
@@ -77,10 +77,10 @@ class Dual(NDArrayOperatorsMixin):
         return _product_of(self, other)
 
     def __neg__(self) -> Dual:
-        return Dual(-self.value, _scaled(self.tangents, -1))
+        return Dual(-self.value, _scaled_tangents(self.tangents, -1))
 
     def __getitem__(self, index: Any) -> Dual:
-        return self._arranged(lambda array: array[index])
+        return self._map_entries(lambda array: array[index])
 
     def __len__(self) -> int:
         return len(self.value)
@@ -107,21 +107,24 @@ class Dual(NDArrayOperatorsMixin):
     @property
     def T(self) -> Dual:  # noqa: N802  (NumPy's name)
         """Transpose."""
-        return self._arranged(np.transpose)
+        return self._map_entries(np.transpose)
 
     def sum(self, axis: int) -> Dual:
         """Return the sum along an axis."""
-        return self._arranged(lambda array: np.sum(array, axis=axis))
+        return self._map_entries(lambda array: np.sum(array, axis=axis))
 
-    def _arranged(self, function: Callable[[FloatArray], FloatArray]) -> Dual:
+    def _map_entries(self, function: Callable[[FloatArray], FloatArray]) -> Dual:
         """Return the dual whose entries are chosen, moved or added up."""
-        tangents = {at: function(_spread(each, self.shape)) for at, each in self.tangents.items()}
+        tangents = {
+            direction: function(_broadcast_tangent(tangent, self.shape))
+            for direction, tangent in self.tangents.items()
+        }
         return Dual(function(self.value), tangents)
 
 
 def seeds(values: Sequence[Any], first: int = 0) -> list[Dual]:
     """Return values as dual numbers, each array with its own direction, from the direction `first` on."""
-    return [Dual(value, {first + at: 1}) for at, value in enumerate(values)]
+    return [Dual(value, {first + index: 1}) for index, value in enumerate(values)]
 
 
 def value_of(array: Any) -> Any:
@@ -142,7 +145,7 @@ def tangents_of(array: Any) -> Tangents:
     return array.tangents if isinstance(array, Dual) else {}
 
 
-def _spread(tangent: Any, shape: tuple[int, ...]) -> FloatArray:
+def _broadcast_tangent(tangent: Any, shape: tuple[int, ...]) -> FloatArray:
     return tangent if np.shape(tangent) == shape else np.broadcast_to(tangent, shape)
 
 
@@ -152,7 +155,7 @@ def _sum_of(first: Any, second: Any) -> Dual:
         return Dual(add(first.value, second), first.tangents)
     if not isinstance(first, Dual):
         return Dual(add(first, second.value), second.tangents)
-    return Dual(add(first.value, second.value), _total(first.tangents, second.tangents))
+    return Dual(add(first.value, second.value), _sum_of_tangents(first.tangents, second.tangents))
 
 
 def _difference_of(first: Any, second: Any) -> Dual:
@@ -167,14 +170,16 @@ def _difference_of(first: Any, second: Any) -> Dual:
 def _product_of(first: Any, second: Any) -> Dual:
     """Return a product, by Leibniz's rule."""
     if not isinstance(second, Dual):
-        return Dual(mul(first.value, second), _scaled(first.tangents, second))
+        return Dual(mul(first.value, second), _scaled_tangents(first.tangents, second))
     if not isinstance(first, Dual):
-        return Dual(mul(first, second.value), _scaled(second.tangents, first))
+        return Dual(mul(first, second.value), _scaled_tangents(second.tangents, first))
     a, b = first.value, second.value
-    return Dual(mul(a, b), _total(_scaled(first.tangents, b), _scaled(second.tangents, a)))
+    return Dual(
+        mul(a, b), _sum_of_tangents(_scaled_tangents(first.tangents, b), _scaled_tangents(second.tangents, a))
+    )
 
 
-def _total(first: Tangents, second: Tangents) -> Tangents:
+def _sum_of_tangents(first: Tangents, second: Tangents) -> Tangents:
     if not (first and second):
         return first or second
     total = dict(first)
@@ -183,7 +188,7 @@ def _total(first: Tangents, second: Tangents) -> Tangents:
     return total
 
 
-def _scaled(tangents: Tangents, factor: Scalar) -> Tangents:
+def _scaled_tangents(tangents: Tangents, factor: Scalar) -> Tangents:
     """Return tangents times an array, or times a constant that folds."""
     if type(factor) is not int:
         return {direction: tangent * factor for direction, tangent in tangents.items()}
@@ -192,12 +197,12 @@ def _scaled(tangents: Tangents, factor: Scalar) -> Tangents:
     return {direction: mul(factor, tangent) for direction, tangent in tangents.items()} if factor else {}
 
 
-def _chained(slopes: Sequence[Callable[[], Any]], inputs: Sequence[Any]) -> Tangents:
+def _chain_rule(partials: Sequence[Callable[[], Any]], inputs: Sequence[Any]) -> Tangents:
     """Return the chain rule: the sum of slope times tangent over the inputs that have one."""
     total: Tangents = {}
-    for slope, each in zip(slopes, inputs, strict=True):
-        if isinstance(each, Dual):
-            total = _total(total, _scaled(each.tangents, slope()))
+    for partial, operand in zip(partials, inputs, strict=True):
+        if isinstance(operand, Dual):
+            total = _sum_of_tangents(total, _scaled_tangents(operand.tangents, partial()))
     return total
 
 
@@ -211,7 +216,7 @@ def _(number: Dual) -> Dual:
 def _(angle: Dual, name: str) -> Dual:
     cos, sin = (trigonometric(function, angle.value) for function in ("cos", "sin"))
     value, slope = (cos, -sin) if name == "cos" else (sin, cos)
-    return Dual(value, _scaled(angle.tangents, slope))
+    return Dual(value, _scaled_tangents(angle.tangents, slope))
 
 
 @cell_on.register
@@ -220,10 +225,10 @@ def _(position: Dual, count: int) -> IndexArray:
     return cell_of(position.value, count)
 
 
-Slopes = Callable[..., Sequence[Callable[[], Any]]]
+Partials = Callable[..., Sequence[Callable[[], Any]]]
 """Function from result and operands of a function to its derivatives by each operand, computed if needed."""
 
-SLOPES: Mapping[np.ufunc, Slopes] = {
+PARTIAL_DERIVATIVES: Mapping[np.ufunc, Partials] = {
     np.divide: lambda r, _a, b: (lambda: 1.0 / b, lambda: -r / b),
     np.power: lambda r, a, b: (lambda: b * a ** (b - 1.0), lambda: r * np.log(a)),
     np.negative: lambda _r, _a: (lambda: -1.0,),
@@ -254,7 +259,7 @@ SLOPES: Mapping[np.ufunc, Slopes] = {
 }
 """Derivatives of NumPy functions."""
 
-FLAT = frozenset(
+PIECEWISE_CONSTANT = frozenset(
     {
         *(np.less, np.less_equal, np.greater, np.greater_equal, np.equal, np.not_equal),
         *(np.isfinite, np.isnan, np.isinf, np.sign, np.signbit, np.floor, np.ceil, np.rint),
@@ -262,64 +267,71 @@ FLAT = frozenset(
 )
 """Functions that are piecewise constant."""
 
-FREQUENT: Mapping[np.ufunc, Callable[[Any, Any], Dual]] = {
+ARITHMETIC_OPERATORS: Mapping[np.ufunc, Callable[[Any, Any], Dual]] = {
     np.add: _sum_of,
     np.subtract: _difference_of,
     np.multiply: _product_of,
 }
-"""Frequent functions, computed without `SLOPES`."""
+"""Frequent functions, computed without `PARTIAL_DERIVATIVES`."""
 
 SHAPE_FUNCTIONS = frozenset({np.zeros_like, np.ones_like, np.empty_like, np.shape, np.ndim, np.searchsorted})
 """Functions whose results are shapes and indices, which have no derivatives."""
 
 
-def _where(condition: Any, a: Any, b: Any) -> Dual:
+def _where_of_duals(condition: Any, a: Any, b: Any) -> Dual:
     value = np.where(condition, value_of(a), value_of(b))
-    return Dual(value, {at: np.where(condition, *each) for at, each in _by_direction((a, b))})
+    return Dual(
+        value, {direction: np.where(condition, *pair) for direction, pair in _tangents_by_direction((a, b))}
+    )
 
 
-def _clip(values: Any, low: Any, high: Any) -> Any:
+def _clip_duals(values: Any, low: Any, high: Any) -> Any:
     return np.minimum(np.maximum(values, low), high)
 
 
-def _joined(function: Callable[..., Any]) -> Callable[..., Dual]:
+def _joining_function(function: Callable[..., Any]) -> Callable[..., Dual]:
     """Wrap stacking or concatenating, for which all parts need tangents."""
 
     def joined(arrays: Sequence[Any], axis: int = 0) -> Dual:
-        value = function([value_of(each) for each in arrays], axis=axis)
-        shapes = [np.shape(value_of(each)) for each in arrays]
+        value = function([value_of(array) for array in arrays], axis=axis)
+        shapes = [np.shape(value_of(array)) for array in arrays]
         tangents = {
-            at: function([_spread(*each) for each in zip(parts, shapes, strict=True)], axis=axis)
-            for at, parts in _by_direction(arrays)
+            at: function(
+                [_broadcast_tangent(*array) for array in zip(tangents_of_arrays, shapes, strict=True)],
+                axis=axis,
+            )
+            for at, tangents_of_arrays in _tangents_by_direction(arrays)
         }
         return Dual(value, tangents)
 
     return joined
 
 
-def _by_direction(arrays: Sequence[Any]) -> Iterator[tuple[int, list[Any]]]:
+def _tangents_by_direction(arrays: Sequence[Any]) -> Iterator[tuple[int, list[Any]]]:
     """Yield each direction in which one of several arrays has a tangent, with those of all of them."""
-    tangents = [tangents_of(each) for each in arrays]
-    for direction in dict.fromkeys(at for each in tangents for at in each):
-        yield direction, [each.get(direction, 0.0) for each in tangents]
+    tangents = [tangents_of(array_tangents) for array_tangents in arrays]
+    for direction in dict.fromkeys(
+        tangent_direction for array_tangents in tangents for tangent_direction in array_tangents
+    ):
+        yield direction, [array_tangents.get(direction, 0.0) for array_tangents in tangents]
 
 
-def _broadcast_to(array: Dual, shape: tuple[int, ...]) -> Dual:
+def _broadcast_dual(array: Dual, shape: tuple[int, ...]) -> Dual:
     return Dual(np.broadcast_to(array.value, shape), array.tangents)
 
 
-def _full_like(array: Any, fill: Any) -> Any:
+def _full_like_dual(array: Any, fill: Any) -> Any:
     shape = np.shape(value_of(array))
-    return _broadcast_to(fill, shape) if isinstance(fill, Dual) else np.full(shape, fill)
+    return _broadcast_dual(fill, shape) if isinstance(fill, Dual) else np.full(shape, fill)
 
 
-ARRANGED: Mapping[Callable[..., Any], Callable[..., Any]] = {
-    np.where: _where,
-    np.clip: _clip,
-    np.stack: _joined(np.stack),
-    np.concatenate: _joined(np.concatenate),
-    np.broadcast_to: _broadcast_to,
-    np.full_like: _full_like,
+ARRANGING_FUNCTIONS: Mapping[Callable[..., Any], Callable[..., Any]] = {
+    np.where: _where_of_duals,
+    np.clip: _clip_duals,
+    np.stack: _joining_function(np.stack),
+    np.concatenate: _joining_function(np.concatenate),
+    np.broadcast_to: _broadcast_dual,
+    np.full_like: _full_like_dual,
     np.sum: Dual.sum,
 }
 """Functions that arrange or choose entries."""

@@ -38,12 +38,15 @@ class Truncation:
 
     def __init__(self, orders: Iterable[Order]) -> None:
         self.orders = tuple(sorted(set(orders), key=lambda order: (sum(order), order)))
-        kept = frozenset(self.orders)
+        order_set = frozenset(self.orders)
         self.variables = len(self.orders[0])
         self.zeroth = (0,) * self.variables
-        self.degree = max(map(sum, kept))
+        self.degree = max(map(sum, order_set))
         self._products = {
-            (a, b): total for a in kept for b in kept if (total := _total(a, b)) in frozenset(kept)
+            (a, b): order_sum
+            for a in order_set
+            for b in order_set
+            if (order_sum := _sum_of_orders(a, b)) in frozenset(order_set)
         }
 
     def product(self, first: Terms, second: Terms) -> dict[Order, Scalar]:
@@ -64,7 +67,7 @@ class Truncation:
         return Jet(self, {self.zeroth: value, **dict(zip(units, slopes, strict=True))})
 
 
-def _total(a: Order, b: Order) -> Order:
+def _sum_of_orders(a: Order, b: Order) -> Order:
     return tuple(map(sum, zip(a, b, strict=True)))
 
 
@@ -87,31 +90,31 @@ class Jet:
         """Return a derivative; the number zero if it vanishes at every point."""
         return mul(prod(map(factorial, order)), self._terms.get(order, 0))
 
-    def _joined(self, other: Any, join: Callable[[Scalar, Scalar], Scalar]) -> Jet:
-        theirs = self._lifted(other)
-        orders = dict.fromkeys((*self._terms, *theirs))
-        terms = {order: join(self._terms.get(order, 0), theirs.get(order, 0)) for order in orders}
+    def _combine_terms(self, other: Any, operation: Callable[[Scalar, Scalar], Scalar]) -> Jet:
+        other_terms = self._terms_of(other)
+        orders = dict.fromkeys((*self._terms, *other_terms))
+        terms = {order: operation(self._terms.get(order, 0), other_terms.get(order, 0)) for order in orders}
         return Jet(self._truncation, terms)
 
-    def _lifted(self, other: Any) -> Terms:
+    def _terms_of(self, other: Any) -> Terms:
         return other._terms if isinstance(other, Jet) else {self._truncation.zeroth: other}
 
     def __add__(self, other: Any) -> Jet:
-        return self._joined(other, add)
+        return self._combine_terms(other, add)
 
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> Jet:
-        return self._joined(other, sub)
+        return self._combine_terms(other, sub)
 
     def __rsub__(self, other: Any) -> Jet:
-        return self._joined(other, lambda a, b: sub(b, a))
+        return self._combine_terms(other, lambda a, b: sub(b, a))
 
     def __neg__(self) -> Jet:
         return Jet(self._truncation, {order: mul(-1, term) for order, term in self._terms.items()})
 
     def __mul__(self, other: Any) -> Jet:
-        return Jet(self._truncation, self._truncation.product(self._terms, self._lifted(other)))
+        return Jet(self._truncation, self._truncation.product(self._terms, self._terms_of(other)))
 
     __rmul__ = __mul__
 
@@ -128,14 +131,14 @@ class Jet:
 
     def __pow__(self, exponent: Any) -> Jet:
         if isinstance(exponent, Jet):
-            return _compose(_exponential, _compose(_logarithmic, self) * exponent)
+            return _compose_series(_exponential_series, _compose_series(_logarithm_series, self) * exponent)
         if not (float(exponent).is_integer() and abs(exponent) <= MOST_FACTORS):
-            return _power(self, exponent)
-        power = _whole_power(self, abs(int(exponent)))
+            return _real_power(self, exponent)
+        power = _power_by_squaring(self, abs(int(exponent)))
         return power if exponent >= 0 else _reciprocal(power)
 
     def __rpow__(self, base: Any) -> Jet:
-        return _compose(_exponential, self * np.log(base))
+        return _compose_series(_exponential_series, self * np.log(base))
 
     def composed(self, outer: Iterator[Scalar]) -> Jet:
         """Return the composition with an outer function, from its Taylor coefficients at `value`."""
@@ -145,10 +148,10 @@ class Jet:
         for coefficient in islice(outer, self._truncation.degree - 1):
             result, power = result + power * coefficient, power * inner
         last: Jet = power * next(outer)
-        return result._joined(last, add)
+        return result._combine_terms(last, add)
 
 
-def _whole_power(base: Jet, exponent: int) -> Jet:
+def _power_by_squaring(base: Jet, exponent: int) -> Jet:
     """Return an integer power by squaring, which is valid at zero, too."""
     result, square = base * 0 + 1, base
     while exponent:
@@ -159,74 +162,76 @@ def _whole_power(base: Jet, exponent: int) -> Jet:
     return result
 
 
-def _power(base: Jet, exponent: float) -> Jet:
-    return base.composed(_binomial(np.power(base.value, exponent), base.value, exponent))
+def _real_power(base: Jet, exponent: float) -> Jet:
+    return base.composed(_power_series(np.power(base.value, exponent), base.value, exponent))
 
 
 def _reciprocal(base: Jet) -> Jet:
-    return base.composed(_binomial(np.divide(1.0, base.value), base.value, -1))
+    return base.composed(_power_series(np.divide(1.0, base.value), base.value, -1))
 
 
-def _binomial(first: Scalar, value: Scalar, exponent: float) -> Iterator[Scalar]:
+def _power_series(zeroth: Scalar, value: Scalar, exponent: float) -> Iterator[Scalar]:
     """Yield the Taylor coefficients of a power of the value, from the power itself, without end."""
-    coefficient = first
-    for number in count():
+    coefficient = zeroth
+    for degree in count():
         yield coefficient
-        coefficient = coefficient * ((exponent - number) / (number + 1)) / value
+        coefficient = coefficient * ((exponent - degree) / (degree + 1)) / value
 
 
-def _exponential(value: Scalar) -> Iterator[Scalar]:
-    first = np.exp(value)
-    return (first / factorial(number) for number in count())
+def _exponential_series(value: Scalar) -> Iterator[Scalar]:
+    exponential = np.exp(value)
+    return (exponential / factorial(degree) for degree in count())
 
 
-def _logarithmic(value: Scalar) -> Iterator[Scalar]:
+def _logarithm_series(value: Scalar) -> Iterator[Scalar]:
     yield np.log(value)
     power = np.float64(-1)
-    for number in count(1):
+    for degree in count(1):
         power = power / -value
-        yield power / number
+        yield power / degree
 
 
-def _sine(value: Scalar) -> Iterator[Scalar]:
+def _sine_series(value: Scalar) -> Iterator[Scalar]:
     sine, cosine = np.sin(value), np.cos(value)
     derivatives = cycle((sine, cosine, -sine, -cosine))
-    return (derivative / factorial(number) for number, derivative in enumerate(derivatives))
+    return (derivative / factorial(degree) for degree, derivative in enumerate(derivatives))
 
 
-def _cosine(value: Scalar) -> Iterator[Scalar]:
+def _cosine_series(value: Scalar) -> Iterator[Scalar]:
     sine, cosine = np.sin(value), np.cos(value)
     derivatives = cycle((cosine, -sine, -cosine, sine))
-    return (derivative / factorial(number) for number, derivative in enumerate(derivatives))
+    return (derivative / factorial(degree) for degree, derivative in enumerate(derivatives))
 
 
-def _tangent(value: Scalar) -> Iterator[Scalar]:
+def _tangent_series(value: Scalar) -> Iterator[Scalar]:
     """Yield the series of tan by tan' = 1 + tan^2."""
-    known = [np.tan(value)]
-    for number in count(1):
-        yield known[-1]
-        squared = sum(a * b for a, b in zip(known, reversed(known), strict=True))
-        known.append((squared + (number == 1)) / number)
+    coefficients = [np.tan(value)]
+    for degree in count(1):
+        yield coefficients[-1]
+        square = sum(a * b for a, b in zip(coefficients, reversed(coefficients), strict=True))
+        coefficients.append((square + (degree == 1)) / degree)
 
 
-def _square_root(value: Scalar) -> Iterator[Scalar]:
-    return _binomial(np.sqrt(value), value, 0.5)
+def _square_root_series(value: Scalar) -> Iterator[Scalar]:
+    return _power_series(np.sqrt(value), value, 0.5)
 
 
-def _compose(function: Callable[[Scalar], Iterator[Scalar]], argument: Jet) -> Jet:
-    return argument.composed(function(argument.value))
+def _compose_series(series: Callable[[Scalar], Iterator[Scalar]], argument: Jet) -> Jet:
+    return argument.composed(series(argument.value))
 
 
-def _of_either(of_number: np.ufunc, function: Callable[[Scalar], Iterator[Scalar]]) -> Callable[[Any], Any]:
-    return lambda argument: _compose(function, argument) if isinstance(argument, Jet) else of_number(argument)
+def _for_jet_or_number(ufunc: np.ufunc, series: Callable[[Scalar], Iterator[Scalar]]) -> Callable[[Any], Any]:
+    return lambda argument: (
+        _compose_series(series, argument) if isinstance(argument, Jet) else ufunc(argument)
+    )
 
 
 FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
-    "sin": _of_either(np.sin, _sine),
-    "cos": _of_either(np.cos, _cosine),
-    "tan": _of_either(np.tan, _tangent),
-    "sqrt": _of_either(np.sqrt, _square_root),
-    "exp": _of_either(np.exp, _exponential),
-    "log": _of_either(np.log, _logarithmic),
+    "sin": _for_jet_or_number(np.sin, _sine_series),
+    "cos": _for_jet_or_number(np.cos, _cosine_series),
+    "tan": _for_jet_or_number(np.tan, _tangent_series),
+    "sqrt": _for_jet_or_number(np.sqrt, _square_root_series),
+    "exp": _for_jet_or_number(np.exp, _exponential_series),
+    "log": _for_jet_or_number(np.log, _logarithm_series),
 }
 """Functions of jets and of numbers by their names in expressions."""

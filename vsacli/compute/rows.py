@@ -23,19 +23,21 @@ class RowLayout:
 
     def __init__(self, shapes: Mapping[str, tuple[int, ...]]) -> None:
         self.shapes = dict(shapes)
-        ends = list(accumulate(map(math.prod, self.shapes.values()), initial=0))
-        self.size = ends[-1]
-        self._places = dict(zip(self.shapes, (slice(*place) for place in pairwise(ends)), strict=True))
+        bounds = list(accumulate(map(math.prod, self.shapes.values()), initial=0))
+        self.size = bounds[-1]
+        self._slices = dict(
+            zip(self.shapes, (slice(*bound_pair) for bound_pair in pairwise(bounds)), strict=True)
+        )
 
     def unpack(self, rows: Sequence[_Row]) -> dict[str, Sequence[_Row]]:
         """Return the rows of each array by name; further rows are ignored."""
-        return {name: rows[place] for name, place in self._places.items()}
+        return {name: rows[row_slice] for name, row_slice in self._slices.items()}
 
     def arrays(self, rows: AnyArray) -> dict[str, AnyArray]:
         """Return each array in its shape, followed by the axes of a row."""
         return {
-            name: rows[place].reshape((*self.shapes[name], *rows.shape[1:]))
-            for name, place in self._places.items()
+            name: rows[row_slice].reshape((*self.shapes[name], *rows.shape[1:]))
+            for name, row_slice in self._slices.items()
         }
 
     def pack(self, rows: Mapping[str, Iterable[_Row]]) -> list[_Row]:

@@ -16,7 +16,7 @@ from functools import cache
 
 import numpy as np
 
-_Environment = ctypes.c_uint32 * 8
+_FloatEnvironment = ctypes.c_uint32 * 8
 """The floating-point environment of glibc on x86-64, fenv_t; its last word is the register MXCSR."""
 
 RESULTS_ARE_ZERO, OPERANDS_ARE_ZERO = 0x8000, 0x0040
@@ -26,27 +26,27 @@ RESULTS_ARE_ZERO, OPERANDS_ARE_ZERO = 0x8000, 0x0040
 @contextmanager
 def subnormals_as_zero() -> Iterator[None]:
     """Treat subnormal operands and results as zero in this thread; Linux on x86-64 only."""
-    library = _mathematics()
+    library = _math_library()
     if library is None:
         yield
         return
-    before = _Environment()
-    library.fegetenv(before)
-    within = _Environment(*before)
-    within[-1] |= RESULTS_ARE_ZERO | OPERANDS_ARE_ZERO
-    library.fesetenv(within)
+    saved = _FloatEnvironment()
+    library.fegetenv(saved)
+    changed = _FloatEnvironment(*saved)
+    changed[-1] |= RESULTS_ARE_ZERO | OPERANDS_ARE_ZERO
+    library.fesetenv(changed)
     try:
         yield
     finally:
-        library.fesetenv(before)
+        library.fesetenv(saved)
 
 
 @cache
-def _mathematics() -> ctypes.CDLL | None:
+def _math_library() -> ctypes.CDLL | None:
     """Return the library with the functions of fenv.h if its data are as above, else None."""
     # NumPy computes the limits of each type at first use: here, before subnormals are zero.
-    for kind in (np.float16, np.float32, np.float64):
-        np.finfo(kind)
+    for dtype in (np.float16, np.float32, np.float64):
+        np.finfo(dtype)
     if sys.platform == "linux" and os.uname().machine == "x86_64" and sys.maxsize > 2**32:
         with suppress(OSError):  # another C library
             return ctypes.CDLL("libm.so.6")

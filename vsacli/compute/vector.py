@@ -22,8 +22,8 @@ Scalar = Any
 @singledispatch
 def exact(number: Scalar) -> Scalar:
     """Return a constant that folds as a Python integer, and any other scalar as it is."""
-    plain = isinstance(number, float | int | complex | Rational)
-    return int(number) if plain and number in (0, 1, -1) else number
+    is_number = isinstance(number, float | int | complex | Rational)
+    return int(number) if is_number and number in (0, 1, -1) else number
 
 
 def is_zero(number: Scalar) -> bool:
@@ -69,13 +69,13 @@ def sub(a: Scalar, b: Scalar) -> Scalar:
 def mul(a: Scalar, b: Scalar) -> Scalar:
     """Return the product a b."""
     if type(a) is int:
-        return _times_integer(a, b)
+        return _integer_multiple(a, b)
     if type(b) is int:
-        return _times_integer(b, a)
+        return _integer_multiple(b, a)
     return a * b
 
 
-def _times_integer(factor: int, a: Scalar) -> Scalar:
+def _integer_multiple(factor: int, a: Scalar) -> Scalar:
     if factor == 0:
         return 0
     if factor == 1:
@@ -110,13 +110,13 @@ ZERO, ONES = Vector(0, 0, 0), Vector(1, 1, 1)
 def cross(a: Vector, b: Vector, along: Vector = ONES) -> Vector:
     """Return the vector product a x b; with `along`, only what an inner product with it needs."""
     return Vector(
-        0 if _vanishes(along.x) else sub(mul(a.y, b.z), mul(a.z, b.y)),
-        0 if _vanishes(along.y) else sub(mul(a.z, b.x), mul(a.x, b.z)),
-        0 if _vanishes(along.z) else sub(mul(a.x, b.y), mul(a.y, b.x)),
+        0 if _is_exact_zero(along.x) else sub(mul(a.y, b.z), mul(a.z, b.y)),
+        0 if _is_exact_zero(along.y) else sub(mul(a.z, b.x), mul(a.x, b.z)),
+        0 if _is_exact_zero(along.z) else sub(mul(a.x, b.y), mul(a.y, b.x)),
     )
 
 
-def _vanishes(a: Scalar) -> bool:
+def _is_exact_zero(a: Scalar) -> bool:
     return type(a) is int and a == 0
 
 

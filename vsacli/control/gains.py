@@ -40,8 +40,8 @@ def linear_control(
         integral: time integral of the error, ([samples,] joints).
     """
     control = desired[-1] + integral_gain * integral
-    for wanted, found, gain in zip(desired, actual, gains.T, strict=False):
-        control = control + gain * (wanted - found)
+    for reference, measured, gain in zip(desired, actual, gains.T, strict=False):
+        control = control + gain * (reference - measured)
     return control
 
 
@@ -130,16 +130,18 @@ class Gains:
 
 def _error_coefficients(name: str, poles: npt.ArrayLike, counts: set[int]) -> tuple[FloatArray, FloatArray]:
     """Return rows K0, K1, ..., and the KI of each row."""
-    table = np.atleast_2d(np.asarray(poles, dtype=np.complex128))
-    if table.ndim != 2 or table.shape[1] not in counts:
+    pole_rows = np.atleast_2d(np.asarray(poles, dtype=np.complex128))
+    if pole_rows.ndim != 2 or pole_rows.shape[1] not in counts:
         expected = ", ".join(map(str, sorted(counts)))
-        raise InputError.one(f"expected {expected} poles of the {name} error, found {table.shape[-1]}")
-    for pole in table.ravel():
+        raise InputError.one(f"expected {expected} poles of the {name} error, found {pole_rows.shape[-1]}")
+    for pole in pole_rows.ravel():
         check_stable(name, pole)
-    polynomials = [np.poly(row) for row in table]
-    for row, polynomial in zip(table.tolist(), polynomials, strict=True):
+    polynomials = [np.poly(row) for row in pole_rows]
+    for row, polynomial in zip(pole_rows.tolist(), polynomials, strict=True):
         if np.iscomplexobj(polynomial):
-            pole = next(each for each in row if row.count(each) > row.count(each.conjugate()))
+            pole = next(
+                candidate for candidate in row if row.count(candidate) > row.count(candidate.conjugate())
+            )
             missing = pole_text(pole.conjugate())
             reason = f"the complex pole {pole_text(pole)} of the {name} error has no conjugate"
             raise InputError.one(f"{reason}; add {missing}")
@@ -154,9 +156,9 @@ def check_stable(name: str, pole: complex) -> None:
         InputError: its real part is not negative.
     """
     if not pole.real < 0:
-        stable = f", e.g. {pole_text(complex(-pole.real, pole.imag))}" if pole.real > 0 else ""
-        shown = f"{pole_text(pole)} of the {name} error"
-        raise InputError.one(f"the pole {shown} is unstable; its real part must be negative{stable}")
+        suggestion = f", e.g. {pole_text(complex(-pole.real, pole.imag))}" if pole.real > 0 else ""
+        subject = f"{pole_text(pole)} of the {name} error"
+        raise InputError.one(f"the pole {subject} is unstable; its real part must be negative{suggestion}")
 
 
 def pole_text(pole: complex) -> str:

@@ -80,11 +80,11 @@ class Decoupling:
         ddtau_e = self._plant.links.torque_acceleration(  # (60)
             q, dq, link.ddq, link.d3q, v_q, reference.wrench
         )
-        dampers = self._plant.dampers.of_links(reference.commanded, dq, link.ddq, link.d3q)
+        dampers = self._plant.dampers.link_damper_torques(reference.commanded, dq, link.ddq, link.d3q)
         ddtau_e = add(ddtau_e, dampers.ddtau)
         ddtheta = springs.motor_accelerations(link.ddq, ddtau_e, v_sigma)
-        of_rotors = drivetrain.rotors.torques(ddtheta)
-        torque = of_rotors + drivetrain.damping * dtheta + springs.tau_transmission  # (73)-(74)
+        rotor_torque = drivetrain.rotors.torques(ddtheta)
+        torque = rotor_torque + drivetrain.damping * dtheta + springs.tau_transmission  # (73)-(74)
         friction = drivetrain.friction
         return torque if friction is None else torque + friction.torque(dtheta, slip)
 
@@ -111,9 +111,11 @@ class Decoupling:
         links, tau_e, dtau_e = self._plant.links, springs.tau_e, springs.dtau_e
         matrix = links.mass_matrix(q)
         dampers = self._plant.dampers
-        bias = add(links.bias(q, dq, wrench), dampers.of_links(commanded, dq).tau)
+        bias = add(links.bias(q, dq, wrench), dampers.link_damper_torques(commanded, dq).tau)
         ddq = links.solve(matrix, tau_e - bias)  # (34)
-        rate = add(links.torque_rate(q, dq, ddq, wrench), dampers.of_links(commanded, dq, ddq).dtau)
+        rate = add(
+            links.torque_rate(q, dq, ddq, wrench), dampers.link_damper_torques(commanded, dq, ddq).dtau
+        )
         d3q = links.solve(matrix, dtau_e - rate)  # (35)
         return LinkMotion(tau_e, dtau_e, ddq, d3q, springs.stiffness, springs.dstiffness)
 
@@ -142,10 +144,10 @@ class ComputedTorque:
             self._gains.position, self._gains.position_integral, integral.q,
         )  # fmt: skip
         links, drivetrain = self._plant.links, self._plant.drivetrain
-        of_links = (links.mass_matrix(q) @ v_q[..., None])[..., 0] + links.bias(q, dq, reference.wrench)
-        of_links += drivetrain.inertia * v_q + drivetrain.damping * dq
+        motor_torque = (links.mass_matrix(q) @ v_q[..., None])[..., 0] + links.bias(q, dq, reference.wrench)
+        motor_torque += drivetrain.inertia * v_q + drivetrain.damping * dq
         friction = drivetrain.friction
-        return of_links if friction is None else of_links + friction.torque(dq, slip)
+        return motor_torque if friction is None else motor_torque + friction.torque(dq, slip)
 
 
 def feedback_linearization(
@@ -197,9 +199,9 @@ class FeedbackLinearization:
 
         The first call for a robot traces its links: 0.3 s with seven joints.
         """
-        unpacked = self.plant.unpacked(state)
-        zero = np.zeros_like(unpacked[0])
-        torque = self.law.torque(*unpacked, reference, integral or Integral(zero, zero))
+        unpacked_state = self.plant.unpack_state(state)
+        zero = np.zeros_like(unpacked_state[0])
+        torque = self.law.torque(*unpacked_state, reference, integral or Integral(zero, zero))
         return self.plant.drivetrain.of_joints(torque)
 
 
@@ -229,14 +231,14 @@ def control_law(plant: Plant, gains: Gains) -> Decoupling | ComputedTorque:
 def _mixed_drives_text(robot: Robot, plant: Plant) -> str:
     drivetrain = plant.drivetrain
     rigid, sprung = (
-        list(dict.fromkeys(robot.joint_names[joint] for joint in drivetrain.joint[with_spring]))
-        for with_spring in (~drivetrain.sprung, drivetrain.sprung)
+        list(dict.fromkeys(robot.joint_names[joint] for joint in drivetrain.joint[mask]))
+        for mask in (~drivetrain.sprung, drivetrain.sprung)
     )
     return (
-        f"feedback linearization needs springs at all joints or at none: {_are(rigid)} rigid, "
-        f"{_are(sprung)} not; give rigid joints an elastic actuator, or use the controller feedforward"
+        f"feedback linearization needs springs at all joints or at none: {_names_are(rigid)} rigid, "
+        f"{_names_are(sprung)} not; give rigid joints an elastic actuator, or use the controller feedforward"
     )
 
 
-def _are(names: list[str]) -> str:
+def _names_are(names: list[str]) -> str:
     return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"

@@ -48,21 +48,21 @@ class PolesFile(DeclaredRecord):
     joints: tuple[JointPoles, ...] = value(Items(RecordOf(JointPoles), unique="name"), "poles of each joint")
 
 
-def parse_poles(written: str, alternative: str = "") -> Poles:
+def parse_poles(text: str, alternative: str = "") -> Poles:
     """Parse poles separated by commas, e.g. `-20, -21, -10+5j, -10-5j`.
 
     Args:
-        written: text of a user.
+        text: text of a user.
         alternative: clause on what else the text may be, for the error.
 
     Raises:
         InputError: the text is something else.
     """
     try:
-        return tuple(complex(re.sub(r"\s", "", word)) for word in written.split(","))
+        return tuple(complex(re.sub(r"\s", "", word)) for word in text.split(","))
     except ValueError:
         expected = f"expected poles such as -20,-21,-10+5j,-10-5j{alternative}"
-        raise InputError.one(f"{expected}, found {written!r}") from None
+        raise InputError.one(f"{expected}, found {text!r}") from None
 
 
 def gains_from_text(robot: Robot, position: str, stiffness: str, *, integral: bool) -> Gains:
@@ -83,15 +83,15 @@ def load_gains(path: str | os.PathLike[str], robot: Robot, *, integral: bool) ->
         InputError: the file has problems.
     """
     document, source = read_document(path, PolesFile, file_formats.POLES)
-    given = {joint.name: joint for joint in document.joints}
-    for name in given.keys() - set(robot.joint_names):
+    poles_by_joint = {joint.name: joint for joint in document.joints}
+    for name in poles_by_joint.keys() - set(robot.joint_names):
         hint = did_you_mean(name, robot.joint_names)
         raise InputError.one(f"the robot has no joint {name!r}{hint}", source.path)
-    missing = [name for name in robot.joint_names if name not in given]
+    missing = [name for name in robot.joint_names if name not in poles_by_joint]
     if missing:
         raise InputError.one(f"no poles for {', '.join(missing)}; each joint needs them", source.path)
     position, stiffness = (
-        {f"{name}: ": parse_poles(getattr(given[name], error)) for name in robot.joint_names}
+        {f"{name}: ": parse_poles(getattr(poles_by_joint[name], error)) for name in robot.joint_names}
         for error in ("position", "stiffness")
     )
     try:
@@ -107,18 +107,26 @@ def _gains_from_poles(
     sprung = any(actuator.sprung for actuator in robot.actuators)
     order = POSITION_ORDER if sprung else RIGID_ORDER
     return Gains.from_poles(
-        [_completed(of, "position", poles, order, integral) for of, poles in position.items()],
-        [_completed(of, "stiffness", poles, STIFFNESS_ORDER, integral) for of, poles in stiffness.items()],
+        [
+            _repeat_single_pole(message_start, "position", poles, order, integral)
+            for message_start, poles in position.items()
+        ],
+        [
+            _repeat_single_pole(message_start, "stiffness", poles, STIFFNESS_ORDER, integral)
+            for message_start, poles in stiffness.items()
+        ],
     )
 
 
-def _completed(of: str, name: str, poles: Poles, order: int, integral: bool) -> Poles:
+def _repeat_single_pole(message_start: str, name: str, poles: Poles, order: int, integral: bool) -> Poles:
     """Return one pole for each state of the error; a single one is repeated."""
     count = order + integral
     if len(poles) == 1:
         return poles * count
     if len(poles) != count:
-        other = f"{order} without" if integral else f"{order + 1} with"
-        expected = f"{of}expected {count} poles of the {name} error ({other} integral action)"
+        alternative = f"{order} without" if integral else f"{order + 1} with"
+        expected = (
+            f"{message_start}expected {count} poles of the {name} error ({alternative} integral action)"
+        )
         raise InputError.one(f"{expected}, or 1 that is repeated, found {len(poles)}")
     return poles

@@ -43,77 +43,77 @@ Residual = tuple[FloatArray, FloatArray]
 
 
 def shaft_error(
-    joint: Joint, of_joint: JointVariables, tau_transmission: Components, regular: BoolArray
+    joint: Joint, variables: JointVariables, tau_transmission: Components, regular: BoolArray
 ) -> FloatArray:
     """Return the largest residual of the shafts of a joint, relative to the terms of its balance, (samples,).
 
     Args:
         joint: Joint.
-        of_joint: Variables of the joint.
+        variables: Variables of the joint.
         tau_transmission: Torque of the springs against each motor by their laws, each (samples,).
         regular: Samples at which values must exist; the error is zero elsewhere.
     """
     errors = [
-        np.where(regular, np.abs(residual) / np.maximum(size, np.finfo(float).tiny), 0.0)
-        for residual, size in _shaft_residuals(joint, of_joint, tau_transmission)
+        np.where(regular, np.abs(residual) / np.maximum(magnitude, np.finfo(float).tiny), 0.0)
+        for residual, magnitude in _shaft_residuals(joint, variables, tau_transmission)
     ]
     return reduce(np.maximum, errors)
 
 
 def _shaft_residuals(
-    joint: Joint, of_joint: JointVariables, tau_transmission: Components
+    joint: Joint, variables: JointVariables, tau_transmission: Components
 ) -> Iterator[Residual]:
     for index, motor in enumerate(joint.actuator.motors):
         torque, dtheta, power = (
-            rows[index] for rows in (of_joint.tau_motor, of_joint.dtheta, of_joint.motor_power)
+            rows[index] for rows in (variables.tau_motor, variables.dtheta, variables.motor_power)
         )
-        yield _torque_residual(joint, index, of_joint, tau_transmission[index])
+        yield _torque_residual(joint, index, variables, tau_transmission[index])
         yield _balance_residual(power, torque * dtheta)
         if motor.torque_constant is not None:
-            electrical = (of_joint.current, of_joint.voltage, of_joint.copper_loss)
+            electrical = (variables.current, variables.voltage, variables.copper_loss)
             rows = (None if array is None else array[index] for array in electrical)
             yield from _winding_residuals(motor, torque, dtheta, power, *rows)
     if joint.damper is not None:
         yield _balance_residual(
-            of_joint.tau_damper,
+            variables.tau_damper,
             *(
-                of_joint.damping * velocity
-                for velocity in _damper_velocity_by_motor(joint, of_joint).values()
+                variables.damping * velocity
+                for velocity in _damper_velocity_by_motor(joint, variables).values()
             ),
         )
-    if of_joint.dissipated_power is not None:
-        lost = (*link_losses(joint, of_joint), *shaft_losses(joint, of_joint))
-        yield _balance_residual(of_joint.dissipated_power, *lost)
+    if variables.dissipated_power is not None:
+        losses = (*link_losses(joint, variables), *shaft_losses(joint, variables))
+        yield _balance_residual(variables.dissipated_power, *losses)
 
 
 def _balance_residual(computed: FloatArray, *terms: FloatArray) -> Residual:
-    size = reduce(np.add, [np.abs(term) for term in terms], np.abs(computed))
-    return computed - reduce(np.add, terms, np.zeros_like(computed)), size
+    magnitude = reduce(np.add, [np.abs(term) for term in terms], np.abs(computed))
+    return computed - reduce(np.add, terms, np.zeros_like(computed)), magnitude
 
 
 def _torque_residual(
-    joint: Joint, index: int, of_joint: JointVariables, tau_transmission: FloatArray
+    joint: Joint, index: int, variables: JointVariables, tau_transmission: FloatArray
 ) -> Residual:
     """Return the residual of a shaft, without the effect of rounded positions on the springs."""
-    motor, dtheta = joint.actuator.motors[index], of_joint.dtheta[index]
-    terms = [*_momentum_rates(joint, index, of_joint.ddtheta), tau_transmission]
+    motor, dtheta = joint.actuator.motors[index], variables.dtheta[index]
+    terms = [*_momentum_rates(joint, index, variables.ddtheta), tau_transmission]
     terms += [motor.damping * dtheta, *_friction_torques(motor.friction, dtheta)]
-    damped = _damper_velocity_by_motor(joint, of_joint).get(index)
-    if damped is not None:
-        terms.append(of_joint.damping * damped)
-    residual, size = _balance_residual(of_joint.tau_motor[index], *terms)
+    damper_velocity = _damper_velocity_by_motor(joint, variables).get(index)
+    if damper_velocity is not None:
+        terms.append(variables.damping * damper_velocity)
+    residual, magnitude = _balance_residual(variables.tau_motor[index], *terms)
     if joint.actuator.sprung:
-        positions = np.abs(of_joint.q) + np.abs(of_joint.theta[index])
-        rounding = POSITION_ROUNDING * of_joint.stiffness * positions
+        position_magnitude = np.abs(variables.q) + np.abs(variables.theta[index])
+        rounding = POSITION_ROUNDING * variables.stiffness * position_magnitude
         residual = np.maximum(np.abs(residual) - rounding, 0.0)
-    return residual, size
+    return residual, magnitude
 
 
 def _momentum_rates(joint: Joint, index: int, ddtheta: FloatArray) -> list[FloatArray]:
     """Return row `index` of B theta'', term by term."""
-    of_rotor = joint.actuator.motors[index].inertia * ddtheta[index]
-    coupling = joint.actuator.coupled_rotors
-    return [of_rotor] if is_zero(coupling) else [of_rotor, coupling * ddtheta[1 - index]]
+    rotor_term = joint.actuator.motors[index].inertia * ddtheta[index]
+    coupling_inertia = joint.actuator.coupled_rotors
+    return [rotor_term] if is_zero(coupling_inertia) else [rotor_term, coupling_inertia * ddtheta[1 - index]]
 
 
 def _winding_residuals(
@@ -145,56 +145,56 @@ def _friction_torques(friction: Friction | None, velocity: FloatArray) -> list[F
         shape = np.where(velocity > REST, 1.0, np.where(velocity < -REST, -1.0, 0.0 * velocity))
     else:
         shape = np.tanh(velocity / friction.width)
-    mean, half = (forward + backward) / 2, (forward - backward) / 2
-    return [mean * shape, half * np.abs(shape), friction.offset + 0.0 * velocity]
+    mean, half_difference = (forward + backward) / 2, (forward - backward) / 2
+    return [mean * shape, half_difference * np.abs(shape), friction.offset + 0.0 * velocity]
 
 
-def _damper_velocity_by_motor(joint: Joint, of_joint: JointVariables) -> dict[int | None, FloatArray]:
+def _damper_velocity_by_motor(joint: Joint, variables: JointVariables) -> dict[int | None, FloatArray]:
     """Return damper velocities of a joint by the motor that they act on; None for a damper between links."""
     if joint.damper is None:
         return {}
     if joint.damper_at("link"):
-        return {None: of_joint.dq}
-    behind = joint.actuator.has_columns(VARIABLES["phi"])
-    return {motor: of_joint.dphi[motor] for motor, there in enumerate(behind) if there}
+        return {None: variables.dq}
+    motors_with_phi = joint.actuator.has_columns(VARIABLES["phi"])
+    return {motor: variables.dphi[motor] for motor, has_phi in enumerate(motors_with_phi) if has_phi}
 
 
-def link_losses(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
+def link_losses(joint: Joint, variables: JointVariables) -> list[FloatArray]:
     """Return the power lost between the two links of a joint, term by term."""
-    dq = of_joint.dq
-    lost = [joint.damping * dq * dq, *(torque * dq for torque in _friction_torques(joint.friction, dq))]
+    dq = variables.dq
+    losses = [joint.damping * dq * dq, *(torque * dq for torque in _friction_torques(joint.friction, dq))]
     if joint.damper_at("link"):
-        lost.append(of_joint.damping * dq * dq)
-    return lost
+        losses.append(variables.damping * dq * dq)
+    return losses
 
 
-def shaft_losses(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
+def shaft_losses(joint: Joint, variables: JointVariables) -> list[FloatArray]:
     """Return the power lost between the motors and the link of a joint, term by term."""
-    lost = []
-    for motor, dtheta in zip(joint.actuator.motors, of_joint.dtheta, strict=False):
-        lost.append(motor.damping * dtheta * dtheta)
-        lost.extend(torque * dtheta for torque in _friction_torques(motor.friction, dtheta))
+    losses = []
+    for motor, dtheta in zip(joint.actuator.motors, variables.dtheta, strict=False):
+        losses.append(motor.damping * dtheta * dtheta)
+        losses.extend(torque * dtheta for torque in _friction_torques(motor.friction, dtheta))
     if joint.damper_at("transmission"):
-        velocities = _damper_velocity_by_motor(joint, of_joint).values()
-        lost.extend(of_joint.damping * velocity * velocity for velocity in velocities)
-    return lost
+        velocities = _damper_velocity_by_motor(joint, variables).values()
+        losses.extend(variables.damping * velocity * velocity for velocity in velocities)
+    return losses
 
 
-def shaft_energy(joint: Joint, of_joint: JointVariables) -> FloatArray:
+def shaft_energy(joint: Joint, variables: JointVariables) -> FloatArray:
     """Return the kinetic energy of the rotors of a joint plus the energy in its springs, (samples,), J."""
-    energy: FloatArray = of_joint.elastic_energy
-    motors, dtheta = joint.actuator.motors, of_joint.dtheta
+    energy: FloatArray = variables.elastic_energy
+    motors, dtheta = joint.actuator.motors, variables.dtheta
     for motor, velocity in zip(motors, dtheta, strict=False):
         energy = energy + motor.inertia / 2 * velocity * velocity
-    coupling = joint.actuator.coupled_rotors
-    return energy if is_zero(coupling) else energy + coupling * dtheta[0] * dtheta[1]
+    coupling_inertia = joint.actuator.coupled_rotors
+    return energy if is_zero(coupling_inertia) else energy + coupling_inertia * dtheta[0] * dtheta[1]
 
 
-def shaft_powers(joint: Joint, of_joint: JointVariables) -> list[FloatArray]:
+def shaft_powers(joint: Joint, variables: JointVariables) -> list[FloatArray]:
     """Return the powers that change `shaft_energy`: motors, torque on the link, losses; W."""
-    motors = len(joint.actuator.motors)
-    outflows = [of_joint.tau_e * of_joint.dq, *shaft_losses(joint, of_joint)]
-    return [*of_joint.motor_power[:motors], *(-power for power in outflows)]
+    motor_count = len(joint.actuator.motors)
+    outflows = [variables.tau_e * variables.dq, *shaft_losses(joint, variables)]
+    return [*variables.motor_power[:motor_count], *(-power for power in outflows)]
 
 
 BALANCES = {
@@ -244,22 +244,24 @@ class BalancedDynamics(RobotKernel):
     def results(self) -> RowLayout:
         """Layout of the output rows: those of inverse dynamics, then `BALANCES`."""
         joints = self.dynamics.robot.joints
-        motors, damped = (len(joints), SIDES), (len(joints_with_parallel_damper(joints)),)
-        shapes = dict(zip(BALANCES, (motors, motors, (), (), damped, damped), strict=True))
+        motor_shape, damped_shape = (len(joints), SIDES), (len(joints_with_parallel_damper(joints)),)
+        shapes = dict(
+            zip(BALANCES, (motor_shape, motor_shape, (), (), damped_shape, damped_shape), strict=True)
+        )
         return RowLayout({**self.dynamics.results.shapes, **shapes})
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(74) and the balances."""
-        joints, of_joints = self.dynamics.robot.joints, self.dynamics.at_joints(rows)
-        passed = call_at_joints(rows[0], passed_power, joints, zip(of_joints, strict=True))
-        powers, rates = zip(*passed, strict=True)
-        by_motor = {"passed_power": rows_of_joints(powers), "passed_rate": rows_of_joints(rates)}
-        computed = self.dynamics.rows_of(rows, of_joints)
-        return self.results.pack({**computed, **by_motor, **balance_errors(joints, of_joints)})
+        joints, joint_variables = self.dynamics.robot.joints, self.dynamics.joint_variables(rows)
+        powers_and_rates = call_at_joints(rows[0], passed_power, joints, zip(joint_variables, strict=True))
+        powers, rates = zip(*powers_and_rates, strict=True)
+        motor_rows = {"passed_power": rows_of_joints(powers), "passed_rate": rows_of_joints(rates)}
+        computed = self.dynamics.result_rows(rows, joint_variables)
+        return self.results.pack({**computed, **motor_rows, **balance_errors(joints, joint_variables)})
 
 
 def balance_errors(
-    joints: Sequence[Joint], of_joints: Sequence[JointVariables]
+    joints: Sequence[Joint], joint_variables: Sequence[JointVariables]
 ) -> dict[str, list[FloatArray]]:
     """Return the residuals of (14), by the springs' laws at phi, and of the shafts, by name.
 
@@ -268,77 +270,82 @@ def balance_errors(
     damper the torque of the springs may pass zero while nothing else is small, so the torque residual is
     returned unscaled, with its size: only the whole run has a scale for it.
     """
-    row = of_joints[0].tau_e
-    springs, shafts, missing, sizes = [np.zeros_like(row)], [], [], []
-    balanced = call_at_joints(row, _joint_balance_errors, joints, zip(of_joints, strict=True))
-    for of_stiffness, of_torque, size, of_shafts in balanced:
-        shafts.append(of_shafts)
-        if of_stiffness is not None:
-            springs.append(of_stiffness)
-        if size is not None:
-            missing.append(of_torque)
-            sizes.append(size)
-        elif of_torque is not None:
-            springs.append(of_torque)
-    largest = {"spring_error": [reduce(np.maximum, springs)], "shaft_error": [reduce(np.maximum, shafts)]}
-    return {**largest, "damped_error": missing, "damped_size": sizes}
+    row = joint_variables[0].tau_e
+    spring_errors, shaft_errors, damped_residuals, damped_magnitudes = [np.zeros_like(row)], [], [], []
+    joint_errors = call_at_joints(row, _joint_balance_errors, joints, zip(joint_variables, strict=True))
+    for stiffness_error, torque_error, magnitude, largest_shaft_error in joint_errors:
+        shaft_errors.append(largest_shaft_error)
+        if stiffness_error is not None:
+            spring_errors.append(stiffness_error)
+        if magnitude is not None:
+            damped_residuals.append(torque_error)
+            damped_magnitudes.append(magnitude)
+        elif torque_error is not None:
+            spring_errors.append(torque_error)
+    largest = {
+        "spring_error": [reduce(np.maximum, spring_errors)],
+        "shaft_error": [reduce(np.maximum, shaft_errors)],
+    }
+    return {**largest, "damped_error": damped_residuals, "damped_size": damped_magnitudes}
 
 
-def _joint_balance_errors(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray | None, ...]:
+def _joint_balance_errors(joint: Joint, variables: JointVariables) -> tuple[FloatArray | None, ...]:
     """Return the scaled errors of stiffness and torque of the springs, and the error of the shafts.
 
     With a parallel damper the torque error is in N m, and its size is returned, which is None otherwise.
     """
-    regular = ~has_flag(of_joint.flags, Flag.INFEASIBLE | Flag.SINGULAR)
-    tau_e, stiffness = of_joint.tau_e, of_joint.stiffness
+    regular = ~has_flag(variables.flags, Flag.INFEASIBLE | Flag.SINGULAR)
+    tau_e, stiffness = variables.tau_e, variables.stiffness
     if not joint.actuator.sprung:
-        return None, None, None, shaft_error(joint, of_joint, tau_e[None], regular)
-    springs = joint.actuator.springs_of(of_joint)
-    size, stiffness_size = springs.sizes(joint.actuator.unknowns(of_joint.phi, of_joint.theta))
-    of_shafts = shaft_error(joint, of_joint, springs.tau_transmission, regular)
-    of_stiffness = np.abs(springs.stiffness - stiffness) / np.where(regular, stiffness_size, 1.0)
-    of_stiffness = np.where(regular, of_stiffness, 0.0)
-    size = np.maximum(size, np.finfo(float).tiny)
+        return None, None, None, shaft_error(joint, variables, tau_e[None], regular)
+    springs = joint.actuator.springs_of(variables)
+    torque_magnitude, stiffness_magnitude = springs.sizes(
+        joint.actuator.unknowns(variables.phi, variables.theta)
+    )
+    largest_shaft_error = shaft_error(joint, variables, springs.tau_transmission, regular)
+    stiffness_error = np.abs(springs.stiffness - stiffness) / np.where(regular, stiffness_magnitude, 1.0)
+    stiffness_error = np.where(regular, stiffness_error, 0.0)
+    torque_magnitude = np.maximum(torque_magnitude, np.finfo(float).tiny)
     if not joint.damper_at("transmission"):
-        of_torque = np.where(regular, np.abs(springs.tau_e - tau_e) / size, 0.0)
-        return of_stiffness, of_torque, None, of_shafts
-    residual = np.abs(springs.tau_e + of_joint.tau_damper - tau_e)
-    residual = np.maximum(residual - _rounding_of_damper(of_joint), 0.0)
-    size = np.where(regular, np.maximum(size, np.abs(tau_e)), 0.0)
-    return of_stiffness, np.where(regular, residual, 0.0), size, of_shafts
+        torque_error = np.where(regular, np.abs(springs.tau_e - tau_e) / torque_magnitude, 0.0)
+        return stiffness_error, torque_error, None, largest_shaft_error
+    residual = np.abs(springs.tau_e + variables.tau_damper - tau_e)
+    residual = np.maximum(residual - _rounding_of_damper(variables), 0.0)
+    torque_magnitude = np.where(regular, np.maximum(torque_magnitude, np.abs(tau_e)), 0.0)
+    return stiffness_error, np.where(regular, residual, 0.0), torque_magnitude, largest_shaft_error
 
 
-def _rounding_of_damper(of_joint: JointVariables) -> FloatArray:
+def _rounding_of_damper(variables: JointVariables) -> FloatArray:
     """Return the rounding of the torque of a damper, whose velocity is the difference theta' - q'."""
-    rounding: FloatArray = 4 * np.finfo(float).eps * of_joint.damping * np.abs(of_joint.dq)
+    rounding: FloatArray = 4 * np.finfo(float).eps * variables.damping * np.abs(variables.dq)
     return rounding
 
 
-def passed_power(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
+def passed_power(joint: Joint, variables: JointVariables) -> tuple[FloatArray, FloatArray]:
     """Return the power of motors into springs, dampers and damping, and its rate, W, W/s.
 
     It is the motor power without that of inertia and dry friction, which `energy` integrates separately. Each
     (2, samples), NaN where there is no motor.
     """
-    dtheta, ddtheta = of_joint.dtheta, of_joint.ddtheta
+    dtheta, ddtheta = variables.dtheta, variables.ddtheta
     dampings = [motor.damping for motor in joint.actuator.motors]
     motor_damping = stack_constants([*dampings, *[np.nan] * (SIDES - len(dampings))])
-    torque = motor_damping * dtheta + of_joint.tau_transmission
+    torque = motor_damping * dtheta + variables.tau_transmission
     rate = motor_damping * ddtheta
-    none = np.full_like(of_joint.q, np.nan)
-    rate = rate + np.stack([*_transmission_rates(joint.actuator, of_joint), none][:SIDES])
+    absent = np.full_like(variables.q, np.nan)
+    rate = rate + np.stack([*_transmission_rates(joint.actuator, variables), absent][:SIDES])
     if joint.damper_at("transmission"):
-        damper_torque, damper_rate = parallel_damper_torques(joint, of_joint)
+        damper_torque, damper_rate = parallel_damper_torques(joint, variables)
         torque, rate = torque + damper_torque, rate + damper_rate
     return torque * dtheta, rate * dtheta + torque * ddtheta
 
 
-def _transmission_rates(actuator: Actuator, of_joint: JointVariables) -> Sequence[FloatArray]:
+def _transmission_rates(actuator: Actuator, variables: JointVariables) -> Sequence[FloatArray]:
     """Return the rates of the torques that act on each motor beside its own losses."""
     if not actuator.sprung:
-        return [of_joint.dtau_e]
-    rates = *actuator.unknowns(of_joint.dphi, of_joint.dtheta), of_joint.dq
-    return actuator.springs_of(of_joint).transmission_rates(rates)
+        return [variables.dtau_e]
+    coordinate_rates = *actuator.unknowns(variables.dphi, variables.dtheta), variables.dq
+    return actuator.springs_of(variables).transmission_rates(coordinate_rates)
 
 
 _Axes: TypeAlias = tuple[Vector, Vector, Vector]
@@ -364,7 +371,7 @@ class _FrameVelocity(NamedTuple):
     gravity: Vector
     base: _Axes
 
-    def seen_from(self, seat: Seat) -> _FrameVelocity:
+    def seat_motion(self, seat: Seat) -> _FrameVelocity:
         """Return the motion of a frame fixed in this one, in its components."""
         into_seat, lever = seat.rotation.transposed().times, seat.lever
         return _FrameVelocity(
@@ -375,29 +382,27 @@ class _FrameVelocity(NamedTuple):
             base=_rotate_axes(into_seat, self.base),
         )
 
-    def behind(self, joint: Joint, q: FloatArray, dq: FloatArray) -> _FrameVelocity:
+    def moved_link(self, joint: Joint, q: FloatArray, dq: FloatArray) -> _FrameVelocity:
         """Return the motion of the frame of the link that a joint moves, seated here."""
         link = link_constants(joint)
-        angle, offset = (
-            (joint.dh.theta + q, joint.dh.d) if joint.is_revolute else (joint.dh.theta, joint.dh.d + q)
-        )
+        angle, d = (joint.dh.theta + q, joint.dh.d) if joint.is_revolute else (joint.dh.theta, joint.dh.d + q)
         into_link = Rotation(np.cos(angle), np.sin(angle), link.cos_alpha, link.sin_alpha).undo
         axis = into_link(Vector(0, 0, 1))
-        step = Vector(link.a, 0, 0) + axis * offset
+        p = Vector(link.a, 0, 0) + axis * d
         omega = into_link(self.omega) + (axis * dq if joint.is_revolute else ZERO)
-        slide = ZERO if joint.is_revolute else axis * dq
+        sliding = ZERO if joint.is_revolute else axis * dq
         return _FrameVelocity(
-            origin=into_link(self.origin) + step,
-            velocity=into_link(self.velocity) + cross(omega, step) + slide,
+            origin=into_link(self.origin) + p,
+            velocity=into_link(self.velocity) + cross(omega, p) + sliding,
             omega=omega,
             gravity=into_link(self.gravity),
             base=_rotate_axes(into_link, self.base),
         )
 
 
-def _rotate_axes(into: Callable[[Vector], Vector], axes: _Axes) -> _Axes:
+def _rotate_axes(rotate: Callable[[Vector], Vector], axes: _Axes) -> _Axes:
     x, y, z = axes
-    return into(x), into(y), into(z)
+    return rotate(x), rotate(y), rotate(z)
 
 
 def link_energy(robot: Robot, block: Block) -> FloatArray:
@@ -406,9 +411,9 @@ def link_energy(robot: Robot, block: Block) -> FloatArray:
     for joint, frame in zip(robot.joints, _frame_velocities(robot, block), strict=True):
         link = link_constants(joint)
         velocity = frame.velocity + cross(frame.omega, link.com)
-        turning = frame.omega.dot(link.inertia.times(frame.omega))
+        angular_term = frame.omega.dot(link.inertia.times(frame.omega))
         height = frame.gravity.dot(frame.origin + link.com)
-        energy = energy + turning / 2 + link.mass * (velocity.dot(velocity) / 2 - height)
+        energy = energy + angular_term / 2 + link.mass * (velocity.dot(velocity) / 2 - height)
     return energy
 
 
@@ -422,51 +427,53 @@ def link_powers(robot: Robot, block: Block, frame: WrenchFrame | None) -> list[F
     """
     powers = []
     for index, joint in enumerate(robot.joints):
-        of_joint = JointVariables.of(block.of_joint(index))
-        powers.append(of_joint.tau_e * of_joint.dq)
-        powers.extend(-lost for lost in link_losses(joint, of_joint))
+        variables = JointVariables.of(block.of_joint(index))
+        powers.append(variables.tau_e * variables.dq)
+        powers.extend(-loss for loss in link_losses(joint, variables))
     return powers if frame is None else [*powers, *_wrench_powers(robot, block, frame)]
 
 
 def _frame_velocities(robot: Robot, block: Block) -> list[_FrameVelocity]:
     axes = (Vector(1, 0, 0), Vector(0, 1, 0), Vector(0, 0, 1))
-    still = _FrameVelocity(ZERO, ZERO, ZERO, base_gravity(robot), axes)
-    moving = list[_FrameVelocity]()
+    base_frame = _FrameVelocity(ZERO, ZERO, ZERO, base_gravity(robot), axes)
+    link_frames = list[_FrameVelocity]()
     for joint, (parent, seat), q, dq in zip(
         robot.joints, carriers(robot), block.q.T, block.dq.T, strict=True
     ):
-        frame = moving[parent] if parent >= 0 else still
-        moving.append((frame if seat is None else frame.seen_from(seat)).behind(joint, q, dq))
-    return moving
+        frame = link_frames[parent] if parent >= 0 else base_frame
+        link_frames.append((frame if seat is None else frame.seat_motion(seat)).moved_link(joint, q, dq))
+    return link_frames
 
 
 def _wrench_powers(robot: Robot, block: Block, frame: WrenchFrame) -> Iterator[FloatArray]:
     """Yield the power of the wrench on each tool on which one acts."""
     velocities = _frame_velocities(robot, block)
-    by_tool = block.wrench.reshape(len(block.time), -1, len(WRENCH_AXES))
-    for index, (tool, of_tool) in enumerate(zip(robot.end_effectors, frames_by_tool(frame), strict=True)):
-        if of_tool is not None:
-            moved, components = velocities[robot.tool_joints[index]], by_tool[:, index].T
-            yield _wrench_power(robot, tool, moved, of_tool, components)
+    wrenches = block.wrench.reshape(len(block.time), -1, len(WRENCH_AXES))
+    for index, (tool, tool_frame) in enumerate(zip(robot.end_effectors, frames_by_tool(frame), strict=True)):
+        if tool_frame is not None:
+            link_frame, components = velocities[robot.tool_joints[index]], wrenches[:, index].T
+            yield _wrench_power(robot, tool, link_frame, tool_frame, components)
 
 
 def _wrench_power(
-    robot: Robot, tool: Tool, moved: _FrameVelocity, frame: str, wrench: FloatArray
+    robot: Robot, tool: Tool, link_frame: _FrameVelocity, frame: str, wrench: FloatArray
 ) -> FloatArray:
     force, moment = Vector(*wrench[:3]), Vector(*wrench[3:])
-    velocity = moved.velocity + cross(moved.omega, Vector(*tool.xyz))
+    velocity = link_frame.velocity + cross(link_frame.omega, Vector(*tool.xyz))
     if frame == "end_effector":
         into_link = rotation_matrix(tool)
         force, moment = into_link.times(force), into_link.times(moment)
     else:
         into_frame_0 = rotation_matrix(robot.base).transposed()
-        force, moment = (_from_axes(moved.base, into_frame_0.times(part)) for part in (force, moment))
-    power: FloatArray = force.dot(velocity) + moment.dot(moved.omega)
+        force, moment = (
+            _vector_along_axes(link_frame.base, into_frame_0.times(vector)) for vector in (force, moment)
+        )
+    power: FloatArray = force.dot(velocity) + moment.dot(link_frame.omega)
     return power
 
 
-def _from_axes(axes: _Axes, components: Vector) -> Vector:
+def _vector_along_axes(axes: _Axes, components: Vector) -> Vector:
     """Return the vector with components along axes, which are given in the components of the result."""
     x, y, z = axes
-    total: Vector = x * components.x + y * components.y + z * components.z
-    return total
+    vector: Vector = x * components.x + y * components.y + z * components.z
+    return vector

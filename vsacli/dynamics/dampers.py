@@ -47,23 +47,25 @@ def damper_velocities(joint: Joint, dq: Scalar, dphi: Iterable[Scalar]) -> list[
     if joint.damper_at("link"):
         return [dq]
     return [
-        rate for rate, there in zip(dphi, joint.actuator.has_columns(VARIABLES["phi"]), strict=True) if there
+        rate
+        for rate, sprung in zip(dphi, joint.actuator.has_columns(VARIABLES["phi"]), strict=True)
+        if sprung
     ]
 
 
-def parallel_damper_torques(joint: Joint, of_joint: JointVariables) -> tuple[FloatArray, FloatArray]:
+def parallel_damper_torques(joint: Joint, variables: JointVariables) -> tuple[FloatArray, FloatArray]:
     """Return the torque of a parallel damper on the motors of a joint, and its rate, each (2, samples)."""
     damping, ddamping, dphi, ddtheta = (
-        of_joint.damping,
-        of_joint.ddamping,
-        of_joint.dphi,
-        of_joint.ddtheta,
+        variables.damping,
+        variables.ddamping,
+        variables.dphi,
+        variables.ddtheta,
     )
     torque, rate = np.zeros_like(dphi), np.zeros_like(dphi)
     for motor, has_spring in enumerate(joint.actuator.has_columns(VARIABLES["phi"])):
         if has_spring:
             torque[motor] = damping * dphi[motor]
-            rate[motor] = ddamping * dphi[motor] + damping * (ddtheta[motor] - of_joint.ddq)
+            rate[motor] = ddamping * dphi[motor] + damping * (ddtheta[motor] - variables.ddq)
     return torque, rate
 
 
@@ -79,39 +81,43 @@ class Dampers:
 
     def __init__(self, robot: Robot, drivetrain: Drivetrain) -> None:
         locations = [joint.damper and joint.damper.location for joint in robot.joints]
-        self._between_links = np.array([location == "link" for location in locations])
+        self._is_between_links = np.array([location == "link" for location in locations])
         parallel = np.array([location == "transmission" for location in locations])
-        behind_spring = drivetrain.of_motors(drivetrain.deflected)[drivetrain.sprung]
-        self._joint = drivetrain.spring_joint
-        self._parallel = behind_spring & parallel[self._joint]
-        self._absent = np.array([location is None for location in locations])
-        self._share = np.equal.outer(self._joint, np.arange(len(locations))).astype(np.float64)
+        has_deflection = drivetrain.of_motors(drivetrain.deflected)[drivetrain.sprung]
+        self._joint_of_motor = drivetrain.spring_joint
+        self._is_parallel = has_deflection & parallel[self._joint_of_motor]
+        self._is_absent = np.array([location is None for location in locations])
+        self._motor_joint_matrix = np.equal.outer(self._joint_of_motor, np.arange(len(locations))).astype(
+            np.float64
+        )
 
-    def of_links(
+    def link_damper_torques(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, ddq: Scalar = 0, d3q: Scalar = 0
     ) -> TorqueDerivatives:
         """Return the torques of dampers between the links, with derivatives; exact zeros without dampers."""
-        if not self._between_links.any():
+        if not self._is_between_links.any():
             return TorqueDerivatives(0, 0, 0)
-        d, d_d, dd_d = (np.where(self._between_links, commanded[name], 0.0) for name in DAMPING.names)
+        d, d_d, dd_d = (np.where(self._is_between_links, commanded[name], 0.0) for name in DAMPING.names)
         return damper_torque((d, d_d, dd_d), (dq, ddq, d3q))
 
-    def parallel(
+    def parallel_torques(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray
     ) -> ParallelDamperTorques:
         """Return the torques of dampers parallel to springs, from velocities of joints and sprung motors."""
-        if not self._parallel.any():
+        if not self._is_parallel.any():
             return ParallelDamperTorques(0, 0)
-        damping = np.where(self._parallel, commanded[DAMPING.key][..., self._joint], 0.0)
-        motors: FloatArray = damping * (dtheta - dq[..., self._joint])
-        return ParallelDamperTorques(motors @ self._share, motors)
+        damping = np.where(self._is_parallel, commanded[DAMPING.key][..., self._joint_of_motor], 0.0)
+        motors: FloatArray = damping * (dtheta - dq[..., self._joint_of_motor])
+        return ParallelDamperTorques(motors @ self._motor_joint_matrix, motors)
 
     def variables(
         self, commanded: Mapping[str, FloatArray], dq: FloatArray, dtheta: FloatArray
     ) -> dict[str, FloatArray]:
         """Return the result variables of the dampers by name, (..., joints); none if there are no dampers."""
-        if self._absent.all():
+        if self._is_absent.all():
             return {}
         damping = commanded[DAMPING.key]
-        torque = add(self.of_links(commanded, dq).tau, self.parallel(commanded, dq, dtheta).links)
-        return {"damping": damping, "tau_damper": np.where(self._absent, np.nan, torque)}
+        torque = add(
+            self.link_damper_torques(commanded, dq).tau, self.parallel_torques(commanded, dq, dtheta).links
+        )
+        return {"damping": damping, "tau_damper": np.where(self._is_absent, np.nan, torque)}

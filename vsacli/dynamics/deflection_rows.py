@@ -33,7 +33,7 @@ class IntegratedRows:
 
     def of_joint(self, index: int, inputs: Inputs) -> FloatArray:
         """Return the deflections of a joint, (2, samples)."""
-        return _both_sides(inputs["phi"], index)
+        return _spring_rows(inputs["phi"], index)
 
 
 @dataclass(frozen=True)
@@ -50,16 +50,16 @@ class InternalRows:
 
     def shapes(self, _joints: int) -> dict[str, tuple[int, ...]]:
         """Return the shapes of the inputs, by name."""
-        inside = (len(self.joints),)
-        return dict(zip(self.names, ((*inside, SIDES), inside, inside), strict=False))
+        joint_shape = (len(self.joints),)
+        return dict(zip(self.names, ((*joint_shape, SIDES), joint_shape, joint_shape), strict=False))
 
     def of_joint(self, index: int, inputs: Inputs) -> InternalMotion | None:
         """Return the internal motion of a joint; None unless its transmission is damped."""
         if index not in self.joints:
             return None
-        place = self.joints.index(index)
-        rates = (inputs[name][place] if name in self.names else None for name in INTERNAL[1:])
-        return InternalMotion(_both_sides(inputs[INTERNAL[0]], place), *rates)
+        position = self.joints.index(index)
+        rates = (inputs[name][position] if name in self.names else None for name in INTERNAL[1:])
+        return InternalMotion(_spring_rows(inputs[INTERNAL[0]], position), *rates)
 
 
 def internal_rows(motions: Mapping[int, InternalMotion]) -> dict[str, FloatArray]:
@@ -71,6 +71,6 @@ def internal_rows(motions: Mapping[int, InternalMotion]) -> dict[str, FloatArray
     }
 
 
-def _both_sides(rows: Sequence[Scalar], place: int) -> FloatArray:
+def _spring_rows(rows: Sequence[Scalar], position: int) -> FloatArray:
     """Return the rows of both springs of a joint, (2, samples), from those of all joints in order."""
-    return np.stack(rows[SIDES * place : SIDES * (place + 1)])
+    return np.stack(rows[SIDES * position : SIDES * (position + 1)])

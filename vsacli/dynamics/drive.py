@@ -1,6 +1,6 @@
 """Actuation of a joint, (61)-(74): stiffness, motor motion and motor torques, for every kind of actuator.
 
-`Actuator.transmit` computes (61)-(72), `driven_by` adds (73)-(74), and `drive` the flags of limits.
+`Actuator.transmit` computes (61)-(72), `drive_without_limits` adds (73)-(74), `drive` the flags of limits.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from vsacli.actuators.actuator import Actuator
 from vsacli.actuators.drivetrain import SIDES
 from vsacli.actuators.friction import FrictionLaws
 from vsacli.actuators.motor import ELECTRICAL, Windings
-from vsacli.actuators.reach import OfJoint
+from vsacli.actuators.reach import VariablesOfJoint
 from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray, stack_constants
 from vsacli.base.flags import MIN_MARGIN, Flag, finite, has_flag, not_finite_flags
@@ -62,14 +62,14 @@ def drive(
         samples all motor variables are NaN; at singular samples those that need the inverse of the decoupling
         matrix. A motor that the actuator does not have is NaN throughout.
     """
-    driven = driven_by(joint, command, min_margin, prescribed)  # (61)-(74)
-    arrays = driven.by_name()
-    exceeded = limit_flags(joint, arrays, np.zeros_like(driven.flags))
-    unexplained = not_finite_flags(_motors_not_finite(joint, arrays))
-    return driven._replace(flags=driven.flags | exceeded | unexplained)
+    variables = drive_without_limits(joint, command, min_margin, prescribed)  # (61)-(74)
+    arrays = variables.by_name()
+    limit_bits = limit_flags(joint, arrays, np.zeros_like(variables.flags))
+    not_finite_bits = not_finite_flags(_motors_not_finite(joint, arrays))
+    return variables._replace(flags=variables.flags | limit_bits | not_finite_bits)
 
 
-def driven_by(
+def drive_without_limits(
     joint: Joint,
     command: Command,
     min_margin: float,
@@ -80,19 +80,21 @@ def driven_by(
     if isinstance(prescribed, InternalMotion):
         from vsacli.actuators.damped_springs import DampedSprings
 
-        transmitted = DampedSprings(actuator).transmit(command, prescribed, min_margin)
+        transmission = DampedSprings(actuator).transmit(command, prescribed, min_margin)
     else:
-        transmitted = actuator.transmit(command, min_margin, prescribed)  # (61)-(72)
-    tau_motor = shaft_torques(actuator, transmitted.dtheta, transmitted.ddtheta, transmitted.tau_transmission)
-    tau_damper, on_motors = _damper_torques(joint, command, transmitted.dphi)
-    if on_motors is not None:
-        tau_motor = tau_motor + on_motors
-    windings = Windings.over_samples(actuator.sides)
-    electrical = {} if windings is None else windings.variables(tau_motor, transmitted.dtheta)
-    driven = transmitted._replace(
-        tau_motor=tau_motor, motor_power=tau_motor * transmitted.dtheta, **electrical
+        transmission = actuator.transmit(command, min_margin, prescribed)  # (61)-(72)
+    tau_motor = shaft_torques(
+        actuator, transmission.dtheta, transmission.ddtheta, transmission.tau_transmission
     )
-    return driven if tau_damper is None else driven._replace(tau_damper=tau_damper)
+    tau_damper, motor_reactions = _damper_torques(joint, command, transmission.dphi)
+    if motor_reactions is not None:
+        tau_motor = tau_motor + motor_reactions
+    windings = Windings.over_samples(actuator.sides)
+    electrical = {} if windings is None else windings.variables(tau_motor, transmission.dtheta)
+    variables = transmission._replace(
+        tau_motor=tau_motor, motor_power=tau_motor * transmission.dtheta, **electrical
+    )
+    return variables if tau_damper is None else variables._replace(tau_damper=tau_damper)
 
 
 def shaft_torques(
@@ -102,7 +104,7 @@ def shaft_torques(
 
     The paper's B_k is `motor.inertia`, D_mk `motor.damping`, tau_ek `tau_transmission`, tau_k the result.
     """
-    motor_damping = _by_motor([motor.damping for motor in actuator.motors])
+    motor_damping = _motor_constants([motor.damping for motor in actuator.motors])
     torques = _rotor_torques(actuator, ddtheta) + motor_damping * dtheta + tau_transmission  # (73)-(74)
     friction = FrictionLaws.over_samples([side.friction if side else None for side in actuator.sides])
     if friction is not None:
@@ -120,20 +122,20 @@ def _damper_torques(
     if joint.damper_at("link"):
         return damping * command.dq, None
     has_spring = joint.actuator.has_columns(VARIABLES["phi"])
-    on_motors = [
+    motor_reactions = [
         damping * rate if sprung else 0 * damping for rate, sprung in zip(dphi, has_spring, strict=True)
     ]
-    return on_motors[0] + on_motors[1], np.stack(on_motors)
+    return motor_reactions[0] + motor_reactions[1], np.stack(motor_reactions)
 
 
 def _rotor_torques(actuator: Actuator, ddtheta: FloatArray) -> FloatArray:
     """Return B theta'', (2, samples), with the coupling B_12 of the rotors."""
-    uncoupled = _by_motor([motor.inertia for motor in actuator.motors]) * ddtheta
-    coupling = actuator.coupled_rotors
-    return uncoupled if is_zero(coupling) else uncoupled + coupling * ddtheta[::-1]
+    own_torques = _motor_constants([motor.inertia for motor in actuator.motors]) * ddtheta
+    coupling_inertia = actuator.coupled_rotors
+    return own_torques if is_zero(coupling_inertia) else own_torques + coupling_inertia * ddtheta[::-1]
 
 
-def _motors_not_finite(joint: Joint, arrays: OfJoint) -> BoolArray:
+def _motors_not_finite(joint: Joint, arrays: VariablesOfJoint) -> BoolArray:
     """Return where a motor variable is not finite although the sample is neither infeasible nor singular.
 
     Samples with a demand that is not finite count, too.
@@ -150,5 +152,5 @@ def _motors_not_finite(joint: Joint, arrays: OfJoint) -> BoolArray:
     return ~(demand_finite & explained)
 
 
-def _by_motor(values: list[float]) -> FloatArray:
+def _motor_constants(values: list[float]) -> FloatArray:
     return stack_constants([*values, *[math.nan] * (SIDES - len(values))])

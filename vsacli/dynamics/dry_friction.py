@@ -23,15 +23,15 @@ def joint_friction(friction: Friction | None, rates: Sequence[Scalar]) -> Torque
     if friction is None:
         return TorqueDerivatives(0, 0, 0)
     dq, ddq, d3q, _ = rates
-    size, steepness = exact(friction.coulomb[0]), 1 / friction.width if friction.width else 0
+    coulomb, steepness = exact(friction.coulomb[0]), 1 / friction.width if friction.width else 0
     at_rest = type(dq) is int and dq == 0
     tanh = 0 if at_rest else np.tanh(dq * steepness)
-    once, twice = mul(steepness, ddq), mul(steepness, d3q)
-    slope = mul(size, sub(1, mul(tanh, tanh)))
+    dx, ddx = mul(steepness, ddq), mul(steepness, d3q)
+    slope = mul(coulomb, sub(1, mul(tanh, tanh)))
     return TorqueDerivatives(
-        tau=mul(size, tanh) + friction.offset,
-        dtau=mul(slope, once),
-        ddtau=mul(slope, sub(twice, mul(mul(2, tanh), mul(once, once)))),
+        tau=mul(coulomb, tanh) + friction.offset,
+        dtau=mul(slope, dx),
+        ddtau=mul(slope, sub(ddx, mul(mul(2, tanh), mul(dx, dx)))),
     )
 
 
@@ -72,7 +72,7 @@ def response_with_friction(
         accelerate: Equations of motion without friction.
     """
 
-    def under(direction: FloatArray) -> tuple[Response, FloatArray]:
+    def respond(direction: FloatArray) -> tuple[Response, FloatArray]:
         friction = laws.torque(velocity, direction)
         ddq, ddtheta, holding = accelerate(torque - friction, laws.sharp & (direction == 0))
         return Response(ddq, ddtheta, friction + holding), laws.direction_beyond(friction + holding)
@@ -82,9 +82,9 @@ def response_with_friction(
         ddq, ddtheta, _ = accelerate(torque - friction, None)
         return Response(ddq, ddtheta, friction)
     if slip is not None:
-        return under(np.broadcast_to(slip, velocity.shape))[0]
+        return respond(np.broadcast_to(slip, velocity.shape))[0]
     direction = sign_of_motion(velocity)
-    response, beyond = under(direction)
+    response, breakaway = respond(direction)
     # A motor at rest whose holding torque exceeds its friction begins to slide in that direction.
-    released = np.where(direction == 0, beyond, 0.0)
-    return under(direction + released)[0] if released.any() else response
+    released_direction = np.where(direction == 0, breakaway, 0.0)
+    return respond(direction + released_direction)[0] if released_direction.any() else response

@@ -86,23 +86,29 @@ def carriers(robot: Robot) -> list[Carrier]:
     Exact zeros and ones of a seat are those of all seats on the same link, so that equal fingers at different
     mounts share their compiled code.
     """
-    numbers = {
+    seat_entries = {
         index: [*chain.from_iterable(rotation_matrix(joint.mount)), *_exact_position(joint.mount)]
         for index, joint in enumerate(robot.joints)
         if joint.mount is not None
     }
     seats = dict[int, Seat]()
-    for index, own in numbers.items():
-        beside = [others for at, others in numbers.items() if robot.parents[at] == robot.parents[index]]
-        common = list(map(_common_exact, own, zip(*beside, strict=True)))
-        *axes, lever = (Vector(*common[start : start + 3]) for start in range(0, len(common), 3))
+    for index, entries in seat_entries.items():
+        entries_on_link = [
+            other_entries
+            for other, other_entries in seat_entries.items()
+            if robot.parents[other] == robot.parents[index]
+        ]
+        common_entries = list(map(_common_exact, entries, zip(*entries_on_link, strict=True)))
+        *axes, lever = (
+            Vector(*common_entries[start : start + 3]) for start in range(0, len(common_entries), 3)
+        )
         seats[index] = Seat(Matrix(*axes), lever)
     return [Carrier(parent, seats.get(index)) for index, parent in enumerate(robot.parents)]
 
 
-def _common_exact(number: Scalar, beside: Sequence[Scalar]) -> Scalar:
+def _common_exact(number: Scalar, counterparts: Sequence[Scalar]) -> Scalar:
     """Return a number that is exact, a Python integer, only if it is the same in all places beside it."""
-    equal = all(type(other) is int and other == number for other in beside)
+    equal = all(type(other) is int and other == number for other in counterparts)
     return float(number) if type(number) is int and not equal else number
 
 
@@ -115,14 +121,16 @@ def tool_loads(robot: Robot, frame: WrenchFrame, wrench: Sequence[Sequence[Scala
         wrench: Components of all tools, six each, their first and their second derivatives; scalars of any
             kind.
     """
-    axes, loads = len(WRENCH_AXES), []
+    component_count, loads = len(WRENCH_AXES), []
     frames = frames_by_tool(frame)
-    for index, (tool, carrier, of_tool) in enumerate(
+    for index, (tool, carrier, tool_frame) in enumerate(
         zip(robot.end_effectors, robot.tool_joints, frames, strict=True)
     ):
-        if of_tool is not None:
-            own = [components[axes * index : axes * (index + 1)] for components in wrench]
-            loads.append(_tool_load(robot, tool, carrier, of_tool, own))
+        if tool_frame is not None:
+            tool_components = [
+                components[component_count * index : component_count * (index + 1)] for components in wrench
+            ]
+            loads.append(_tool_load(robot, tool, carrier, tool_frame, tool_components))
     return loads
 
 
@@ -131,11 +139,11 @@ def _tool_load(
 ) -> ToolLoad:
     in_base = frame == "base"
     rotation = rotation_matrix(robot.base).transposed() if in_base else rotation_matrix(tool)
-    exerted = [(ZERO - Vector(*components[:3]), ZERO - Vector(*components[3:])) for components in wrench]
+    reactions = [(ZERO - Vector(*components[:3]), ZERO - Vector(*components[3:])) for components in wrench]
     return ToolLoad(
         joint=carrier,
-        force=[rotation.times(force) for force, _ in exerted],
-        moment=[rotation.times(moment) for _, moment in exerted],
+        force=[rotation.times(force) for force, _ in reactions],
+        moment=[rotation.times(moment) for _, moment in reactions],
         point=_exact_position(tool),
         in_base=in_base,
     )
@@ -168,8 +176,8 @@ class LinkTorques(RobotKernel):
     @cached_property
     def arguments(self) -> RowLayout:
         """Layout of the input rows."""
-        of_joints = (*POSITION.names, *(DAMPING.names if link_damped(self.robot) else ()))
-        shapes = dict.fromkeys(of_joints, (len(self.robot.joints),))
+        joint_inputs = (*POSITION.names, *(DAMPING.names if link_damped(self.robot) else ()))
+        shapes = dict.fromkeys(joint_inputs, (len(self.robot.joints),))
         if self.frame is not None:
             shapes |= dict.fromkeys(WRENCH_NAMES, (wrench_components(self.frame),))
         return RowLayout(shapes)
@@ -279,10 +287,10 @@ def link_torques(
     damped = DAMPING.key in kernel.arguments.shapes
     dampings = _damping_rows(robot, shape, (damping, ddamping, dddamping)) if damped else ()
     inputs = (*motion, *dampings, *_wrench_rows(wrench, shape[:-1]))
-    chosen = engine_of_call(engine, kernel, motion[0].shape[1])
-    rows: Any = np.concatenate(inputs) if chosen is NUMBERS else [row for each in inputs for row in each]
-    computed = chosen.run(kernel, rows).reshape(len(TORQUES), *motion[0].shape)
-    tau_e, dtau_e, ddtau_e = computed.transpose(0, 2, 1).reshape(len(TORQUES), *shape)
+    backend = engine_of_call(engine, kernel, motion[0].shape[1])
+    rows: Any = np.concatenate(inputs) if backend is NUMBERS else [row for array in inputs for row in array]
+    torques = backend.run(kernel, rows).reshape(len(TORQUES), *motion[0].shape)
+    tau_e, dtau_e, ddtau_e = torques.transpose(0, 2, 1).reshape(len(TORQUES), *shape)
     return ElasticTorques(
         tau_e, dtau_e if len(motion_arrays) > 3 else None, ddtau_e if len(motion_arrays) > 4 else None
     )
@@ -296,8 +304,8 @@ def _recursion_kernel(robot: Robot, frame: WrenchFrame | None) -> LinkTorques:
 
 def _check_motion_arrays(robot: Robot, motion: Iterable[ArrayLike | None]) -> list[FloatArray]:
     """Return the given arrays of q, dq, ..., checked: of one shape, none missing before the last."""
-    joints, by_name = len(robot.joints), zip(POSITION.names, motion, strict=True)
-    arrays = {name: checked_shape(name, array, joints) for name, array in by_name if array is not None}
+    joint_count, by_name = len(robot.joints), zip(POSITION.names, motion, strict=True)
+    arrays = {name: checked_shape(name, array, joint_count) for name, array in by_name if array is not None}
     missing = [name for name in POSITION.names[: max(len(arrays), 3)] if name not in arrays]
     if missing and list(arrays) != ["q"]:
         raise InputError.one(
@@ -319,20 +327,20 @@ def _damping_rows(
     robot: Robot, shape: tuple[int, ...], dampings: Sequence[ArrayLike | None]
 ) -> Iterator[FloatArray]:
     """Yield the damping and its derivatives of a robot with dampers between the links."""
-    least = np.array([joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints])
-    for name, array, default in zip(DAMPING.names, dampings, (least, 0 * least, 0 * least), strict=True):
+    minima = np.array([joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints])
+    for name, array, default in zip(DAMPING.names, dampings, (minima, 0 * minima, 0 * minima), strict=True):
         values = np.broadcast_to(default, shape) if array is None else np.asarray(array, dtype=np.float64)
         if values.shape != shape:
             raise InputError.one(f"{name} must have the shape {shape} of q, not {values.shape}")
         yield _rows_over_samples(values)
 
 
-def _wrench_rows(wrench: Wrench | None, samples: tuple[int, ...]) -> Iterator[FloatArray]:
-    """Yield the components, and each of their derivatives; `samples` is the shape before the last axis."""
+def _wrench_rows(wrench: Wrench | None, sample_shape: tuple[int, ...]) -> Iterator[FloatArray]:
+    """Yield the components, and each of their derivatives; `sample_shape` is that before the last axis."""
     if wrench is None:
         return
     for name in WRENCH_NAMES:
-        array, expected = getattr(wrench, name), (*samples, wrench_components(wrench.frame))
+        array, expected = getattr(wrench, name), (*sample_shape, wrench_components(wrench.frame))
         if (shape := np.shape(array)) != expected:
             raise InputError.one(f"{name} must have the shape {expected}, not {shape}")
         yield _rows_over_samples(np.asarray(array, dtype=np.float64))

@@ -107,8 +107,8 @@ def efforts(interval: FloatArray, before: Iterable[FloatArray], after: Iterable[
     (tau_1, tau_2), (next_1, next_2) = before, after
     return Efforts(
         *(
-            interval / 8 * (at_end * at_end + at_begin * at_begin)
-            for at_begin, at_end in ((tau_1 + tau_2, next_1 + next_2), (tau_1 - tau_2, next_1 - next_2))
+            interval / 8 * (end * end + begin * begin)
+            for begin, end in ((tau_1 + tau_2, next_1 + next_2), (tau_1 - tau_2, next_1 - next_2))
         )
     )
 
@@ -128,9 +128,11 @@ class EnergyMeter:
 
     def add(self, flow: Flow) -> FloatArray:
         """Add a flow; return the work up to the end of each interval, which overwrites `flow.work`."""
-        totals = {name: part for name, part in flow._asdict().items() if name != "work" and part is not None}
-        self._layout = RowLayout({name: part.shape[:-1] for name, part in totals.items()})
-        rows = np.concatenate([part.reshape(-1, part.shape[-1]) for part in totals.values()])
+        totals = {
+            name: terms for name, terms in flow._asdict().items() if name != "work" and terms is not None
+        }
+        self._layout = RowLayout({name: terms.shape[:-1] for name, terms in totals.items()})
+        rows = np.concatenate([terms.reshape(-1, terms.shape[-1]) for terms in totals.values()])
         columns = np.ascontiguousarray(rows.T)  # so that NumPy adds one interval after the other
         columns[0] += self._totals
         self._totals = np.add.reduce(columns, axis=0)
@@ -151,22 +153,24 @@ class EnergyMeter:
             robot: Robot.
             variant: Its index in a batch; None without an axis of variants.
         """
-        place = ... if variant is None else (..., variant)
+        selection = ... if variant is None else (..., variant)
         has_motor = [[side < joint.actuator.motor_count for side in range(SIDES)] for joint in robot.joints]
-        totals = {name: total[place] for name, total in self._layout.arrays(np.asarray(self._totals)).items()}
-        works = np.asarray(self._work)[place], totals["spent"]
+        totals = {
+            name: total[selection] for name, total in self._layout.arrays(np.asarray(self._totals)).items()
+        }
+        works = np.asarray(self._work)[selection], totals["spent"]
         work, spent = (np.sum(total, axis=1, where=has_motor) for total in works)
         duration = float(totals["intervals"])
-        shared = [joint.actuator.co_contracts for joint in robot.joints]
+        co_contracts = [joint.actuator.co_contracts for joint in robot.joints]
         efforts = [
-            np.where(shared, _mean_root(totals[name], duration), np.nan)
+            np.where(co_contracts, _root_mean(totals[name], duration), np.nan)
             for name in ("co_contraction", "load")
         ]
-        energies = np.array((np.asarray(self._peak)[place], spent, spent - work, *efforts))
-        lost = zip(_dissipated_energies(robot, totals), _copper_losses(robot, totals), strict=True)
+        energies = np.array((np.asarray(self._peak)[selection], spent, spent - work, *efforts))
+        losses = zip(_dissipated_energies(robot, totals), _copper_losses(robot, totals), strict=True)
         return [
-            replace(JointEnergy(*each), dissipated=dissipated, copper_loss=copper_loss)
-            for each, (dissipated, copper_loss) in zip(energies.T.tolist(), lost, strict=True)
+            replace(JointEnergy(*values), dissipated=dissipated, copper_loss=copper_loss)
+            for values, (dissipated, copper_loss) in zip(energies.T.tolist(), losses, strict=True)
         ]
 
 
@@ -182,12 +186,12 @@ def _copper_losses(robot: Robot, totals: Mapping[str, FloatArray]) -> Iterator[f
         yield float(np.sum(totals["copper"][index, heated])) if any(heated) else None
 
 
-def _mean_root(integral: FloatArray, duration: float) -> FloatArray:
+def _root_mean(squares: FloatArray, duration: float) -> FloatArray:
     """Return the root of the mean over time; NaN if no time has passed."""
-    return np.sqrt(integral / duration) if duration else np.full_like(integral, np.nan)
+    return np.sqrt(squares / duration) if duration else np.full_like(squares, np.nan)
 
 
-AT_STEPS = ("dtheta", "motor_power", "tau_transmission", "passed_power", "passed_rate")
+END_VARIABLES = ("dtheta", "motor_power", "tau_transmission", "passed_power", "passed_rate")
 """Variables from which the work of motors in an interval follows, at both its ends."""
 
 
@@ -200,28 +204,28 @@ class IntervalEnergy(RobotKernel):
 
     Attributes:
         robot: Robot.
-        rubbing: Whether the work of dry friction is an input.
+        with_friction: Whether the work of dry friction is an input.
     """
 
     robot: Robot
-    rubbing: bool
+    with_friction: bool
 
     def of_robot(self, robot: Robot) -> Self:
         """See `RobotKernel.of_robot`."""
         return replace(self, robot=robot)
 
     @cached_property
-    def at_steps(self) -> tuple[str, ...]:
+    def end_variables(self) -> tuple[str, ...]:
         """Names of the input variables at both ends of an interval."""
         coupled = not all(is_zero(joint.actuator.coupled_rotors) for joint in self.robot.joints)
-        return (*AT_STEPS, "ddtheta") if coupled else AT_STEPS
+        return (*END_VARIABLES, "ddtheta") if coupled else END_VARIABLES
 
     @cached_property
     def arguments(self) -> RowLayout:
         """Layout of the input rows: length, variables before and after, and the work of dry friction."""
         motors = (len(self.robot.joints), SIDES)
-        friction = {"friction": motors} if self.rubbing else {}
-        return RowLayout({"interval": (), **dict.fromkeys(self.at_steps, (2, *motors)), **friction})
+        friction = {"friction": motors} if self.with_friction else {}
+        return RowLayout({"interval": (), **dict.fromkeys(self.end_variables, (2, *motors)), **friction})
 
     @cached_property
     def results(self) -> RowLayout:
@@ -235,17 +239,21 @@ class IntervalEnergy(RobotKernel):
         inputs = self.arguments.unpack(rows)
         (interval,) = inputs["interval"]
         joints = self.robot.joints
-        friction = _motor_pairs(inputs["friction"]) if self.rubbing else [None] * len(joints)
-        both_ends = [{name: _rows_at_end(inputs[name], end) for name in self.at_steps} for end in range(2)]
+        friction = _motor_pairs(inputs["friction"]) if self.with_friction else [None] * len(joints)
+        both_ends = [
+            {name: _rows_at_end(inputs[name], end) for name in self.end_variables} for end in range(2)
+        ]
         flows = []
         for index, joint in enumerate(joints):
             inertia = tuple(motor.inertia for motor in joint.actuator.motors)
-            ends = [{name: of_joints[index] for name, of_joints in end.items()} for end in both_ends]
+            ends = [
+                {name: pairs_of_joints[index] for name, pairs_of_joints in end.items()} for end in both_ends
+            ]
             constants = inertia, joint.actuator.coupled_rotors
             flows.append(call(interval, _joint_flow, *constants, interval, ends, friction[index]))
-        works, spent, of_springs = zip(*flows, strict=True)
-        kinds = works, spent, zip(*of_springs, strict=True)
-        return [row for kind in kinds for part in kind for row in part]
+        works, spent, joint_efforts = zip(*flows, strict=True)
+        row_groups = works, spent, zip(*joint_efforts, strict=True)
+        return [row for group in row_groups for rows_of_joint in group for row in rows_of_joint]
 
 
 def _joint_flow(
@@ -257,18 +265,20 @@ def _joint_flow(
 ) -> tuple[list[FloatArray], list[FloatArray], Efforts]:
     """Return work, positive work and efforts of both motors of a joint; NaN for a missing motor."""
     works = [np.full_like(interval, np.nan)] * SIDES
-    for side, of_motor in enumerate(inertia):
-        at_ends = ((each["passed_power"][side], each["passed_rate"][side]) for each in ends)
-        before, after = (of_motor / 2 * each["dtheta"][side] ** 2 for each in ends)
-        works[side] = integral(interval, *at_ends) + (after - before)
+    for side, rotor_inertia in enumerate(inertia):
+        power_and_rate = ((end["passed_power"][side], end["passed_rate"][side]) for end in ends)
+        before, after = (rotor_inertia / 2 * end["dtheta"][side] ** 2 for end in ends)
+        works[side] = integral(interval, *power_and_rate) + (after - before)
     if not is_zero(coupling):
-        motions = ((np.stack(each["dtheta"]), np.stack(each["ddtheta"])) for each in ends)
-        of_other = coupling * work_on_each_other(interval, *motions)
-        works = [work + of_other[side] for side, work in enumerate(works)]
+        motions = ((np.stack(end["dtheta"]), np.stack(end["ddtheta"])) for end in ends)
+        coupling_work = coupling * work_on_each_other(interval, *motions)
+        works = [work + coupling_work[side] for side, work in enumerate(works)]
     if friction is not None:
-        works = [work + rubbed for work, rubbed in zip(works, friction, strict=True)]
+        works = [work + friction_work for work, friction_work in zip(works, friction, strict=True)]
     powers = (end["motor_power"] for end in ends)
-    spent = [positive_work(interval, *of_motor) for of_motor in zip(*powers, works, strict=True)]
+    spent = [
+        positive_work(interval, *powers_and_work) for powers_and_work in zip(*powers, works, strict=True)
+    ]
     return works, spent, efforts(interval, *(end["tau_transmission"] for end in ends))
 
 
@@ -293,32 +303,34 @@ class RunEnergy:
         self._variants, self._engine = variants, engine
         robot = variants.base
         lossy = any(robot.has_variable(VARIABLES[name]) for name in ("dissipated_power", "copper_loss"))
-        self._losses = [LossMeter(each) for each in variants.robots] if lossy else []
-        of_base = IntervalEnergy(robot, rubbing=lossy)
-        self._at_steps, self._kernel = of_base.at_steps, variants.kernel(of_base)
+        self._losses = [LossMeter(robot_variant) for robot_variant in variants.robots] if lossy else []
+        kernel = IntervalEnergy(robot, with_friction=lossy)
+        self._end_variables, self._kernel = kernel.end_variables, variants.kernel(kernel)
         self._meter = EnergyMeter()
-        self._last: dict[str, FloatArray] = {}
+        self._last_samples: dict[str, FloatArray] = {}
 
     def add(self, block: Block) -> FloatArray:
         """Add a block of `BalancedDynamics`; return `motor_energy` at its samples, (samples, joints, 2).
 
         The block has the samples of one variant after the other.
         """
-        by_variant = -1, len(self._variants), len(block.time) // len(self._variants)
-        steps = {
-            name: np.moveaxis(getattr(block, name), 0, -1).reshape(by_variant)
-            for name in ("time", *self._at_steps)
+        variant_shape = -1, len(self._variants), len(block.time) // len(self._variants)
+        samples = {
+            name: np.moveaxis(getattr(block, name), 0, -1).reshape(variant_shape)
+            for name in ("time", *self._end_variables)
         }
         lost = self._add_losses(block)
-        first = _select_samples(steps, slice(1))
-        before = self._last or first
+        first = _select_samples(samples, slice(1))
+        before = self._last_samples or first
         # Copies, since views would keep the whole block in memory.
-        self._last = {name: values.copy() for name, values in _select_samples(steps, slice(-1, None)).items()}
+        self._last_samples = {
+            name: values.copy() for name, values in _select_samples(samples, slice(-1, None)).items()
+        }
         self._meter.add_stored(_by_variant(np.moveaxis(block.elastic_energy, 0, -1), len(self._variants)))
-        works = [self._add_flow(before, first, lost and lost.during(slice(1)))]
-        if by_variant[-1] > 1:
-            earlier, later = _select_samples(steps, slice(-1)), _select_samples(steps, slice(1, None))
-            works.append(self._add_flow(earlier, later, lost and lost.during(slice(1, None))))
+        works = [self._add_flow(before, first, lost and lost.select_intervals(slice(1)))]
+        if variant_shape[-1] > 1:
+            earlier, later = _select_samples(samples, slice(-1)), _select_samples(samples, slice(1, None))
+            works.append(self._add_flow(earlier, later, lost and lost.select_intervals(slice(1, None))))
         work = np.concatenate(works, axis=-1)
         return over_time(work.reshape(*work.shape[:-2], -1))
 
@@ -326,19 +338,20 @@ class RunEnergy:
         """Return the losses in the intervals of all variants, (..., variants, intervals)."""
         if not self._losses:
             return None
-        of_variants = zip(self._losses, block.divided(len(self._losses)), strict=True)
-        lost = [meter.add(part) for meter, part in of_variants]
+        meters_and_blocks = zip(self._losses, block.divided(len(self._losses)), strict=True)
+        lost = [meter.add(block_of_variant) for meter, block_of_variant in meters_and_blocks]
         friction, dissipated, copper = (
-            [each for each in of_kind if each is not None] for of_kind in zip(*lost, strict=True)
+            [block_part for block_part in parts_of_kind if block_part is not None]
+            for parts_of_kind in zip(*lost, strict=True)
         )
         heat = np.stack(copper, axis=-2) if copper else None
         return LostEnergy(np.stack(friction, axis=-2), np.stack(dissipated, axis=-2), heat)
 
-    def _add_flow(self, before: _Steps, after: _Steps, lost: LostEnergy | None) -> FloatArray:
+    def _add_flow(self, before: _SampleRows, after: _SampleRows, lost: LostEnergy | None) -> FloatArray:
         """Add the flow from samples to the next ones; return the work of motors until these."""
         interval = after["time"][0] - before["time"][0]
         rows: dict[str, Iterable[FloatArray]] = {
-            name: [*_flat_rows(before[name]), *_flat_rows(after[name])] for name in self._at_steps
+            name: [*_flat_rows(before[name]), *_flat_rows(after[name])] for name in self._end_variables
         }
         if lost is not None:
             rows["friction"] = _flat_rows(lost.motor_friction.reshape(-1, *interval.shape))
@@ -357,12 +370,12 @@ class RunEnergy:
         return self._meter.report(self._variants.robots[variant], variant)
 
 
-_Steps = Mapping[str, FloatArray]
+_SampleRows = Mapping[str, FloatArray]
 """Rows of variables at consecutive samples, (rows, variants, samples), by name."""
 
 
-def _select_samples(steps: _Steps, part: slice) -> dict[str, FloatArray]:
-    return {name: values[..., part] for name, values in steps.items()}
+def _select_samples(rows: _SampleRows, selection: slice) -> dict[str, FloatArray]:
+    return {name: values[..., selection] for name, values in rows.items()}
 
 
 def _flat_rows(values: FloatArray) -> FloatArray:

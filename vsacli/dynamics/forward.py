@@ -90,16 +90,16 @@ def state_derivative(
     if wrench is not None:
         check_wrench(wrench, robot.tool_names)
     plant = plant_of(robot, None if wrench is None else wrench.frame)
-    q, dq, theta, dtheta = plant.unpacked(state)
+    q, dq, theta, dtheta = plant.unpack_state(state)
     torque = plant.drivetrain.of_motors(checked_shape("tau_motor", tau_motor, len(robot.joints), 2))
-    least = [joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints]
+    minima = [joint.damper.range[0] if joint.damper else 0.0 for joint in robot.joints]
     commanded = {name: np.zeros_like(q) for name in DAMPING.names}
     commanded[DAMPING.key] = checked_shape(
-        DAMPING.key, np.broadcast_to(least, q.shape) if damping is None else damping, len(robot.joints)
+        DAMPING.key, np.broadcast_to(minima, q.shape) if damping is None else damping, len(robot.joints)
     )
     ddq, ddtheta, _ = plant.accelerations(q, dq, theta, dtheta, torque, wrench, commanded)
-    merged = plant.drivetrain.of_motors_by_joint
-    return Rates(dq, ddq, merged(dtheta, dq), merged(ddtheta, ddq))
+    merge_by_joint = plant.drivetrain.of_motors_by_joint
+    return Rates(dq, ddq, merge_by_joint(dtheta, dq), merge_by_joint(ddtheta, ddq))
 
 
 @lru_cache(KEPT_PROGRAMS)
@@ -133,7 +133,7 @@ class Plant:
         self._rigid_damping = self.drivetrain.of_rigid_joints(self.drivetrain.damping)
         self._sprung_damping = self.drivetrain.damping[self.drivetrain.sprung]
 
-    def unpacked(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def unpack_state(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return q, q' of the joints and theta, theta' of the motors with springs.
 
         Raises:
@@ -148,7 +148,7 @@ class Plant:
             self.drivetrain.of_motors(checked_shape(name, values, joints, 2))[..., sprung]
             for name, values in (("theta", state.theta), ("dtheta", state.dtheta))
         )
-        if len({part.shape[:-1] for part in (q, dq, theta, dtheta)}) > 1:
+        if len({array.shape[:-1] for array in (q, dq, theta, dtheta)}) > 1:
             raise InputError.one("q, dq, theta, dtheta must have the same number of samples")
         return q, dq, theta, dtheta
 
@@ -179,19 +179,19 @@ class Plant:
                 If None, a motor at rest is held as long as its friction suffices.
         """
         tau_e, spring = self.drivetrain.torques(q, theta)
-        damper = self.dampers.parallel(commanded, dq, dtheta)
-        resistance = add(self.links.bias(q, dq, wrench), self.dampers.of_links(commanded, dq).tau)
+        damper = self.dampers.parallel_torques(commanded, dq, dtheta)
+        resistance = add(self.links.bias(q, dq, wrench), self.dampers.link_damper_torques(commanded, dq).tau)
         matrix = self.links.mass_matrix(q) + self._rigid_matrix
         laws, velocity = self.drivetrain.friction, self.drivetrain.of_all_motors(dq, dtheta)
 
         def accelerate(
             torque: FloatArray, held: BoolArray | None
         ) -> tuple[FloatArray, FloatArray, FloatArray]:
-            drive = add(tau_e, damper.links) + self.drivetrain.of_rigid_joints(torque)
-            on_joints = drive - resistance - self._rigid_damping * dq  # (5a)
-            left = torque[..., self.drivetrain.sprung] - self._sprung_damping * dtheta
-            on_motors = left - add(spring, damper.motors)  # (5b), (5c)
-            return self._solve_accelerations(matrix, on_joints, on_motors, held)
+            applied = add(tau_e, damper.links) + self.drivetrain.of_rigid_joints(torque)
+            joint_torque = applied - resistance - self._rigid_damping * dq  # (5a)
+            motor_drive = torque[..., self.drivetrain.sprung] - self._sprung_damping * dtheta
+            motor_torque = motor_drive - add(spring, damper.motors)  # (5b), (5c)
+            return self._solve_accelerations(matrix, joint_torque, motor_torque, held)
 
         if laws is None:
             ddq, ddtheta, _ = accelerate(torque, None)
@@ -199,19 +199,21 @@ class Plant:
         return response_with_friction(laws, torque, velocity, slip, accelerate)
 
     def _solve_accelerations(
-        self, matrix: FloatArray, on_joints: FloatArray, on_motors: FloatArray, held: BoolArray | None
+        self, matrix: FloatArray, joint_torque: FloatArray, motor_torque: FloatArray, held: BoolArray | None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return accelerations under torques on joints and on motors with springs; see `AccelerationLaw`."""
         rotors = self.drivetrain.rotors
         if held is None or not held.any():
-            still = np.zeros((*on_motors.shape[:-1], len(self.drivetrain.joint)))
-            return self.links.solve(matrix, on_joints), rotors.accelerations(on_motors), still
+            no_holding = np.zeros((*motor_torque.shape[:-1], len(self.drivetrain.joint)))
+            return self.links.solve(matrix, joint_torque), rotors.accelerations(motor_torque), no_holding
         held_joints = self.drivetrain.of_rigid_joints(held.astype(np.float64)) > 0
         decoupled = held_joints[..., :, None] | held_joints[..., None, :]
-        free = np.where(decoupled, np.eye(on_joints.shape[-1]), matrix)
-        ddq = self.links.solve(free, np.where(held_joints, 0.0, on_joints))
-        holding_joints = on_joints - (matrix @ ddq[..., None])[..., 0]
-        ddtheta, holding_motors = rotors.accelerations_with_held(on_motors, held[..., self.drivetrain.sprung])
+        free_matrix = np.where(decoupled, np.eye(joint_torque.shape[-1]), matrix)
+        ddq = self.links.solve(free_matrix, np.where(held_joints, 0.0, joint_torque))
+        holding_joints = joint_torque - (matrix @ ddq[..., None])[..., 0]
+        ddtheta, holding_motors = rotors.accelerations_with_held(
+            motor_torque, held[..., self.drivetrain.sprung]
+        )
         holding = self.drivetrain.of_all_motors(holding_joints, holding_motors)
         return ddq, ddtheta, np.where(held, holding, 0.0)
 

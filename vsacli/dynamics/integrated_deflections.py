@@ -74,17 +74,19 @@ class DeflectionEquation:
         """Return the rates of the deflections of some joints, (19)."""
         return np.stack(
             [
-                _rates_of_unknowns(actuator, command, of_joint)
-                for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
+                _rates_of_unknowns(actuator, command, joint_phi)
+                for (actuator, command), joint_phi in zip(self._commands(joints, time), phi, strict=True)
             ]
         )
 
-    def hindrances(self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray) -> npt.NDArray[np.intp]:
+    def stop_reasons(
+        self, joints: tuple[int, ...], time: FloatArray, phi: FloatArray
+    ) -> npt.NDArray[np.intp]:
         """Return why deflections of some joints cannot be integrated at times: indices into `REASONS`."""
         return np.stack(
             [
-                _hindrances(actuator, command, of_joint)
-                for (actuator, command), of_joint in zip(self._commands(joints, time), phi, strict=True)
+                _stop_reasons(actuator, command, joint_phi)
+                for (actuator, command), joint_phi in zip(self._commands(joints, time), phi, strict=True)
             ]
         )
 
@@ -105,14 +107,15 @@ def _rates_of_unknowns(actuator: Actuator, command: Command, phi: FloatArray) ->
     return np.stack(actuator.springs(phi, command.q).rates(command.dtau_e, dstiffness, command.dq)[:SIDES])
 
 
-def _hindrances(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
+def _stop_reasons(actuator: Actuator, command: Command, phi: FloatArray) -> npt.NDArray[np.intp]:
     """Return indices into `REASONS`; also singular where det A has another sign than on the branch."""
     solution = _deflection_root(actuator, command)
     flags = reach_flags(command.commanded["stiffness"], solution)
-    at_phi, on_branch = (
-        np.sign(actuator.springs(each, command.q).determinant) for each in (phi, solution.deflections)
+    sign, branch_sign = (
+        np.sign(actuator.springs(deflections, command.q).determinant)
+        for deflections in (phi, solution.deflections)
     )
-    singular = has_flag(flags, Flag.SINGULAR) | (at_phi != on_branch)
+    singular = has_flag(flags, Flag.SINGULAR) | (sign != branch_sign)
     return np.where(has_flag(flags, Flag.INFEASIBLE), UNATTAINABLE, np.where(singular, SINGULAR, FOLLOWED))
 
 
@@ -124,7 +127,7 @@ ROUGH_TOLERANCE = 1e-6
 the spline's third derivative, 1e-16 over the cube of the sample distance. Pieces are so short that the drift
 of smooth recordings is far smaller."""
 
-CHECKS = 64
+CHECKS_PER_STEP = 64
 """Number of times in an integrator step at which a joint is checked; the search for the end divides by it."""
 
 
@@ -145,15 +148,15 @@ class Pieces(NamedTuple):
         ends = trajectory.breakpoints[1:]
         if len(ends) <= MOST_PIECES:
             return cls(ends, tolerance)
-        chosen = np.linspace(0, len(ends) - 1, MOST_PIECES + 1).round().astype(np.intp)[1:]
-        return cls(ends[chosen], max(tolerance, ROUGH_TOLERANCE))
+        indices = np.linspace(0, len(ends) - 1, MOST_PIECES + 1).round().astype(np.intp)[1:]
+        return cls(ends[indices], max(tolerance, ROUGH_TOLERANCE))
 
 
 class Integration:
     """Integration of the deflections of some joints from a start time, until one of them stops.
 
     Args:
-        task: Robot and motion.
+        equation: Robot and motion.
         joints: Indices of the joints.
         pieces: Pieces of the whole trajectory.
         start: Time of the deflections, s.
@@ -166,28 +169,33 @@ class Integration:
     """
 
     def __init__(
-        self, task: DeflectionEquation, joints: tuple[int, ...], pieces: Pieces, start: float, phi: FloatArray
+        self,
+        equation: DeflectionEquation,
+        joints: tuple[int, ...],
+        pieces: Pieces,
+        start: float,
+        phi: FloatArray,
     ) -> None:
         self.joints = joints
         self.times = [start]
         self.stopped: dict[int, str] = {}
-        self._equation = task
+        self._equation = equation
         self._steps: list[DenseOutput] = []
         self._tolerance = pieces.tolerance
-        self._smallest = float(np.abs(phi).max(axis=1).min())
+        self._smallest_phi = float(np.abs(phi).max(axis=1).min())
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # in rejected steps
-            self._run(pieces.ends[pieces.ends > start].tolist(), phi.ravel())
+            self._integrate_pieces(pieces.ends[pieces.ends > start].tolist(), phi.ravel())
 
     def solution(self) -> OdeSolution:
         """Return the deflections as a function of time, (2 joints, samples)."""
         return scipy.integrate.OdeSolution(self.times, self._steps)
 
-    def _rates(self, time: float, state: Any) -> Any:
+    def _rates(self, time: float, phi_rows: Any) -> Any:
         return self._equation.rates(
-            self.joints, np.array([time]), deflections_by_joint(state[:, None])
+            self.joints, np.array([time]), deflections_by_joint(phi_rows[:, None])
         ).ravel()
 
-    def _run(self, ends: list[float], state: FloatArray) -> None:
+    def _integrate_pieces(self, ends: list[float], state: FloatArray) -> None:
         for end in ends:
             start = self.times[-1]
             integrator = scipy.integrate.DOP853(
@@ -199,34 +207,34 @@ class Integration:
                 if len(ends) > 1
                 else None,  # pieces are short, a whole trajectory is not
                 rtol=self._tolerance,
-                atol=self._tolerance * self._smallest,
+                atol=self._tolerance * self._smallest_phi,
             )
-            self._go_through(integrator)
+            self._integrate_piece(integrator)
             if self.stopped:
                 return
             state = integrator.y
 
-    def _go_through(self, integrator: DOP853[np.float64]) -> None:
+    def _integrate_piece(self, integrator: DOP853[np.float64]) -> None:
         while integrator.status == "running" and not self.stopped:
             if integrator.step() is not None:
                 self.stopped = {self._fastest(integrator): REASONS[STALLED]}
             else:
                 step = integrator.dense_output()
                 self._steps.append(step)
-                self.times.append(self._end_of(step, self.times[-1], float(integrator.t)))
+                self.times.append(self._end_of_step(step, self.times[-1], float(integrator.t)))
 
-    def _end_of(self, step: DenseOutput, left: float, right: float) -> float:
+    def _end_of_step(self, step: DenseOutput, left: float, right: float) -> float:
         """Return the end of a step, or the first time in it at which a joint cannot be integrated."""
         while right - left > 4 * np.spacing(abs(right)):
-            nodes = np.linspace(left, right, CHECKS + 1)
-            hindrances = self._equation.hindrances(
-                self.joints, nodes[1:], deflections_by_joint(step(nodes[1:]))
+            times = np.linspace(left, right, CHECKS_PER_STEP + 1)
+            reason_indices = self._equation.stop_reasons(
+                self.joints, times[1:], deflections_by_joint(step(times[1:]))
             )
-            hits = np.flatnonzero(hindrances.any(axis=0))
-            if not hits.size:
+            stopped = np.flatnonzero(reason_indices.any(axis=0))
+            if not stopped.size:
                 break
-            left, right = float(nodes[hits[0]]), float(nodes[hits[0] + 1])
-            reasons = zip(self.joints, hindrances[:, hits[0]].tolist(), strict=True)
+            left, right = float(times[stopped[0]]), float(times[stopped[0] + 1])
+            reasons = zip(self.joints, reason_indices[:, stopped[0]].tolist(), strict=True)
             self.stopped = {joint: REASONS[reason] for joint, reason in reasons if reason}
         return right
 
@@ -273,12 +281,12 @@ class IntegratedDeflections:
         phi = np.full((len(self.stops), 2, len(time)), np.nan)
         elapsed = time - self._start
         for part in self._parts:
-            inside = (part.solution.t_min <= elapsed) & (elapsed <= part.solution.t_max)
-            if inside.any():
+            in_part = (part.solution.t_min <= elapsed) & (elapsed <= part.solution.t_max)
+            if in_part.any():
                 for joint, deflections in zip(
-                    part.joints, deflections_by_joint(part.solution(elapsed[inside])), strict=True
+                    part.joints, deflections_by_joint(part.solution(elapsed[in_part])), strict=True
                 ):
-                    phi[joint][:, inside] = deflections
+                    phi[joint][:, in_part] = deflections
         for joint, stop in enumerate(self.stops):
             if stop is not None:
                 phi[joint, :, time >= stop.time] = np.nan
@@ -299,26 +307,28 @@ def integrate_deflections(
         trajectory: Commanded motion.
         tolerance: Relative tolerance of the integrator, at least 1e-13.
     """
-    first, trajectory = trajectory.start, trajectory.from_zero()
+    start, trajectory = trajectory.start, trajectory.from_zero()
     equation = DeflectionEquation(robot, trajectory)
     if not equation.joints:
-        return IntegratedDeflections((None,) * trajectory.joints, (), first)
+        return IntegratedDeflections((None,) * trajectory.joints, (), start)
     time, end = trajectory.times.span
     pieces = Pieces.of(trajectory, tolerance)
     phi = np.full((trajectory.joints, SIDES, 1), np.nan)
     phi[list(equation.joints)] = equation.roots(equation.joints, np.array([time]))
-    hindrances = equation.hindrances(equation.joints, np.array([time]), phi[list(equation.joints)])[:, 0]
-    reasons = zip(equation.joints, hindrances.tolist(), strict=True)
-    stops = {joint: DeflectionStop(first + time, REASONS[reason]) for joint, reason in reasons if reason}
+    reason_indices = equation.stop_reasons(equation.joints, np.array([time]), phi[list(equation.joints)])[
+        :, 0
+    ]
+    reasons = zip(equation.joints, reason_indices.tolist(), strict=True)
+    stops = {joint: DeflectionStop(start + time, REASONS[reason]) for joint, reason in reasons if reason}
     parts = []
     while time < end and len(stops) < len(equation.joints):
-        going = [joint for joint in equation.joints if joint not in stops]
-        integration = Integration(equation, tuple(going), pieces, time, phi[going, :, 0])
+        remaining = [joint for joint in equation.joints if joint not in stops]
+        integration = Integration(equation, tuple(remaining), pieces, time, phi[remaining, :, 0])
         if integration.times[-1] > time:
             time = integration.times[-1]
-            parts.append(_IntegratedPart(going, integration.solution()))
-            phi[going] = deflections_by_joint(parts[-1].solution(np.array([time])))
+            parts.append(_IntegratedPart(remaining, integration.solution()))
+            phi[remaining] = deflections_by_joint(parts[-1].solution(np.array([time])))
         stops |= {
-            joint: DeflectionStop(first + time, reason) for joint, reason in integration.stopped.items()
+            joint: DeflectionStop(start + time, reason) for joint, reason in integration.stopped.items()
         }
-    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(parts), first)
+    return IntegratedDeflections(tuple(map(stops.get, range(trajectory.joints))), tuple(parts), start)

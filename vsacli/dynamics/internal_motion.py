@@ -40,7 +40,7 @@ class Collocation:
         self._nodes = np.append(scipy.special.roots_jacobi(stages - 1, 1, 0)[0], 1.0)
         # From values at -1 and the nodes to coefficients of Chebyshev polynomials, and from the nodes alone.
         self._to_coefficients = np.linalg.inv(chebyshev.chebvander(np.append(-1.0, self._nodes), stages))
-        self._through_nodes = np.linalg.inv(chebyshev.chebvander(self._nodes, stages - 1))
+        self._nodes_to_coefficients = np.linalg.inv(chebyshev.chebvander(self._nodes, stages - 1))
         derivatives = chebyshev.chebder(self._to_coefficients)
         self._slopes: FloatArray = chebyshev.chebvander(self._nodes, stages - 1) @ derivatives
 
@@ -58,7 +58,7 @@ class Collocation:
 
     def coefficients_of_rates(self, values: FloatArray) -> FloatArray:
         """Return the coefficients from values at the nodes, (..., stages)."""
-        return values @ self._through_nodes.T
+        return values @ self._nodes_to_coefficients.T
 
 
 class Piecewise:
@@ -76,8 +76,8 @@ class Piecewise:
         """Return the values, (rows, samples); beyond the ends those of the nearest cell."""
         cell = np.clip(np.searchsorted(self.ends, time, side="right") - 1, 0, len(self.ends) - 2)
         left, right = self.ends[cell], self.ends[cell + 1]
-        place = np.clip(2 * (time - left) / (right - left) - 1, -1.0, 1.0)
-        basis = chebyshev.chebvander(place, self._coefficients.shape[2] - 1)
+        local_time = np.clip(2 * (time - left) / (right - left) - 1, -1.0, 1.0)
+        basis = chebyshev.chebvander(local_time, self._coefficients.shape[2] - 1)
         return np.asarray(np.einsum("srd,sd->rs", self._coefficients[cell], basis), dtype=np.float64)
 
 
@@ -128,7 +128,7 @@ LOST, SINGULAR = (
 """Reasons why a motion ends."""
 
 
-class Marched(NamedTuple):
+class MarchedMotion(NamedTuple):
     """An internal motion as functions of time.
 
     Attributes:
@@ -161,7 +161,7 @@ class _CellSolution(NamedTuple):
     rates: FloatArray
     torque: float
     damping: float
-    constants: float
+    time_constants: float
     rounding: float
     slope: float
 
@@ -173,21 +173,21 @@ class _Cell(NamedTuple):
         left, right: Ends of the cell, s.
         new: Whether the cell begins at a breakpoint of the demand.
         shares: Shares of the last coefficients two halvings and one halving before.
-        halved: Number of halvings.
+        halvings: Number of halvings.
     """
 
     left: float
     right: float
-    new: bool = True
+    at_breakpoint: bool = True
     shares: tuple[float, float] = (np.inf, np.inf)
-    halved: int = 0
+    halvings: int = 0
 
     def halves(self, share: float) -> tuple[_Cell, _Cell]:
         """Return the left and the right half."""
         middle = (self.left + self.right) / 2
         return (
-            _Cell(self.left, middle, self.new, (self.shares[1], share), self.halved + 1),
-            _Cell(middle, self.right, False, (self.shares[1], share), self.halved + 1),
+            _Cell(self.left, middle, self.at_breakpoint, (self.shares[1], share), self.halvings + 1),
+            _Cell(middle, self.right, False, (self.shares[1], share), self.halvings + 1),
         )
 
 
@@ -202,36 +202,36 @@ class March:
     def __init__(self, springs: DampedSprings, demand: Callable[[FloatArray], Command]) -> None:
         self._springs, self._demand, self._rule = springs, demand, Collocation()
 
-    def through(self, ends: FloatArray, phi: FloatArray) -> Marched:
+    def solve_cells(self, ends: FloatArray, phi: FloatArray) -> MarchedMotion:
         """Return the motion from deflections (2, 1); the demand is smooth between adjacent `ends`, s."""
-        ended, solved = [float(ends[0])], list[tuple[FloatArray, FloatArray]]()
+        cell_ends, fits = [float(ends[0])], list[tuple[FloatArray, FloatArray]]()
         peaks = _Peaks(self._springs, self._demand(ends), phi)
-        todo = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
-        while todo:
-            cell = todo.pop()
+        pending = [_Cell(left, right) for left, right in pairwise(ends.tolist())][::-1]
+        while pending:
+            cell = pending.pop()
             outcome = self._solve_cell(cell, phi, peaks.torque)
             if isinstance(outcome, str):
                 share, unresolved = np.inf, True
             else:
-                fitted = self._fit_cell(cell, outcome)
-                share = peaks.share(*fitted, outcome)
-                settling = cell.new and outcome.constants > LAYER
-                falling = share < cell.shares[0] / GAIN
-                unresolved = share > RESOLVED and (share > TOLERATED or falling or settling)
-            if unresolved and cell.halved < HALVINGS:
-                todo += cell.halves(share)[::-1]
+                fit = self._fit_cell(cell, outcome)
+                share = peaks.share(*fit, outcome)
+                settling = cell.at_breakpoint and outcome.time_constants > LAYER
+                decreasing = share < cell.shares[0] / GAIN
+                unresolved = share > RESOLVED and (share > TOLERATED or decreasing or settling)
+            if unresolved and cell.halvings < HALVINGS:
+                pending += cell.halves(share)[::-1]
             elif isinstance(outcome, str):
-                return Marched(*_concatenate_cells(ended, solved), cell.left, outcome)
+                return MarchedMotion(*_concatenate_cells(cell_ends, fits), cell.left, outcome)
             else:
                 phi = outcome.phi[:, -1:]
-                solved.append(fitted)
-                ended.append(cell.right)
-        return Marched(*_concatenate_cells(ended, solved), ended[-1], None)
+                fits.append(fit)
+                cell_ends.append(cell.right)
+        return MarchedMotion(*_concatenate_cells(cell_ends, fits), cell_ends[-1], None)
 
     def _fit_cell(self, cell: _Cell, solution: _CellSolution) -> tuple[FloatArray, FloatArray]:
         """Return coefficients of deflections and rates; in fast cells, rates are derivatives of the fit."""
         phi = self._rule.coefficients(solution.phi)
-        if solution.constants <= FAST:
+        if solution.time_constants <= FAST:
             return phi, self._rule.coefficients_of_rates(solution.rates)
         half = (cell.right - cell.left) / 2
         first = chebyshev.chebder(self._springs.spread(phi)) / half
@@ -248,7 +248,10 @@ class March:
         """
         springs, command = self._springs, self._demand(self._rule.times(cell.left, cell.right))
         slopes, damping = self._rule.slopes(cell.left, cell.right), command.commanded[DAMPING.key]
-        initial_spread, side = springs.spread(start), np.sign(springs.springs_at(start, command.q[:1]).pivot)
+        initial_spread, pivot_sign = (
+            springs.spread(start),
+            np.sign(springs.springs_at(start, command.q[:1]).pivot),
+        )
         spread, phi = initial_spread + 0 * command.q, start + 0 * command.q
         converged, rounding = False, POSITION_ROUNDING * _largest_size(command.q)
         for _ in range(NEWTON_STEPS):
@@ -256,7 +259,7 @@ class March:
             if np.isnan(phi[0]).any() or not springs.laws_hold(phi).all():
                 return LOST
             springs_at_phi = springs.springs_at(phi, command.q)
-            if (np.sign(springs_at_phi.pivot) != side).any():
+            if (np.sign(springs_at_phi.pivot) != pivot_sign).any():
                 return SINGULAR
             if converged:
                 fastest = np.max(np.abs(springs_at_phi.slope) / damping)
@@ -272,8 +275,8 @@ class March:
             rate = slopes[:, 0] * initial_spread + slopes[:, 1:] @ spread
             torque_error = command.tau_e - springs_at_phi.state.tau_e - damping * rate
             slope = springs_at_phi.slope
-            matrix = damping[:, None] * slopes[:, 1:] + np.diag(slope)
-            step = np.asarray(np.linalg.solve(matrix, torque_error), dtype=np.float64)
+            jacobian = damping[:, None] * slopes[:, 1:] + np.diag(slope)
+            step = np.asarray(np.linalg.solve(jacobian, torque_error), dtype=np.float64)
             spread = spread + step
             converged = _largest_size(step) <= max(
                 CONVERGED * _largest_size(spread), CONVERGED * peak / _largest_size(slope), rounding
@@ -298,9 +301,9 @@ class _Peaks:
 
     def __init__(self, springs: DampedSprings, demand: Command, start: FloatArray) -> None:
         self._springs = springs
-        self._slope = _largest_size(springs.slope(start, demand.q[:1]))
+        self._start_slope = _largest_size(springs.slope(start, demand.q[:1]))
         self.torque = _largest_size(demand.tau_e)
-        self._phi, self._spread = 0.0, LEAST_SPREAD
+        self._phi_peak, self._spread_peak = 0.0, LEAST_SPREAD
 
     def share(self, phi: FloatArray, rates: FloatArray, solution: _CellSolution) -> float:
         """Return the last coefficients of deflections, spread and torque, relative to the peaks so far.
@@ -308,18 +311,20 @@ class _Peaks:
         Positions of many turns are rounded; no cell is short enough for coefficients below that.
         """
         spread = self._springs.spread(phi)
-        self._phi = max(self._phi, float(np.nanmax(np.abs(phi))))
-        self._spread = max(self._spread, _largest_size(spread), LEAST_SHARE * self._phi)
-        self.torque = max(self.torque, solution.torque, self._slope * self._spread)
-        missing = (
+        self._phi_peak = max(self._phi_peak, float(np.nanmax(np.abs(phi))))
+        self._spread_peak = max(self._spread_peak, _largest_size(spread), LEAST_SHARE * self._phi_peak)
+        self.torque = max(self.torque, solution.torque, self._start_slope * self._spread_peak)
+        truncation = (
             float(np.nanmax(np.abs(phi[:, -2:]))) - solution.rounding,
             _largest_size(spread[-2:]) - solution.rounding,
         )
-        share = max(0.0, missing[0] / max(self._phi, LEAST_SPREAD), missing[1] / self._spread)
-        if solution.constants > FAST:
+        share = max(0.0, truncation[0] / max(self._phi_peak, LEAST_SPREAD), truncation[1] / self._spread_peak)
+        if solution.time_constants > FAST:
             return share
-        of_torque = solution.damping * _largest_size(rates[0, -2:]) - solution.slope * solution.rounding
-        return max(share, of_torque / self.torque)
+        torque_truncation = (
+            solution.damping * _largest_size(rates[0, -2:]) - solution.slope * solution.rounding
+        )
+        return max(share, torque_truncation / self.torque)
 
 
 def _largest_size(values: FloatArray) -> float:
@@ -327,12 +332,14 @@ def _largest_size(values: FloatArray) -> float:
 
 
 def _concatenate_cells(
-    ended: list[float], solved: list[tuple[FloatArray, FloatArray]]
+    cell_ends: list[float], fits: list[tuple[FloatArray, FloatArray]]
 ) -> tuple[Piecewise | None, Piecewise | None]:
     """Return the deflections and rates over all cells."""
-    if not solved:
+    if not fits:
         return None, None
-    phi, rates = (Piecewise(np.array(ended), np.stack(each)) for each in zip(*solved, strict=True))
+    phi, rates = (
+        Piecewise(np.array(cell_ends), np.stack(coefficients)) for coefficients in zip(*fits, strict=True)
+    )
     return phi, rates
 
 
@@ -347,25 +354,27 @@ class InternalMotions:
 
     joints: tuple[int, ...]
     stops: Mapping[int, DeflectionStop]
-    _marched: Mapping[int, Marched] = field(repr=False)
+    _motions: Mapping[int, MarchedMotion] = field(repr=False)
 
     @property
     def breakpoints(self) -> FloatArray:
         """Ends of the cells, s after the first sample; cells are short where an internal motion decays."""
-        ends = [each.phi.ends for each in self._marched.values() if each.phi is not None]
+        ends = [motion.phi.ends for motion in self._motions.values() if motion.phi is not None]
         return np.unique(np.concatenate([np.zeros(0), *ends]))
 
     def at(self, elapsed: FloatArray) -> dict[int, InternalMotion]:
         """Return the motion of each joint at times, s after the first sample; NaN from a stop on."""
-        return {joint: self._at(joint, elapsed) for joint in self.joints}
+        return {joint: self._motion_of_joint(joint, elapsed) for joint in self.joints}
 
-    def _at(self, joint: int, elapsed: FloatArray) -> InternalMotion:
-        marched = self._marched[joint]
+    def _motion_of_joint(self, joint: int, elapsed: FloatArray) -> InternalMotion:
+        marched = self._motions[joint]
         if marched.phi is None or marched.rates is None:
-            none = np.full_like(elapsed, np.nan)
-            return InternalMotion(np.stack((none, none)), none, none)
-        gone = (elapsed >= marched.end) & (marched.reason is not None)
-        phi, rates = (np.where(gone, np.nan, each.at(elapsed)) for each in (marched.phi, marched.rates))
+            absent = np.full_like(elapsed, np.nan)
+            return InternalMotion(np.stack((absent, absent)), absent, absent)
+        ended = (elapsed >= marched.end) & (marched.reason is not None)
+        phi, rates = (
+            np.where(ended, np.nan, polynomial.at(elapsed)) for polynomial in (marched.phi, marched.rates)
+        )
         return InternalMotion(phi, *rates)
 
 
@@ -374,23 +383,29 @@ def internal_motions(robot: Robot, trajectory: Trajectory) -> InternalMotions:
 
     The integration uses the smooth functions of the trajectory and ignores derivatives given with samples.
     """
-    first, trajectory = trajectory.start, trajectory.from_zero()
+    start, trajectory = trajectory.start, trajectory.from_zero()
     joints = damped_joints(robot, trajectory)
     demand = _JointCommands(robot, trajectory)
-    evenly = np.linspace(0.0, trajectory.duration, FIRST_CELLS + 1)
-    ends = np.union1d(evenly, Pieces.of(trajectory, 0.0).ends)
+    uniform_ends = np.linspace(0.0, trajectory.duration, FIRST_CELLS + 1)
+    ends = np.union1d(uniform_ends, Pieces.of(trajectory, 0.0).ends)
     springs = {index: DampedSprings(robot.joints[index].actuator) for index in joints}
     marched = {}
     with np.errstate(all="ignore"):  # a trial step may leave the range of a law
         for index in joints:
-            begin = springs[index].equilibrium(demand.of(index, ends[:1]), robot.joints[index].damper_start)
+            initial_phi = springs[index].equilibrium(
+                demand.of(index, ends[:1]), robot.joints[index].damper_start
+            )
             march = March(springs[index], partial(demand.of, index))
-            started = not np.isnan(begin[0]).any()
-            marched[index] = march.through(ends, begin) if started else Marched(None, None, 0.0, LOST)
+            has_equilibrium = not np.isnan(initial_phi[0]).any()
+            marched[index] = (
+                march.solve_cells(ends, initial_phi)
+                if has_equilibrium
+                else MarchedMotion(None, None, 0.0, LOST)
+            )
     stops = {
-        index: DeflectionStop(first + each.end, each.reason)
-        for index, each in marched.items()
-        if each.reason is not None
+        index: DeflectionStop(start + motion.end, motion.reason)
+        for index, motion in marched.items()
+        if motion.reason is not None
     }
     return InternalMotions(joints, stops, marched)
 

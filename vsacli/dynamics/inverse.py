@@ -114,56 +114,60 @@ class InverseDynamics(RobotKernel):
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run (36)-(74)."""
-        return self.results.pack(self.rows_of(rows, self.at_joints(rows)))
+        return self.results.pack(self.result_rows(rows, self.joint_variables(rows)))
 
-    def at_joints(self, rows: Sequence[Scalar]) -> Sequence[JointVariables]:
+    def joint_variables(self, rows: Sequence[Scalar]) -> Sequence[JointVariables]:
         """Return the variables of each joint."""
         inputs = self.arguments.unpack(rows)
         torques = self.links(self.links.arguments.pack(inputs))  # (36)-(60)
         # The recursion gives the integer 0 for joints that move no mass.
-        rows_of_links = [np.full_like(rows[0], row) if np.ndim(row) == 0 else row for row in torques]
-        of_all = {**inputs, **self.links.results.unpack(rows_of_links)}
+        torque_rows = [np.full_like(rows[0], row) if np.ndim(row) == 0 else row for row in torques]
+        all_rows = {**inputs, **self.links.results.unpack(torque_rows)}
         names, joints = Command.names(signal.key for signal in self.robot.signals), self.robot.joints
-        commands = (Command.of({name: of_all[name][index] for name in names}) for index in range(len(joints)))
-        prescribed = (self._prescribed_deflections(index, inputs) for index in range(len(joints)))
-        demands = zip(commands, repeat(self.min_margin), prescribed, strict=False)
+        commands = (
+            Command.of({name: all_rows[name][index] for name in names}) for index in range(len(joints))
+        )
+        deflections = (self._prescribed_deflections(index, inputs) for index in range(len(joints)))
+        drive_arguments = zip(commands, repeat(self.min_margin), deflections, strict=False)
         limits = [joint.limits for joint in joints]
         of_joints: list[JointVariables] = call_at_joints(  # (61)-(74)
-            rows[0], drive, joints, demands, keys=limits
+            rows[0], drive, joints, drive_arguments, keys=limits
         )
-        for joint, of_joint in zip(joints, of_joints, strict=True):
-            _check_limits(joint, of_joint)
+        for joint, variables in zip(joints, of_joints, strict=True):
+            _check_limits(joint, variables)
         if "dissipated_power" in self.results.shapes:
             powers = call_at_joints(rows[0], dissipated_power, joints, zip(of_joints, strict=True))
             of_joints = [
-                of_joint._replace(dissipated_power=power)
-                for of_joint, power in zip(of_joints, powers, strict=True)
+                variables._replace(dissipated_power=power)
+                for variables, power in zip(of_joints, powers, strict=True)
             ]
         return of_joints
 
     def _prescribed_deflections(
         self, index: int, inputs: Mapping[str, Sequence[Scalar]]
     ) -> FloatArray | InternalMotion | None:
-        states = (rows.of_joint(index, inputs) for rows in reversed(self.prescribed))
-        return next((state for state in states if state is not None), None)
+        candidates = (rows.of_joint(index, inputs) for rows in reversed(self.prescribed))
+        return next((candidate for candidate in candidates if candidate is not None), None)
 
-    def rows_of(
-        self, rows: Sequence[Scalar], of_joints: Sequence[JointVariables]
+    def result_rows(
+        self, rows: Sequence[Scalar], joint_variables: Sequence[JointVariables]
     ) -> dict[str, Iterable[Any]]:
         """Return the rows of each result by name, from the input rows and the variables of the joints."""
-        absent = {1: np.full_like(rows[0], np.nan), 2: np.full_like(of_joints[0].dtheta, np.nan)}
-        present = [of_joint.by_name() for of_joint in of_joints]
+        absent_rows = {1: np.full_like(rows[0], np.nan), 2: np.full_like(joint_variables[0].dtheta, np.nan)}
+        joint_arrays = [variables.by_name() for variables in joint_variables]
         return {
-            name: rows_of_joints([arrays.get(name, absent[len(VARIABLES[name].dims)]) for arrays in present])
+            name: rows_of_joints(
+                [arrays.get(name, absent_rows[len(VARIABLES[name].dims)]) for arrays in joint_arrays]
+            )
             for name in self.results.shapes
         }
 
 
-def _check_limits(joint: Joint, of_joint: JointVariables) -> None:
+def _check_limits(joint: Joint, variables: JointVariables) -> None:
     """Raise NotImplementedError for a limit on a variable that the joint lacks; it would go unchecked."""
-    present = of_joint.by_name()
+    arrays = variables.by_name()
     for check in limit_checks(joint):
-        if check.variable not in present:
+        if check.variable not in arrays:
             raise NotImplementedError(f"{check.variable} has a limit, but is neither commanded nor computed")
 
 
@@ -185,11 +189,14 @@ def call_at_joints(
         arguments: Further arguments for each joint.
         keys: Keys of the joints to compare in addition.
     """
-    bodies = []
+    functions = []
     for joint, key in zip(joints, keys, strict=False):
-        counting = joint.type, joint.actuator, joint.damping, joint.friction, joint.damper
-        bodies.append(Keyed((function, *counting, key), partial(function, joint)))
-    return [call(row, body, *of_joint) for body, of_joint in zip(bodies, arguments, strict=True)]
+        compared = joint.type, joint.actuator, joint.damping, joint.friction, joint.damper
+        functions.append(Keyed((function, *compared, key), partial(function, joint)))
+    return [
+        call(row, keyed_function, *joint_arguments)
+        for keyed_function, joint_arguments in zip(functions, arguments, strict=True)
+    ]
 
 
 def compute_block(
@@ -248,14 +255,14 @@ def motor_torques(
     """
     check_robot(robot)
     check_type("motion", motion, Motion, "trajectory.at(time) gives one")
-    single = np.ndim(motion.q) == 1
+    is_single = np.ndim(motion.q) == 1
     _check_motion(robot, motion)
-    if single:
+    if is_single:
         motion = motion.mapped(np.atleast_1d(motion.time), lambda array, _: np.asarray(array)[None])
     frame = None if motion.wrench is None else motion.wrench.frame
     kernel = _inverse_dynamics_kernel(robot, frame, min_margin, ())
     block = compute_block(robot, motion, min_margin, engine_of_call(engine, kernel, len(motion.q)))
-    return block.taken(0) if single else block
+    return block.taken(0) if is_single else block
 
 
 def _check_motion(robot: Robot, motion: Motion) -> None:
@@ -266,8 +273,8 @@ def _check_motion(robot: Robot, motion: Motion) -> None:
     """
     arrays, shape = motion.variables(), np.shape(motion.q)
     required = (name for signal in (POSITION, *robot.signals) for name in signal.names)
-    if lacking := [name for name in required if name not in arrays]:
-        raise InputError.one(f"the motion lacks {', '.join(lacking)}, which {robot.name} requires")
+    if missing := [name for name in required if name not in arrays]:
+        raise InputError.one(f"the motion lacks {', '.join(missing)}, which {robot.name} requires")
     checked_shape("q", motion.q, len(robot.joints))
     for name, array in motion.of_joints.items():
         if np.shape(array) != shape:
@@ -290,8 +297,8 @@ def block_of(
         further: Rows of further inputs of the kernel, each (samples,), by name.
         block: Class of the block.
     """
-    inputs = kernel.arguments.shapes
-    commanded = {name: array for name, array in motion.variables().items() if name in inputs}
+    input_shapes = kernel.arguments.shapes
+    commanded = {name: array for name, array in motion.variables().items() if name in input_shapes}
     rows = {name: by_joint(array) for name, array in commanded.items()}
     results = kernel.results.arrays(engine.run(kernel, kernel.arguments.pack({**rows, **further})))
     computed: dict[str, AnyArray] = {name: over_time(array) for name, array in results.items()}
@@ -319,9 +326,9 @@ def internal_equilibrium(robot: Robot, motion: Motion) -> dict[int, InternalMoti
     return motions
 
 
-def rows_of_joints(of_joints: Iterable[FloatArray]) -> Iterator[FloatArray]:
+def rows_of_joints(arrays: Iterable[FloatArray]) -> Iterator[FloatArray]:
     """Yield the rows (samples,) of arrays of the joints, each (samples,) or (2, samples)."""
-    for array in of_joints:
+    for array in arrays:
         yield from array if array.ndim > 1 else [array]
 
 
@@ -352,14 +359,14 @@ def adapt_trajectory(robot: Robot, trajectory: Trajectory) -> Trajectory:
         check_wrench_frame(trajectory.wrench.frame, robot.tool_names)
     trajectory = set_uncommanded_dampers(trajectory, robot)
     for key, signal in COMMANDED.items():
-        lacking = [
+        missing = [
             joint.name
-            for joint, chosen in zip(robot.joints, trajectory.chosen(key), strict=True)
-            if key in joint.commanded and not chosen
+            for joint, commanded in zip(robot.joints, trajectory.chosen(key), strict=True)
+            if key in joint.commanded and not commanded
         ]
-        if lacking:
+        if missing:
             raise InputError.one(
-                f"the trajectory {trajectory.name} has no {key} for {', '.join(lacking)}; "
+                f"the trajectory {trajectory.name} has no {key} for {', '.join(missing)}; "
                 f"each {describe_commanded_joints(signal)} needs one"
             )
     return trajectory

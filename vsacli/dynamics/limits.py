@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from vsacli.actuators.reach import LimitCheck, OfJoint
+from vsacli.actuators.reach import LimitCheck, VariablesOfJoint
 from vsacli.base.arrays import FLAG_TYPE, BoolArray, FlagArray, FloatArray
 from vsacli.base.flags import Flag, ToolFlag, labeled_flag
 from vsacli.base.json_records import Stored, named
@@ -36,27 +36,27 @@ def limit_checks(joint: Joint) -> list[LimitCheck]:
     return [check for check in checks if check.exists]
 
 
-def limit_flags(joint: Joint, of_joint: OfJoint, flags: FlagArray) -> FlagArray:
+def limit_flags(joint: Joint, variables: VariablesOfJoint, flags: FlagArray) -> FlagArray:
     """Return `flags`, (samples,), with the bits of all limits on variables that are given.
 
     Where the standard deviation of a variable is given, its limit is exceeded only beyond the allowance.
     """
     for check in limit_checks(joint):
-        if check.variable in of_joint:
-            flags = flags | check.flags(of_joint, check.allowance(of_joint))
+        if check.variable in variables:
+            flags = flags | check.flags(variables, check.allowance(variables))
     return flags
 
 
-def open_steps(joint: Joint, of_joint: OfJoint) -> BoolArray:
+def undecided_samples(joint: Joint, variables: VariablesOfJoint) -> BoolArray:
     """Return the samples at which standard deviations decide whether limits are exceeded, (samples,).
 
     A value is beyond a limit there, but none by more than the largest allowance.
     """
-    beyond, too_far = np.zeros((2, len(of_joint["flags"])), dtype=FLAG_TYPE)
+    beyond, too_far = np.zeros((2, len(variables["flags"])), dtype=FLAG_TYPE)
     for check in limit_checks(joint):
-        if check.variable in of_joint:
-            beyond |= check.flags(of_joint)
-            too_far |= check.flags(of_joint, check.largest_allowance)
+        if check.variable in variables:
+            beyond |= check.flags(variables)
+            too_far |= check.flags(variables, check.largest_allowance)
     undecided: BoolArray = (beyond != 0) & (too_far == 0)
     return undecided
 
@@ -164,36 +164,36 @@ class Finding(Stored):
     @property
     def text(self) -> str:
         """The finding as a clause without the name of joint or tool, and the advice."""
-        return f"{self._fact('')}{self.advice and ': '}{self.advice}"
+        return f"{self._fact_text('')}{self.advice and ': '}{self.advice}"
 
     @property
     def clause(self) -> str:
         """The finding as a clause that names the joint or tool."""
-        return f"the {self._fact(f' of {self.tool or self.joint}').removeprefix('the ')}"
+        return f"the {self._fact_text(f' of {self.tool or self.joint}').removeprefix('the ')}"
 
-    def _fact(self, whose: str) -> str:
-        """Return the finding as a clause in which the quantity, or the springs, are followed by `whose`."""
+    def _fact_text(self, owner: str) -> str:
+        """Return the finding as a clause in which the quantity, or the springs, are followed by `owner`."""
         if self.kind == OFF_TARGET:
             error, tolerance = (f"{value:.3g} {self.unit}" for value in (self.value, abs(self.bound)))
-            return f"final q error{whose} {error} exceeds the goal tolerance of {tolerance}"
+            return f"final q error{owner} {error} exceeds the goal tolerance of {tolerance}"
         if self.kind == Flag.NOT_FINITE.label:
-            return f"a motor variable{whose} is not finite {self.when()}"
+            return f"a motor variable{owner} is not finite {self.when()}"
         if self.kind == ToolFlag.STATIC_INSTABILITY.label:
             return f"its pose is statically unstable {self.when()}: with the motors held, the links buckle"
         if math.isnan(self.bound):
-            return f"the springs{whose} cannot carry the elastic torque {self.when()}"
+            return f"the springs{owner} cannot carry the elastic torque {self.when()}"
         (value, bound), side = self.numbers, "below" if self.below else "above"
         limit = f"its limit of {bound} {self.unit}"
         if self.margin:
             end = f"{'minimum' if self.below else 'maximum'} {significant(self.end)}"
             limit = f"the {bound} {self.unit} needed for a margin of {100 * self.margin:.4g} % ({end})"
-        return f"{self.quantity}{whose} is {value} {self.unit} {self.when()}, {side} {limit}"
+        return f"{self.quantity}{owner} is {value} {self.unit} {self.when()}, {side} {limit}"
 
 
 def worst_excess(
     joint: Joint,
     check: LimitCheck,
-    of_joint: OfJoint,
+    variables: VariablesOfJoint,
     time: FloatArray,
     beyond: BoolArray,
     *,
@@ -204,21 +204,21 @@ def worst_excess(
     Args:
         joint: Joint with the limit.
         check: Limit.
-        of_joint: Variables of the joint, by name.
+        variables: Variables of the joint, by name.
         time: Times of the samples, (samples,).
         beyond: Mask of the samples to compare, (samples,).
         between: Whether the times lie between samples.
     """
-    values = check.values(of_joint)
+    values = check.values(variables)
     outside = np.nan_to_num(check.outside(values), nan=-np.inf)
     beyond = beyond & (outside > check.tolerance)
     if not beyond.any():
         return None
-    step = int(np.where(beyond, outside, -np.inf).argmax())
-    value, (lower, upper) = float(values[step]), check.range
+    worst = int(np.where(beyond, outside, -np.inf).argmax())
+    value, (lower, upper) = float(values[worst]), check.range
     return Finding(
         check.flag.label,
-        float(time[step]),
+        float(time[worst]),
         value,
         lower if value < lower else upper,
         check.unit(joint.type),

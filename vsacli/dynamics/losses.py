@@ -26,7 +26,7 @@ def integrals(intervals: FloatArray, values: FloatArray, rates: FloatArray) -> F
         values: Integrand, (..., samples).
         rates: Derivative of the integrand, (..., samples).
     """
-    before, after = ((values[..., part], rates[..., part]) for part in (slice(None, -1), slice(1, None)))
+    before, after = ((values[..., ends], rates[..., ends]) for ends in (slice(None, -1), slice(1, None)))
     return integral(intervals, before, after)
 
 
@@ -51,17 +51,24 @@ def work_on_each_other(
         before: Velocities and accelerations of both motors at the beginning, each (2, ...).
         after: Velocities and accelerations at the end.
     """
-    (begin, rise), (end, rise_after) = before, after
-    rise, rise_after = interval * rise, interval * rise_after
+    (velocity, acceleration), (next_velocity, next_acceleration) = before, after
+    acceleration, next_acceleration = interval * acceleration, interval * next_acceleration
 
-    def turned(one: FloatArray, two: FloatArray) -> FloatArray:
+    def antisymmetric(first: FloatArray, second: FloatArray) -> FloatArray:
         """Return the product of one motor's value with the other's, minus that with the motors exchanged."""
-        return one * two[::-1] - two * one[::-1]
+        return first * second[::-1] - second * first[::-1]
 
-    area = turned(begin, end) - turned(rise, rise_after) / 30
-    area = area + (turned(begin, rise - rise_after) + turned(rise - rise_after, end)) / 5
-    whole = (end * end[::-1] - begin * begin[::-1]) + area
-    return whole / 2
+    area = antisymmetric(velocity, next_velocity) - antisymmetric(acceleration, next_acceleration) / 30
+    area = (
+        area
+        + (
+            antisymmetric(velocity, acceleration - next_acceleration)
+            + antisymmetric(acceleration - next_acceleration, next_velocity)
+        )
+        / 5
+    )
+    total = (next_velocity * next_velocity[::-1] - velocity * velocity[::-1]) + area
+    return total / 2
 
 
 def positive_part(intervals: FloatArray, power: FloatArray, work: FloatArray) -> FloatArray:
@@ -80,25 +87,27 @@ def positive_work(
 ) -> FloatArray:
     """Return `positive_part` of single intervals, from the power before and after; arrays of one shape."""
     positive = np.maximum(work, 0.0)
-    (spent,) = where_needed(before * after < 0, _linear, (interval, before, after, positive), (positive,))
+    (spent,) = where_needed(
+        before * after < 0, _linear_positive_work, (interval, before, after, positive), (positive,)
+    )
     return spent
 
 
-def _linear(
-    interval: FloatArray, before: FloatArray, after: FloatArray, positive: FloatArray
+def _linear_positive_work(
+    interval: FloatArray, before: FloatArray, after: FloatArray, least_work: FloatArray
 ) -> tuple[FloatArray]:
     """Return the positive work of a linear power that changes its sign, at least the given one."""
-    low, high = np.minimum(before, after), np.maximum(before, after)
-    return (np.maximum(interval / 2 * high**2 / (high - low), positive),)
+    lower_power, higher_power = np.minimum(before, after), np.maximum(before, after)
+    return (np.maximum(interval / 2 * higher_power**2 / (higher_power - lower_power), least_work),)
 
 
-def trapezoidal(time: FloatArray) -> FloatArray:
+def trapezoidal_weights(time: FloatArray) -> FloatArray:
     """Return the weights of the trapezoidal rule, (samples,) in s."""
     halves = np.diff(time) / 2
     return np.asarray(np.append(halves, 0.0) + np.append(0.0, halves))
 
 
-def trapezoids(intervals: FloatArray, values: FloatArray) -> FloatArray:
+def trapezoidal_integrals(intervals: FloatArray, values: FloatArray) -> FloatArray:
     """Return the time integral over each interval of a piecewise linear function; error O(h^3)."""
     integral: FloatArray = intervals / 2 * (values[..., 1:] + values[..., :-1])
     return integral
@@ -149,7 +158,7 @@ class LostEnergy(NamedTuple):
     dissipated: FloatArray
     copper: FloatArray | None
 
-    def during(self, intervals: slice) -> LostEnergy:
+    def select_intervals(self, intervals: slice) -> LostEnergy:
         """Return the losses in a slice of the intervals."""
         copper = None if self.copper is None else self.copper[..., intervals]
         return LostEnergy(self.motor_friction[..., intervals], self.dissipated[..., intervals], copper)
@@ -161,44 +170,48 @@ class LossMeter:
     def __init__(self, robot: Robot) -> None:
         sides = [side for joint in robot.joints for side in joint.actuator.sides]
         laws = FrictionLaws.of([side.friction if side else None for side in sides])
-        self._of_motors = laws and FrictionLaws(*(values.reshape(-1, SIDES, 1) for values in laws))
-        self._of_joints = FrictionLaws.over_samples([joint.friction for joint in robot.joints])
+        self._motor_friction = laws and FrictionLaws(*(values.reshape(-1, SIDES, 1) for values in laws))
+        self._joint_friction = FrictionLaws.over_samples([joint.friction for joint in robot.joints])
         self._has_motor = np.array([side is not None for side in sides]).reshape(-1, SIDES)
         self._motor_damping = np.array([side.damping if side else 0.0 for side in sides]).reshape(-1, SIDES)
         self._joint_damping = np.array([joint.damping for joint in robot.joints])
         self._robot = robot
-        heated = robot.has_variable(VARIABLES["copper_loss"])
-        damped = robot.has_variable(VARIABLES["damping"])
-        self._names = (*MOTION, *(["copper_loss"] if heated else []), *(DAMPED if damped else []))
-        self._last: dict[str, FloatArray] = {}
+        has_windings = robot.has_variable(VARIABLES["copper_loss"])
+        has_dampers = robot.has_variable(VARIABLES["damping"])
+        self._names = (*MOTION, *(["copper_loss"] if has_windings else []), *(DAMPED if has_dampers else []))
+        self._last_sample: dict[str, FloatArray] = {}
 
     def add(self, block: Block) -> LostEnergy:
         """Return the losses from the previous sample to each sample of a block; zero before the first."""
         rows = {name: by_joint(getattr(block, name)) for name in self._names}
-        before = self._last or _sample_rows(rows, 0)
-        self._last = _sample_rows(rows, -1)
-        return self.between({name: np.concatenate((before[name], rows[name]), axis=-1) for name in rows})
+        before = self._last_sample or _sample_rows(rows, 0)
+        self._last_sample = _sample_rows(rows, -1)
+        return self.interval_losses(
+            {name: np.concatenate((before[name], rows[name]), axis=-1) for name in rows}
+        )
 
-    def between(self, rows: Mapping[str, FloatArray]) -> LostEnergy:
+    def interval_losses(self, rows: Mapping[str, FloatArray]) -> LostEnergy:
         """Return the losses from sample to sample, from variables by name with samples on the last axis."""
         intervals = np.diff(rows["time"])
-        of_motors = [rows[name] for name in ("theta", "dtheta", "ddtheta")]
-        of_joints = [rows[name] for name in ("q", "dq", "ddq")]
-        motor_friction = _friction_work(self._of_motors, intervals, *of_motors)
-        lost_by_motors = motor_friction + _damping_work(self._motor_damping, intervals, *of_motors[1:])
-        dissipated = np.sum(lost_by_motors, axis=1, where=self._has_motor[..., None])
-        dissipated += _damping_work(self._joint_damping, intervals, *of_joints[1:])
-        dissipated += _friction_work(self._of_joints, intervals, *of_joints)
+        motor_motion = [rows[name] for name in ("theta", "dtheta", "ddtheta")]
+        joint_motion = [rows[name] for name in ("q", "dq", "ddq")]
+        motor_friction = _friction_work(self._motor_friction, intervals, *motor_motion)
+        motor_losses = motor_friction + _damping_work(self._motor_damping, intervals, *motor_motion[1:])
+        dissipated = np.sum(motor_losses, axis=1, where=self._has_motor[..., None])
+        dissipated += _damping_work(self._joint_damping, intervals, *joint_motion[1:])
+        dissipated += _friction_work(self._joint_friction, intervals, *joint_motion)
         for index, joint in enumerate(self._robot.joints):
             if joint.damper is not None:
-                of_joint = {name: rows[name][index] for name in self._names if name != "time"}
-                dissipated[index] += _damper_work(joint, intervals, of_joint)
+                variables = {name: rows[name][index] for name in self._names if name != "time"}
+                dissipated[index] += _damper_work(joint, intervals, variables)
         heat = rows.get("copper_loss")
-        return LostEnergy(motor_friction, dissipated, None if heat is None else trapezoids(intervals, heat))
+        return LostEnergy(
+            motor_friction, dissipated, None if heat is None else trapezoidal_integrals(intervals, heat)
+        )
 
 
-def _sample_rows(rows: Mapping[str, FloatArray], step: int) -> dict[str, FloatArray]:
-    return {name: values[..., [step]] for name, values in rows.items()}
+def _sample_rows(rows: Mapping[str, FloatArray], index: int) -> dict[str, FloatArray]:
+    return {name: values[..., [index]] for name, values in rows.items()}
 
 
 def _damping_work(
@@ -207,10 +220,10 @@ def _damping_work(
     return damping[..., None] * integrals(intervals, velocity * velocity, 2 * velocity * acceleration)
 
 
-def _damper_work(joint: Joint, intervals: FloatArray, of_joint: Mapping[str, FloatArray]) -> FloatArray:
-    damping, d_damping, dq, ddq = (of_joint[name] for name in ("damping", "ddamping", "dq", "ddq"))
-    velocities = damper_velocities(joint, dq, of_joint["dphi"])
-    accelerations = damper_velocities(joint, ddq, of_joint["ddtheta"] - ddq)
+def _damper_work(joint: Joint, intervals: FloatArray, variables: Mapping[str, FloatArray]) -> FloatArray:
+    damping, d_damping, dq, ddq = (variables[name] for name in ("damping", "ddamping", "dq", "ddq"))
+    velocities = damper_velocities(joint, dq, variables["dphi"])
+    accelerations = damper_velocities(joint, ddq, variables["ddtheta"] - ddq)
     work = np.zeros_like(intervals)
     for velocity, acceleration in zip(velocities, accelerations, strict=True):
         rate = (d_damping * velocity + 2 * damping * acceleration) * velocity

@@ -56,7 +56,7 @@ class _PointRates(NamedTuple):
     fourth: Vector
 
 
-class _Slide(NamedTuple):
+class _SlidingTerms(NamedTuple):
     """Terms of a prismatic joint's offset d(t) in p', and in (40), (42), (44)."""
 
     dp: Vector
@@ -65,7 +65,7 @@ class _Slide(NamedTuple):
     s: Vector
 
 
-_NO_SLIDE = _Slide(ZERO, ZERO, ZERO, ZERO)
+_NO_SLIDING = _SlidingTerms(ZERO, ZERO, ZERO, ZERO)
 
 
 class MovingBody(NamedTuple):
@@ -90,7 +90,7 @@ class MovingBody(NamedTuple):
     moment: tuple[Vector, Vector, Vector]
 
 
-_WithRates: TypeAlias = tuple[Vector, Vector, Vector]
+_VectorDerivatives: TypeAlias = tuple[Vector, Vector, Vector]
 """A vector and its first two derivatives in the base frame."""
 
 
@@ -100,8 +100,8 @@ class _Reaction(NamedTuple):
     Also those of a link on a tool's environment, and of a link on all that it carries.
     """
 
-    f: _WithRates
-    n: _WithRates
+    f: _VectorDerivatives
+    n: _VectorDerivatives
 
 
 _NO_REACTION = _Reaction((ZERO, ZERO, ZERO), (ZERO, ZERO, ZERO))
@@ -126,31 +126,31 @@ def forward(inputs: RecursionInputs) -> list[MovingBody]:
     base, bodies = base_frame(inputs.gravity), list[MovingBody]()
     for link, state, (parent, seat) in zip(inputs.links, inputs.states, inputs.carriers, strict=True):
         frame = bodies[parent].frame if parent >= 0 else base
-        # `call` computes e.g. _forward(link, state, frame); it lets links of equal structure share one body.
+        # `call` computes e.g. _forward_step(link, state, frame); links of equal structure share one body.
         if seat is not None:
             frame = call(state.rates[0], _seat_motion, seat, frame)
-        bodies.append(call(state.rates[0], _forward, link, state, frame))
+        bodies.append(call(state.rates[0], _forward_step, link, state, frame))
     return bodies
 
 
 def backward(inputs: RecursionInputs, bodies: Sequence[MovingBody]) -> list[TorqueDerivatives]:
     """Run (52)-(60) from the tips to the base; result as for `recursion`."""
     links, states, carriers, _, loads = inputs
-    beyond: list[list[_Reaction]] = [[] for _ in links]
+    reactions_by_link: list[list[_Reaction]] = [[] for _ in links]
     torques: list[TorqueDerivatives] = []
     for index in reversed(range(len(links))):
         (parent, seat), row = carriers[index], states[index].rates[0]
         # Reactions of tools are computed next to their link, so that equal fingers share this code as well.
-        of_tools = [_tool_reaction(load, carriers, bodies) for load in loads if load.joint == index]
-        on_link = _total_reaction(row, [*of_tools, *beyond[index]])
+        tool_reactions = [_tool_reaction(load, carriers, bodies) for load in loads if load.joint == index]
+        reaction_of_link = _total_reaction(row, [*tool_reactions, *reactions_by_link[index]])
         torque, reaction = call(
-            row, _backward, links[index], states[index], bodies[index], on_link, parent < 0
+            row, _backward_step, links[index], states[index], bodies[index], reaction_of_link, parent < 0
         )
         torques.append(torque)
         if parent >= 0:
             if seat is not None:
                 reaction = call(row, _seat_reaction, seat, bodies[parent].frame.angular, reaction)
-            beyond[parent].append(reaction)
+            reactions_by_link[parent].append(reaction)
     return torques[::-1]
 
 
@@ -165,20 +165,20 @@ def _seat_motion(seat: Seat, frame: FrameMotion) -> FrameMotion:
     )
 
 
-def _forward(link: LinkConstants, state: JointState, previous: FrameMotion) -> MovingBody:
-    turning, sliding = (state.rates, (0, 0, 0, 0)) if link.revolute else ((0, 0, 0, 0), state.rates)
+def _forward_step(link: LinkConstants, state: JointState, previous: FrameMotion) -> MovingBody:
+    angle_rates, offset_rates = (state.rates, (0, 0, 0, 0)) if link.revolute else ((0, 0, 0, 0), state.rates)
     rotation = Rotation(state.cos, state.sin, link.cos_alpha, link.sin_alpha)
     z = Vector(0, link.sin_alpha, link.cos_alpha)
     p = Vector(link.a, mul(state.d, link.sin_alpha), mul(state.d, link.cos_alpha))
 
-    angular = _angular_motion(rotation, turning, previous.angular)
+    angular = _angular_motion(rotation, angle_rates, previous.angular)
     p_rates = _point_rates(angular, p)  # of the origin of frame k, in (40), (42), (44)
-    slide = _slide(angular, sliding, z) if not link.revolute else _NO_SLIDE
+    sliding_terms = _sliding_terms(angular, offset_rates, z) if not link.revolute else _NO_SLIDING
     frame = FrameMotion(
         angular,
-        a=rotation.undo(previous.a) + p_rates.second + slide.a,  # (40)
-        j=rotation.undo(previous.j) + p_rates.third + slide.j,  # (42)
-        s=rotation.undo(previous.s) + p_rates.fourth + slide.s,  # (44)
+        a=rotation.undo(previous.a) + p_rates.second + sliding_terms.a,  # (40)
+        j=rotation.undo(previous.j) + p_rates.third + sliding_terms.j,  # (42)
+        s=rotation.undo(previous.s) + p_rates.fourth + sliding_terms.s,  # (44)
     )
     c_rates = _point_rates(angular, link.com)  # of the center of mass, in (41), (43), (45)
     a_c, j_c, s_c = (
@@ -190,18 +190,18 @@ def _forward(link: LinkConstants, state: JointState, previous: FrameMotion) -> M
         rotation=rotation,
         z=z,
         frame=frame,
-        p=(p, p_rates.first + slide.dp, p_rates.second + slide.a),
+        p=(p, p_rates.first + sliding_terms.dp, p_rates.second + sliding_terms.a),
         c=(link.com, c_rates.first, c_rates.second),
         # (46)-(51) belong to the paper's backward pass, but do not depend on other links.
         force=(a_c * link.mass, j_c * link.mass, s_c * link.mass),  # (46)-(48)
-        moment=_euler(link.inertia, angular),
+        moment=_inertial_moments(link.inertia, angular),
     )
 
 
-def _angular_motion(rotation: Rotation, turning: Sequence[Scalar], previous: _Angular) -> _Angular:
+def _angular_motion(rotation: Rotation, angle_rates: Sequence[Scalar], previous: _Angular) -> _Angular:
     # omega to varsigma of frame k-1, theta' z0 to theta'''' z0. `undo` is R^T, from frame k-1 to k.
     w, g, iota, varsigma = previous
-    t1z, t2z, t3z, t4z = (Z0 * rate for rate in turning)
+    t1z, t2z, t3z, t4z = (Z0 * rate for rate in angle_rates)
     w_t1z, g_t1z = cross(w, t1z), cross(g, t1z)
     ww_t1z = cross(w, w_t1z)
     return _Angular(
@@ -225,10 +225,10 @@ def _point_rates(angular: _Angular, r: Vector) -> _PointRates:
     return _PointRates(first, second, third, fourth)
 
 
-def _slide(angular: _Angular, sliding: Sequence[Scalar], z: Vector) -> _Slide:
-    d1, d2, d3, d4 = sliding
+def _sliding_terms(angular: _Angular, offset_rates: Sequence[Scalar], z: Vector) -> _SlidingTerms:
+    d1, d2, d3, d4 = offset_rates
     z_rates = _point_rates(angular, z)
-    return _Slide(
+    return _SlidingTerms(
         dp=z * d1,
         a=z * d2 + z_rates.first * (2 * d1),  # of (40)
         j=z * d3 + z_rates.first * (3 * d2) + z_rates.second * (3 * d1),  # of (42)
@@ -236,7 +236,7 @@ def _slide(angular: _Angular, sliding: Sequence[Scalar], z: Vector) -> _Slide:
     )
 
 
-def _euler(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector, Vector]:
+def _inertial_moments(inertia: SymmetricTensor, angular: _Angular) -> tuple[Vector, Vector, Vector]:
     w, g, iota, varsigma = angular
     inertia_w, inertia_g = inertia.times(w), inertia.times(g)
     g_x_w = cross(g, w)
@@ -258,29 +258,33 @@ def _tool_reaction(load: ToolLoad, carriers: Sequence[Carrier], bodies: Sequence
     """
     angular = bodies[load.joint].frame.angular
     if load.in_base:
-        f, df, ddf = (_into_link(load.joint, carriers, bodies, vector) for vector in load.force)
-        m, dm, ddm = (_into_link(load.joint, carriers, bodies, vector) for vector in load.moment)
+        f, df, ddf = (_in_link_frame(load.joint, carriers, bodies, vector) for vector in load.force)
+        m, dm, ddm = (_in_link_frame(load.joint, carriers, bodies, vector) for vector in load.moment)
     else:
-        f, df, ddf = _turning(angular, *load.force)
-        m, dm, ddm = _turning(angular, *load.moment)
+        f, df, ddf = _base_derivatives(angular, *load.force)
+        m, dm, ddm = _base_derivatives(angular, *load.moment)
     return _Reaction((f, df, ddf), _shifted_moment(angular, load.point, (f, df, ddf), (m, dm, ddm)))
 
 
-def _into_link(joint: int, carriers: Sequence[Carrier], bodies: Sequence[MovingBody], v: Vector) -> Vector:
+def _in_link_frame(
+    joint: int, carriers: Sequence[Carrier], bodies: Sequence[MovingBody], v: Vector
+) -> Vector:
     """Return components in frame 0 as components in a link frame."""
     parent, seat = carriers[joint]
     if parent >= 0:
-        v = _into_link(parent, carriers, bodies, v)
+        v = _in_link_frame(parent, carriers, bodies, v)
     if seat is not None:
         v = call(v.x, Matrix.times, seat.rotation.transposed(), v)
-    turned: Vector = call(v.x, Rotation.undo, bodies[joint].rotation, v)
-    return turned
+    rotated: Vector = call(v.x, Rotation.undo, bodies[joint].rotation, v)
+    return rotated
 
 
-def _shifted_moment(angular: _Angular, r: Vector, force: _WithRates, moment: _WithRates) -> _WithRates:
+def _shifted_moment(
+    angular: _Angular, r: Vector, force: _VectorDerivatives, moment: _VectorDerivatives
+) -> _VectorDerivatives:
     """Return the moment about the origin of a frame from that about a point r fixed in it."""
-    v_r, (f, df, ddf), (m, dm, ddm) = _point_rates(angular, r), force, moment
-    dr, ddr = v_r.first, v_r.second
+    point_rates, (f, df, ddf), (m, dm, ddm) = _point_rates(angular, r), force, moment
+    dr, ddr = point_rates.first, point_rates.second
     return (
         m + cross(r, f),
         dm + cross(dr, f) + cross(r, df),
@@ -297,55 +301,55 @@ def _seat_reaction(seat: Seat, angular: _Angular, reaction: _Reaction) -> _React
 
 def _total_reaction(row: Scalar, reactions: Sequence[_Reaction]) -> _Reaction:
     """Return the sum of what the joints and tools on a link take from it."""
-    total, *others = reactions or [_NO_REACTION]
-    for reaction in others:
+    total, *further = reactions or [_NO_REACTION]
+    for reaction in further:
         total = call(row, _sum_of_reactions, total, reaction)
     return total
 
 
-def _sum_of_reactions(one: _Reaction, other: _Reaction) -> _Reaction:
-    f, df, ddf = (a + b for a, b in zip(one.f, other.f, strict=True))
-    n, dn, ddn = (a + b for a, b in zip(one.n, other.n, strict=True))
+def _sum_of_reactions(first: _Reaction, second: _Reaction) -> _Reaction:
+    f, df, ddf = (a + b for a, b in zip(first.f, second.f, strict=True))
+    n, dn, ddn = (a + b for a, b in zip(first.n, second.n, strict=True))
     return _Reaction((f, df, ddf), (n, dn, ddn))
 
 
-def _turning(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vector, Vector, Vector]:
+def _base_derivatives(angular: _Angular, u: Vector, du: Vector, ddu: Vector) -> tuple[Vector, Vector, Vector]:
     """Return a vector with components u(t) in a rotating frame, and its derivatives in the base frame."""
     w, g = angular.omega, angular.gamma
     w_u = cross(w, u)
     return u, du + w_u, ddu + cross(w, du) * 2 + cross(g, u) + cross(w, w_u)
 
 
-def _backward(
-    link: LinkConstants, state: JointState, body: MovingBody, beyond: _Reaction, of_base: bool
+def _backward_step(
+    link: LinkConstants, state: JointState, body: MovingBody, outer_reaction: _Reaction, is_on_base: bool
 ) -> tuple[TorqueDerivatives, _Reaction]:
     """Return the torque of a joint, and the reaction on its link in frame k-1; zero if that is the base."""
-    reaction = _reaction(body, beyond)
-    torque = _project(link, state, body, reaction)
-    return torque, _NO_REACTION if of_base else _in_previous_frame(body.rotation, reaction)
+    reaction = _link_reaction(body, outer_reaction)
+    torque = _joint_torque(link, state, body, reaction)
+    return torque, _NO_REACTION if is_on_base else _in_previous_frame(body.rotation, reaction)
 
 
-def _reaction(body: MovingBody, beyond: _Reaction) -> _Reaction:
+def _link_reaction(body: MovingBody, outer: _Reaction) -> _Reaction:
     (c, dc, ddc), (p, dp, ddp) = body.c, body.p
     force, dforce, ddforce = body.force
     moment, dmoment, ddmoment = body.moment
 
     # `beyond` is the reaction on link k+1, or on all that link k carries, already in frame k.
-    f = beyond.f[0] + force  # (52)
-    df = beyond.f[1] + dforce  # (53)
-    ddf = beyond.f[2] + ddforce  # (54)
-    n = beyond.n[0] + cross(c, force) + cross(p, f) + moment  # (55)
+    f = outer.f[0] + force  # (52)
+    df = outer.f[1] + dforce  # (53)
+    ddf = outer.f[2] + ddforce  # (54)
+    n = outer.n[0] + cross(c, force) + cross(p, f) + moment  # (55)
     dn = (  # (56)
-        beyond.n[1] + cross(dc, force) + cross(c, dforce) + cross(dp, f) + cross(p, df) + dmoment
+        outer.n[1] + cross(dc, force) + cross(c, dforce) + cross(dp, f) + cross(p, df) + dmoment
     )
     ddn = (  # (57)
-        beyond.n[2] + cross(ddc, force) + cross(dc, dforce) * 2 + cross(c, ddforce)
+        outer.n[2] + cross(ddc, force) + cross(dc, dforce) * 2 + cross(c, ddforce)
         + cross(ddp, f) + cross(dp, df) * 2 + cross(p, ddf) + ddmoment
     )  # fmt: skip
     return _Reaction((f, df, ddf), (n, dn, ddn))
 
 
-def _project(
+def _joint_torque(
     link: LinkConstants, state: JointState, body: MovingBody, reaction: _Reaction
 ) -> TorqueDerivatives:
     w, g, z = body.frame.angular.omega, body.frame.angular.gamma, body.z

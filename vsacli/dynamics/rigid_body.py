@@ -51,48 +51,48 @@ class LinkDynamics:
 
     def __init__(self, robot: Robot, frame: WrenchFrame | None) -> None:
         self._names = robot.joint_names
-        self._lower = np.tril_indices(len(robot.joints))
+        self._lower_indices = np.tril_indices(len(robot.joints))
         self._robot, self._frame = robot, frame
 
     @cached_property
-    def _inertia(self) -> LinkFunction:
-        return self._function(partial(_lower_triangle, self._robot))
+    def _inertia_function(self) -> LinkFunction:
+        return self._trace_function(partial(_lower_triangle, self._robot))
 
     @cached_property
-    def _bias(self) -> LinkFunction:
-        return self._function(partial(_torques, self._robot, self._frame, "tau", 1))
+    def _bias_function(self) -> LinkFunction:
+        return self._trace_function(partial(_traced_torques, self._robot, self._frame, "tau", 1))
 
     @cached_property
-    def _rate(self) -> LinkFunction:
-        return self._function(partial(_torques, self._robot, self._frame, "dtau", 2))
+    def _torque_rate_function(self) -> LinkFunction:
+        return self._trace_function(partial(_traced_torques, self._robot, self._frame, "dtau", 2))
 
     @cached_property
-    def _acceleration(self) -> LinkFunction:
-        return self._function(partial(_torques, self._robot, self._frame, "ddtau", 4))
+    def _torque_acceleration_function(self) -> LinkFunction:
+        return self._trace_function(partial(_traced_torques, self._robot, self._frame, "ddtau", 4))
 
     @staticmethod
-    def _function(torques: _Torques) -> LinkFunction:
+    def _trace_function(torques: _Torques) -> LinkFunction:
         """Return a function of arrays that computes torques of the recursion."""
         tape = Tape()
         return StateFunction(tape.program(torques(tape.inputs)))
 
     def mass_matrix(self, q: FloatArray) -> FloatArray:
         """Return M(q), ([samples,] joints, joints): column k is the recursion's torque at q'' = e_k alone."""
-        row, column = self._lower
-        entries = self._inertia(q)
+        row, column = self._lower_indices
+        entries = self._inertia_function(q)
         matrix = np.empty_like(q, shape=(*q.shape, q.shape[-1]))
         matrix[..., row, column] = matrix[..., column, row] = entries
         return matrix
 
     def bias(self, q: FloatArray, dq: FloatArray, wrench: Wrench | None) -> FloatArray:
         """Return n(q, q') of (34): gravity, centrifugal and Coriolis torques, damping, wrench; N m (N)."""
-        return self._bias(q, dq, *_wrench_derivatives(wrench, 0))
+        return self._bias_function(q, dq, *_wrench_derivatives(wrench, 0))
 
     def torque_rate(
         self, q: FloatArray, dq: FloatArray, ddq: FloatArray, wrench: Wrench | None
     ) -> FloatArray:
         """Return M' q'' + n' of (35): the recursion's tau_e' at q''' = 0."""
-        return self._rate(q, dq, ddq, *_wrench_derivatives(wrench, 1))
+        return self._torque_rate_function(q, dq, ddq, *_wrench_derivatives(wrench, 1))
 
     def torque_acceleration(
         self,
@@ -104,7 +104,7 @@ class LinkDynamics:
         wrench: Wrench | None,
     ) -> FloatArray:
         """Return tau_e'' (60)."""
-        return self._acceleration(q, dq, ddq, d3q, d4q, *_wrench_derivatives(wrench, 2))
+        return self._torque_acceleration_function(q, dq, ddq, d3q, d4q, *_wrench_derivatives(wrench, 2))
 
     def solve(self, matrix: FloatArray, torque: FloatArray) -> FloatArray:
         """Return matrix^-1 torque, for M(q) or its extension by rigid drives.
@@ -122,14 +122,14 @@ class LinkDynamics:
                 matrix,
                 torque,
                 SMALLEST_PIVOT,
-                self._elimination,
-                lambda row, column: row in self._coupled[column],
+                self._elimination_order,
+                lambda row, column: row in self._coupled_joints[column],
             )
         self._check_positive_definite(matrix)
         return np.asarray(np.linalg.solve(matrix, torque[..., None])[..., 0], dtype=np.float64)
 
     @cached_property
-    def _elimination(self) -> tuple[int, ...]:
+    def _elimination_order(self) -> tuple[int, ...]:
         """Order in which M is factored: chains on the base from it, branched subtrees from their tips.
 
         Then nothing fills in, and the pivot of a joint depends only on the joints that it carries.
@@ -144,35 +144,39 @@ class LinkDynamics:
         return len(set(subtree) & set(self._robot.tips)) == 1
 
     @cached_property
-    def _coupled(self) -> list[set[int]]:
+    def _coupled_joints(self) -> list[set[int]]:
         """Joints with which M couples each joint: those that carry it, itself, and those it carries."""
         paths = self._robot.paths
         return [
-            {*paths[joint], *(far for far, path in enumerate(paths) if joint in path)}
+            {*paths[joint], *(descendant for descendant, path in enumerate(paths) if joint in path)}
             for joint in range(len(paths))
         ]
 
     def _check_positive_definite(self, matrices: FloatArray) -> None:
-        order = list(self._elimination)
+        order = list(self._elimination_order)
         ordered = matrices if len(self._robot.tips) == 1 else matrices[..., order, :][..., order]
         try:
             pivots = np.diagonal(np.linalg.cholesky(ordered), axis1=-2, axis2=-1) ** 2
         except np.linalg.LinAlgError:
-            raise self._indefinite(matrices) from None
+            raise self._indefinite_error(matrices) from None
         if (pivots <= SMALLEST_PIVOT * np.diagonal(ordered, axis1=-2, axis2=-1)).any():
-            raise self._indefinite(matrices)
+            raise self._indefinite_error(matrices)
 
-    def _indefinite(self, matrices: FloatArray) -> InputError:
+    def _indefinite_error(self, matrices: FloatArray) -> InputError:
         """Return the error with the first joint of each subtree, or branch of one, whose pivot fails."""
-        failed: dict[int, str] = {}
-        for place, joint in enumerate(self._elimination):
-            before = [earlier for earlier in self._elimination[:place] if earlier in self._coupled[joint]]
-            here = [*before, joint]
-            if failed.keys().isdisjoint(before) and not (
-                _last_pivot(matrices[..., here, :][..., here]) > SMALLEST_PIVOT
+        failures: dict[int, str] = {}
+        for position, joint in enumerate(self._elimination_order):
+            earlier_joints = [
+                earlier
+                for earlier in self._elimination_order[:position]
+                if earlier in self._coupled_joints[joint]
+            ]
+            leading_joints = [*earlier_joints, joint]
+            if failures.keys().isdisjoint(earlier_joints) and not (
+                _last_pivot(matrices[..., leading_joints, :][..., leading_joints]) > SMALLEST_PIVOT
             ):
-                minor = f" (leading minor {len(here)} of the mass matrix)"
-                failed[joint] = minor if len(self._robot.tips) == 1 else ""
+                minor = f" (leading minor {len(leading_joints)} of the mass matrix)"
+                failures[joint] = minor if len(self._robot.tips) == 1 else ""
         return InputError(
             Problem(
                 "",
@@ -180,7 +184,7 @@ class LinkDynamics:
                 f"joint {self._names[joint]}: the inertia it moves is not positive{minor}, so a torque "
                 "gives no acceleration; give this link, or one beyond it, mass",
             )
-            for joint, minor in failed.items()
+            for joint, minor in failures.items()
         )
 
 
@@ -191,7 +195,7 @@ def _wrench_derivatives(wrench: Wrench | None, order: int) -> list[FloatArray]:
 
 def _solve_positive_definite(
     matrix: Any,
-    right: Any,
+    rhs: Any,
     smallest_pivot: float,
     order: Sequence[int],
     coupled: Callable[[int, int], bool],
@@ -200,40 +204,50 @@ def _solve_positive_definite(
 
     Args:
         matrix: (n, n), symmetric.
-        right: (n,).
+        rhs: (n,).
         smallest_pivot: Relative to the diagonal entry, below which a pivot of D counts as not positive.
         order: Order of elimination of the columns.
         coupled: Function that says whether L has an entry in a row and an earlier column.
     """
     lower: dict[tuple[int, int], Any] = {}
     pivots: dict[int, Any] = {}
-    for place, column in enumerate(order):
+    for position, column in enumerate(order):
         scaled = {
-            inner: lower[column, inner] * pivots[inner] for inner in order[:place] if (column, inner) in lower
+            earlier: lower[column, earlier] * pivots[earlier]
+            for earlier in order[:position]
+            if (column, earlier) in lower
         }
-        products = [lower[column, inner] * scaled[inner] for inner in scaled]
-        pivot = _subtracted(matrix[column, column], products)
+        products = [lower[column, earlier] * scaled[earlier] for earlier in scaled]
+        pivot = _subtract_terms(matrix[column, column], products)
         regular = pivot > smallest_pivot * matrix[column, column]
         pivots[column] = np.where(regular, pivot, math.nan)
-        for row in order[place + 1 :]:
+        for row in order[position + 1 :]:
             if coupled(row, column):
-                products = [lower[row, inner] * scaled[inner] for inner in scaled if (row, inner) in lower]
-                lower[row, column] = _subtracted(matrix[row, column], products) / pivots[column]
+                products = [
+                    lower[row, earlier] * scaled[earlier] for earlier in scaled if (row, earlier) in lower
+                ]
+                lower[row, column] = _subtract_terms(matrix[row, column], products) / pivots[column]
 
-    forward: dict[int, Any] = {}
+    forward_solution: dict[int, Any] = {}
     for row in order:
-        terms = [lower[row, inner] * forward[inner] for inner in forward if (row, inner) in lower]
-        forward[row] = _subtracted(right[row], terms)
+        terms = [
+            lower[row, earlier] * forward_solution[earlier]
+            for earlier in forward_solution
+            if (row, earlier) in lower
+        ]
+        forward_solution[row] = _subtract_terms(rhs[row], terms)
     solution: dict[int, Any] = {}
-    for place in reversed(range(len(order))):
-        row = order[place]
-        terms = [lower[below, row] * solution[below] for below in order[place + 1 :] if (below, row) in lower]
-        solution[row] = _subtracted(forward[row] / pivots[row], terms)
-    return np.stack([solution[row] for row in range(len(right))])
+    for position in reversed(range(len(order))):
+        row = order[position]
+        terms = [
+            lower[later, row] * solution[later] for later in order[position + 1 :] if (later, row) in lower
+        ]
+        solution[row] = _subtract_terms(forward_solution[row] / pivots[row], terms)
+    return np.stack([solution[row] for row in range(len(rhs))])
 
 
-def _subtracted(value: Any, terms: list[Any]) -> Any:
-    return reduce(lambda rest, term: rest - term, terms, value)
+def _subtract_terms(value: Any, terms: list[Any]) -> Any:
+    return reduce(lambda difference, term: difference - term, terms, value)
 
 
 def _last_pivot(matrices: FloatArray) -> float:
@@ -268,14 +282,14 @@ def without_drives(robot: Robot) -> Robot:
 
     Limits are left out, too, as no program depends on them.
     """
-    nothing: dict[str, Any] = {"actuator": _ANY_DRIVE, "damper": None, "limits": Limits()}
-    joints = tuple(replaced_unchecked(joint, nothing) for joint in robot.joints)
+    no_drive: dict[str, Any] = {"actuator": _PLACEHOLDER_DRIVE, "damper": None, "limits": Limits()}
+    joints = tuple(replaced_unchecked(joint, no_drive) for joint in robot.joints)
     tools = tuple(replaced_unchecked(tool, {"min_stiffness": None}) for tool in robot.tools)
     common = {"name": "links", "description": "", "placeholder": False, "sources": ()}
     return replaced_unchecked(robot, {**common, "joints": joints, "tools": tools})
 
 
-_ANY_DRIVE: Any = Rigid(motor=Motor(inertia=1.0))
+_PLACEHOLDER_DRIVE: Any = Rigid(motor=Motor(inertia=1.0))
 
 
 @lru_cache(maxsize=16)
@@ -287,7 +301,7 @@ class _SymbolicLinks(LinkDynamics):
     """Links with parameters that are symbols: each call records the recursion on their tape."""
 
     @staticmethod
-    def _function(torques: _Torques) -> LinkFunction:
+    def _trace_function(torques: _Torques) -> LinkFunction:
         def compute(*inputs: Any) -> Any:
             scalars = iter(np.concatenate(inputs))
             return np.stack(torques(lambda count: list(islice(scalars, count))))
@@ -300,23 +314,23 @@ def _lower_triangle(robot: Robot, inputs: _Inputs) -> list[Scalar]:
     joints = tuple(replaced_unchecked(joint, {"friction": None}) for joint in robot.joints)
     robot = replaced_unchecked(robot, {"joints": joints})
     q = inputs(len(robot.joints))
-    numbers = range(len(robot.joints))
+    joint_indices = range(len(robot.joints))
     columns = [
-        _recursion_torques(robot, q, [(0, int(joint == moving), 0, 0) for joint in numbers], ZERO)
-        for moving in numbers
+        _recursion_torques(robot, q, [(0, int(joint == moving_joint), 0, 0) for joint in joint_indices], ZERO)
+        for moving_joint in joint_indices
     ]
-    return [columns[column][row].tau for row in numbers for column in range(row + 1)]
+    return [columns[column][row].tau for row in joint_indices for column in range(row + 1)]
 
 
-def _torques(
-    robot: Robot, frame: WrenchFrame | None, output: str, orders: int, inputs: _Inputs
+def _traced_torques(
+    robot: Robot, frame: WrenchFrame | None, output: str, order_count: int, inputs: _Inputs
 ) -> list[Scalar]:
-    """Return an output of the recursion; derivatives of q beyond `orders` are zero."""
+    """Return an output of the recursion; derivatives of q beyond `order_count` are zero."""
     joints = len(robot.joints)
     q = inputs(joints)
-    rates = [inputs(joints) if order < orders else [0] * joints for order in range(4)]
-    order = ("tau", "dtau", "ddtau").index(output)
-    loads = () if frame is None else _tool_load_inputs(inputs, robot, frame, order)
+    rates = [inputs(joints) if derivative < order_count else [0] * joints for derivative in range(4)]
+    derivative = ("tau", "dtau", "ddtau").index(output)
+    loads = () if frame is None else _tool_load_inputs(inputs, robot, frame, derivative)
     torques = _recursion_torques(robot, q, list(zip(*rates, strict=True)), base_gravity(robot), loads)
     return [getattr(torque, output) for torque in torques]
 

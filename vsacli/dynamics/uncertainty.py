@@ -69,21 +69,24 @@ class Uncertainty:
             engine: Backend.
         """
         estimates = trajectory.estimates
-        self._start, self._elapsed = trajectory.start, probed_times(trajectory)
-        batch = times_at_once(robot, estimates)
-        parts: list[Deviations] = []
-        for start in range(0, len(self._elapsed), batch):
-            elapsed = self._elapsed[start : start + batch]
+        self._start, self._elapsed = trajectory.start, probe_times(trajectory)
+        block_size = times_per_block(robot, estimates)
+        blocks: list[Deviations] = []
+        for start in range(0, len(self._elapsed), block_size):
+            elapsed = self._elapsed[start : start + block_size]
             motion = trajectory.at(trajectory.start + elapsed)
-            covariances = {signal: each.covariance(elapsed) for signal, each in estimates.items()}
-            parts.append(propagate_deviations(robot, motion, estimates, covariances, engine))
-        self._at_probes, self.unstated = Deviations.concatenated(parts, axis=0)
+            covariances = {signal: estimate.covariance(elapsed) for signal, estimate in estimates.items()}
+            blocks.append(propagate_deviations(robot, motion, estimates, covariances, engine))
+        self._at_probes, self.unstated = Deviations.concatenated(blocks, axis=0)
 
     def at(self, time: FloatArray) -> dict[str, FloatArray]:
         """Return the deviations at any times by variable, and of `MARGIN`: each (samples, joints[, 2])."""
-        return {name: self._between(known, time) for name, known in self._at_probes.items()}
+        return {
+            name: self._interpolate_deviations(deviations, time)
+            for name, deviations in self._at_probes.items()
+        }
 
-    def _between(self, at_probes: FloatArray, time: FloatArray) -> FloatArray:
+    def _interpolate_deviations(self, at_probes: FloatArray, time: FloatArray) -> FloatArray:
         interpolated = np.full((at_probes[0].size, len(time)), np.nan)
         for row, column in zip(interpolated, at_probes.reshape(len(at_probes), -1).T, strict=True):
             exists = ~np.isnan(column)
@@ -93,19 +96,19 @@ class Uncertainty:
         return np.moveaxis(interpolated.reshape(*at_probes.shape[1:], len(time)), -1, 0)
 
 
-def times_at_once(robot: Robot, estimates: Mapping[Signal, SampledProfile]) -> int:
+def times_per_block(robot: Robot, estimates: Mapping[Signal, SampledProfile]) -> int:
     """Return the number of times whose deviations are computed as one block."""
     components = sum(estimate.fit.components for estimate in estimates.values())
     # each component has at most five orders, each shifted to both sides
     return max(1, usual_block(len(robot.joints)) // (10 * components))
 
 
-def probed_times(trajectory: Trajectory) -> FloatArray:
+def probe_times(trajectory: Trajectory) -> FloatArray:
     """Return the times at which deviations are computed, equally spaced, from the first sample on."""
     fits = [estimate.fit for estimate in trajectory.estimates.values()]
     knots = [len(part.knots) for fit in fits for part in fit.parts if not part.exact]
-    wanted = max(FEWEST_PROBES, PROBES_OF_A_KNOT * max(knots, default=0))
-    return np.linspace(0.0, trajectory.duration, max(2, min(wanted, MOST_PROBES, trajectory.samples)))
+    probe_count = max(FEWEST_PROBES, PROBES_OF_A_KNOT * max(knots, default=0))
+    return np.linspace(0.0, trajectory.duration, max(2, min(probe_count, MOST_PROBES, trajectory.samples)))
 
 
 class Deviations(NamedTuple):
@@ -136,13 +139,13 @@ class _Shift(NamedTuple):
         name: Name of the signal or derivative.
         component: Index of the component.
         stated: Whether the deviation may be stated.
-        size: Standard deviation, (times,).
+        deviation: Standard deviation, (times,).
     """
 
     name: str
     component: int
     stated: bool
-    size: FloatArray
+    deviation: FloatArray
 
 
 def propagate_deviations(
@@ -168,8 +171,8 @@ def propagate_deviations(
 
     def variables(shifted: Motion) -> dict[str, AnyArray]:
         block = block_of(kernel, shifted, engine, block=BalancedBlock)
-        gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
-        return {**{name: getattr(block, name) for name in _COMPUTED}, MARGIN: gap}
+        relative_margin = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
+        return {**{name: getattr(block, name) for name in _COMPUTED}, MARGIN: relative_margin}
 
     components = {signal: range(len(covariance)) for signal, covariance in covariances.items()}
     computed = _propagate(variables, motion, estimates, covariances, components)
@@ -200,16 +203,16 @@ def deviations_of_joint(
 
     def variables(shifted: Motion) -> dict[str, AnyArray]:
         command = command_of(index, {**shifted.variables(), **link_torques_along(undamped, shifted)})
-        driven = drive(undamped.joints[index], command)
-        return {name: getattr(driven, name).T[:, None] for name in _COMPUTED}
+        joint_variables = drive(undamped.joints[index], command)
+        return {name: getattr(joint_variables, name).T[:, None] for name in _COMPUTED}
 
     components = {  # what other joints are commanded beside their motion has no effect on this one
         signal: [index] if signal.key in COMMANDED else range(len(covariance))
         for signal, covariance in covariances.items()
     }
     computed = _propagate(variables, motion, estimates, covariances, components)
-    of_joints = {signal: each for signal, each in covariances.items() if not signal.is_wrench}
-    of_signals = _signal_deviations(robot, estimates, of_joints)
+    joint_covariances = {signal: array for signal, array in covariances.items() if not signal.is_wrench}
+    of_signals = _signal_deviations(robot, estimates, joint_covariances)
     return Deviations(
         {**of_joint(computed.deviations, 0), **of_joint(of_signals.deviations, index)},
         {
@@ -232,29 +235,29 @@ def _propagate(
 ) -> Deviations:
     """Return the deviations of variables that are computed from some components of recorded signals."""
     # A gradient has a row for each shift: signals in order, then components, then orders.
-    covariances = {signal: covariances[signal][list(several)] for signal, several in components.items()}
-    spreads = {signal: _spreads(covariance) for signal, covariance in covariances.items()}
+    covariances = {signal: covariances[signal][list(indices)] for signal, indices in components.items()}
+    deviations = {signal: _standard_deviations(covariance) for signal, covariance in covariances.items()}
     shifts = [
         _Shift(name, signal.first + component, bool(estimates[signal].stated[component]), row)
-        for signal, spread in spreads.items()
-        for component, rows in zip(components[signal], spread, strict=True)
+        for signal, deviation in deviations.items()
+        for component, rows in zip(components[signal], deviation, strict=True)
         for name, row in zip(signal.variables, rows, strict=True)
     ]
     values, gradients = _values_and_gradients(variables, motion, shifts)
-    spreads_by_name, unstated = {}, {}
-    hidden = np.array([not shift.stated for shift in shifts])
+    deviations_by_name, unstated = {}, {}
+    is_unstated = np.array([not shift.stated for shift in shifts])
     for name, value in values.items():
-        unstated[name] = np.any(gradients[name][hidden] != 0, axis=(0, 1))
-        variance, first = np.zeros_like(value), 0
+        unstated[name] = np.any(gradients[name][is_unstated] != 0, axis=(0, 1))
+        variance, start = np.zeros_like(value), 0
         for signal, covariance in covariances.items():
-            gradient = gradients[name][first : first + len(covariance) * signal.orders]
-            variance += _variance(gradient, _correlations(covariance, spreads[signal]))
-            first += len(gradient)
-        spread = np.sqrt(np.maximum(variance, 0))  # below zero by rounding only
-        spreads_by_name[name] = np.where(
-            np.isnan(value), np.nan, np.nan_to_num(spread, nan=np.inf, posinf=np.inf)
+            gradient = gradients[name][start : start + len(covariance) * signal.orders]
+            variance += _variance(gradient, _correlations(covariance, deviations[signal]))
+            start += len(gradient)
+        deviation = np.sqrt(np.maximum(variance, 0))  # below zero by rounding only
+        deviations_by_name[name] = np.where(
+            np.isnan(value), np.nan, np.nan_to_num(deviation, nan=np.inf, posinf=np.inf)
         )
-    return Deviations(spreads_by_name, unstated)
+    return Deviations(deviations_by_name, unstated)
 
 
 def _signal_deviations(
@@ -264,18 +267,20 @@ def _signal_deviations(
 
     They are NaN for wrenches on tools that were not recorded.
     """
-    spreads_by_name: dict[str, FloatArray] = {}
+    deviations_by_name: dict[str, FloatArray] = {}
     unstated: dict[str, BoolArray] = {}
     for signal, covariance in covariances.items():
-        for name, rows in zip(signal.variables, np.moveaxis(_spreads(covariance), 1, 0), strict=True):
+        for name, rows in zip(
+            signal.variables, np.moveaxis(_standard_deviations(covariance), 1, 0), strict=True
+        ):
             if name in estimates[signal].estimated:
                 rows[_joints_without_signal(robot, signal)] = np.nan
                 components = len(WRENCH_AXES) * len(robot.tool_names) if signal.tool else len(rows)
-                spread = spreads_by_name.setdefault(name, np.full((rows.shape[1], components), np.nan))
-                spread[:, signal.columns] = rows.T
-                hidden = unstated.setdefault(name, np.zeros(components, dtype=bool))
-                hidden[signal.columns] = ~estimates[signal].stated
-    return Deviations(spreads_by_name, unstated)
+                deviation = deviations_by_name.setdefault(name, np.full((rows.shape[1], components), np.nan))
+                deviation[:, signal.columns] = rows.T
+                is_unstated = unstated.setdefault(name, np.zeros(components, dtype=bool))
+                is_unstated[signal.columns] = ~estimates[signal].stated
+    return Deviations(deviations_by_name, unstated)
 
 
 def _joints_without_signal(robot: Robot, signal: Signal) -> list[int]:
@@ -286,14 +291,14 @@ def _joints_without_signal(robot: Robot, signal: Signal) -> list[int]:
     ]
 
 
-def _spreads(covariance: FloatArray) -> FloatArray:
+def _standard_deviations(covariance: FloatArray) -> FloatArray:
     """Return the standard deviations, (components, orders, times)."""
     return np.sqrt(np.moveaxis(np.diagonal(covariance, axis1=1, axis2=2), -1, 1))
 
 
-def _correlations(covariance: FloatArray, spread: FloatArray) -> FloatArray:
+def _correlations(covariance: FloatArray, deviation: FloatArray) -> FloatArray:
     """Return correlations from covariances; zero for components that are given or unknown."""
-    product = spread[:, :, None] * spread[:, None]
+    product = deviation[:, :, None] * deviation[:, None]
     return np.divide(covariance, product, out=np.zeros_like(covariance), where=product > 0)
 
 
@@ -302,12 +307,12 @@ def _values_and_gradients(
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return variables by name, (times, joints[, 2]), and changes by the shifts, (shifts, times, ...)."""
     values, gradients = {}, {}
-    for name, array in variables(_shifted(motion, shifts)).items():
-        every = array.reshape(1 + 2 * len(shifts), len(motion.time), *array.shape[1:])
-        values[name], ahead, behind = every[0], every[1::2], every[2::2]
-        one_sided = np.where(np.isnan(ahead), every[0] - behind, ahead - every[0])
-        both = (ahead - behind) / 2
-        gradients[name] = np.where(np.isnan(both), one_sided, both)
+    for name, array in variables(_shifted_motions(motion, shifts)).items():
+        batches = array.reshape(1 + 2 * len(shifts), len(motion.time), *array.shape[1:])
+        values[name], forward, backward = batches[0], batches[1::2], batches[2::2]
+        one_sided = np.where(np.isnan(forward), batches[0] - backward, forward - batches[0])
+        central = (forward - backward) / 2
+        gradients[name] = np.where(np.isnan(central), one_sided, central)
     return values, gradients
 
 
@@ -320,14 +325,14 @@ def _without_inner_dampers(robot: Robot) -> Robot:
     return replace(robot, joints=tuple(joints))
 
 
-def _shifted(motion: Motion, shifts: Sequence[_Shift]) -> Motion:
+def _shifted_motions(motion: Motion, shifts: Sequence[_Shift]) -> Motion:
     """Return the motion, followed for each shift by the motion with it added and with it subtracted."""
     variables = motion.variables()
     times = variables.pop("time")
     copies = {name: np.repeat(array[None], 1 + 2 * len(shifts), axis=0) for name, array in variables.items()}
-    for place, shift in enumerate(shifts):
-        copies[shift.name][1 + 2 * place, :, shift.component] += shift.size
-        copies[shift.name][2 + 2 * place, :, shift.component] -= shift.size
+    for index, shift in enumerate(shifts):
+        copies[shift.name][1 + 2 * index, :, shift.component] += shift.deviation
+        copies[shift.name][2 + 2 * index, :, shift.component] -= shift.deviation
     rows = {name: array.reshape(-1, array.shape[-1]) for name, array in copies.items()}
     wrench = motion.wrench
     if wrench is not None:

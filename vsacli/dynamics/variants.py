@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 PARAMETERS = "parameters"
 """Name of the rows with the varied numbers, behind those of the kernel itself."""
 
-TURNED = frozenset(("alpha", "rpy"))
+ANGLE_KEYS = frozenset(("alpha", "rpy"))
 """Words of paths to angles of the geometry."""
 
 
@@ -68,9 +68,9 @@ class VariantKernel(RowKernel, Generic[_Kernel]):
 
     def __call__(self, rows: Sequence[Scalar]) -> Sequence[Scalar]:
         """Compute with the numbers of each sample."""
-        first = len(rows) - len(self.varied)
-        robot = with_numbers(self.robot, self.varied, rows[first:])
-        return self.kernel.of_robot(robot)(rows[:first])
+        kernel_rows = len(rows) - len(self.varied)
+        robot = with_numbers(self.robot, self.varied, rows[kernel_rows:])
+        return self.kernel.of_robot(robot)(rows[:kernel_rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,19 +101,19 @@ class Variants:
         values = [[number_at(robot, number.path) for robot in self.robots] for number in self.varied]
         return np.array(values).reshape(len(self.varied), len(self.robots))
 
-    def kernel(self, of_base: _Kernel) -> _Kernel | VariantKernel[_Kernel]:
+    def kernel(self, base_kernel: _Kernel) -> _Kernel | VariantKernel[_Kernel]:
         """Return the kernel of all variants from that of `base`."""
-        return VariantKernel(of_base, self.base, self.varied) if self.varied else of_base
+        return VariantKernel(base_kernel, self.base, self.varied) if self.varied else base_kernel
 
     def inputs(self, variant: IndexArray) -> dict[str, Sequence[FloatArray]]:
         """Return the further input rows of `kernel`, by name, from the variant of each sample."""
-        return {PARAMETERS: self._rows(variant)} if self.varied else {}
+        return {PARAMETERS: self._number_rows(variant)} if self.varied else {}
 
-    def robot_over(self, variant: IndexArray) -> Robot:
+    def robot_with_rows(self, variant: IndexArray) -> Robot:
         """Return a robot whose varied numbers are rows, (samples,), from the variant of each sample."""
-        return with_numbers(self.base, self.varied, self._rows(variant))
+        return with_numbers(self.base, self.varied, self._number_rows(variant))
 
-    def _rows(self, variant: IndexArray) -> Sequence[FloatArray]:
+    def _number_rows(self, variant: IndexArray) -> Sequence[FloatArray]:
         return list(np.ascontiguousarray(self.values[:, variant]))
 
 
@@ -128,14 +128,14 @@ def shared_structure(robot: Robot, varied: Sequence[Parameter]) -> tuple[Robot, 
         values = {number: number_at(robot, number.path) for number in varied}
     except (AttributeError, IndexError, TypeError):  # the robot has another record at a path
         return None
-    rows = tuple(number for number, value in values.items() if not _decides(number, value))
-    structure = with_numbers(robot, rows, [number.value or 1.0 for number in rows])
-    restored = with_numbers(structure, rows, [values[number] for number in rows])
-    return (structure, rows) if restored == robot else None
+    differing = tuple(number for number, value in values.items() if not _decides_on_equations(number, value))
+    structure = with_numbers(robot, differing, [number.value or 1.0 for number in differing])
+    restored = with_numbers(structure, differing, [values[number] for number in differing])
+    return (structure, differing) if restored == robot else None
 
 
-def _decides(number: Parameter, value: float) -> bool:
+def _decides_on_equations(number: Parameter, value: float) -> bool:
     """Return whether a value of a number decides on the equations."""
-    twisted = not TURNED.isdisjoint(number.path)
-    exact = twisted and any(type(trigonometric(name, value)) is int for name in ("cos", "sin"))
+    is_angle = not ANGLE_KEYS.isdisjoint(number.path)
+    exact = is_angle and any(type(trigonometric(name, value)) is int for name in ("cos", "sin"))
     return exact or value == 0 or not math.isfinite(value)

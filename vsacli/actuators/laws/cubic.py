@@ -92,5 +92,5 @@ class CubicTwins(Pair):
         k, k_c = self.spring.k, self.spring.k_c
         at_equal_deflections = 2 * self.spring.stiffness(self.spring.deflection(load / 2))
         at_unequal_deflections = np.cbrt((3 * np.sqrt(3 * k_c) * load) ** 2)
-        meet = 8 / 3 * k * np.sqrt(k / (3 * k_c))
-        return np.where(load <= meet, at_equal_deflections, at_unequal_deflections)
+        meeting_load = 8 / 3 * k * np.sqrt(k / (3 * k_c))
+        return np.where(load <= meeting_load, at_equal_deflections, at_unequal_deflections)

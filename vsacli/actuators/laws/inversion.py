@@ -10,11 +10,13 @@ from vsacli.compute.control_flow import Values, look_up, repeat, where_needed
 
 
 def evaluate_hermite_cubic(
-    x: FloatArray, low: FloatArray, high: FloatArray, start: FloatArray, end: FloatArray
+    x: FloatArray, low: FloatArray, high: FloatArray, low_slope: FloatArray, high_slope: FloatArray
 ) -> FloatArray:
     """Return the cubic over x from 0 to 1 with values and slopes at both ends; arrays of one shape."""
     rise = high - low
-    return low + x * (start + x * (3 * rise - 2 * start - end + x * (start + end - 2 * rise)))
+    return low + x * (
+        low_slope + x * (3 * rise - 2 * low_slope - high_slope + x * (low_slope + high_slope - 2 * rise))
+    )
 
 
 def round_to_single(values: FloatArray) -> FloatArray:
@@ -90,11 +92,11 @@ def _halley_in_bracket(
         (phi, low, high, *_), (torque,) = state, constants
         halley, error, spring = _halley_step(law, torque, phi)
         low, high = np.where(error <= 0, phi, low), np.where(error >= 0, phi, high)
-        inside, middle = (halley >= low) & (halley <= high), (low + high) / 2
-        next_phi = np.where(inside, halley, middle)
-        converged = inside & _converges(torque, error)
-        best = (next_phi == phi) | ~((low < middle) & (middle < high))  # no double lies between
-        return (next_phi, low, high, *spring.after(next_phi - phi)), converged | best
+        is_inside, middle = (halley >= low) & (halley <= high), (low + high) / 2
+        next_phi = np.where(is_inside, halley, middle)
+        converged = is_inside & _converges(torque, error)
+        is_exhausted = (next_phi == phi) | ~((low < middle) & (middle < high))  # no double lies between
+        return (next_phi, low, high, *spring.after(next_phi - phi)), converged | is_exhausted
 
     low = np.where(np.isfinite(torque), low, np.nan)
     phi, _, _, *spring = repeat(step, (start, low, high, *[start] * 4), (torque,), MAX_HALLEY_STEPS)
@@ -112,18 +114,18 @@ class FirstGuess:
 
     def __init__(self, law: SpringLaw, nodes: FloatArray) -> None:
         """Begin with ascending nodes, and halve cells until cubics are accurate."""
-        self._interpolate(law, nodes)
+        self._set_nodes(law, nodes)
         for _ in range(MAX_HALVINGS):
             middle = (nodes[:-1] + nodes[1:]) / 2
             torque = law.torque(middle)
-            guessed = law.torque(np.clip(self(torque), nodes[:-1], nodes[1:]))
-            too_wide = np.abs(guessed - torque) > GUESS_RTOL * np.abs(torque)
+            guessed_torque = law.torque(np.clip(self(torque), nodes[:-1], nodes[1:]))
+            too_wide = np.abs(guessed_torque - torque) > GUESS_RTOL * np.abs(torque)
             if not too_wide.any():
                 break
             nodes = np.union1d(nodes, middle[too_wide])
-            self._interpolate(law, nodes)
+            self._set_nodes(law, nodes)
 
-    def _interpolate(self, law: SpringLaw, nodes: FloatArray) -> None:
+    def _set_nodes(self, law: SpringLaw, nodes: FloatArray) -> None:
         torque, stiffness = law.derivatives(nodes, 1)
         compliance = 1 / np.where(stiffness == 0, np.inf, stiffness)
         self._nodes = torque, nodes, round_to_single(compliance)
@@ -131,7 +133,9 @@ class FirstGuess:
     def __call__(self, torque: FloatArray) -> FloatArray:
         """Return the deflection at torques between those of the nodes."""
         cell = np.searchsorted(self._nodes[0][1:-1], torque, side="right")
-        low, start, first = look_up(self._nodes, cell)
-        high, end, last = look_up(self._nodes, cell + 1)
-        width = high - low
-        return evaluate_hermite_cubic((torque - low) / width, start, end, first * width, last * width)
+        low_torque, low_phi, low_compliance = look_up(self._nodes, cell)
+        high_torque, high_phi, high_compliance = look_up(self._nodes, cell + 1)
+        width = high_torque - low_torque
+        return evaluate_hermite_cubic(
+            (torque - low_torque) / width, low_phi, high_phi, low_compliance * width, high_compliance * width
+        )

@@ -301,30 +301,32 @@ class SpringRows:
     """Springs of several joints, the same number at each; deflections and results (..., joints, springs)."""
 
     def __init__(self, laws: Sequence[Sequence[SpringLaw]]) -> None:
-        self._alike = list(indices_of_equals([law for of_joint in laws for law in of_joint]))
+        self._distinct_laws = list(indices_of_equals([law for joint_laws in laws for law in joint_laws]))
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Return the torque of each spring."""
-        return self._each(phi, lambda law, part: (law.torque(part),))[0]
+        return self._evaluate_laws(phi, lambda law, phi_of_law: (law.torque(phi_of_law),))[0]
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy of each spring."""
-        return self._each(phi, lambda law, part: (law.energy(part),))[0]
+        return self._evaluate_laws(phi, lambda law, phi_of_law: (law.energy(phi_of_law),))[0]
 
     def state(self, phi: FloatArray) -> SpringState:
         """Return the state of each spring."""
-        return SpringState(*self._each(phi, lambda law, part: law.state(part)))
+        return SpringState(*self._evaluate_laws(phi, lambda law, phi_of_law: law.state(phi_of_law)))
 
-    def _each(
+    def _evaluate_laws(
         self, phi: FloatArray, values: Callable[[SpringLaw, FloatArray], Sequence[FloatArray]]
     ) -> Sequence[FloatArray]:
         """Return arrays computed from each spring's law at its deflections; one call per distinct law."""
-        if len(self._alike) == 1:
-            return values(self._alike[0][0], phi)
-        flat = phi.reshape(*phi.shape[:-2], -1)
-        parts = [(members, values(law, flat[..., members])) for law, members in self._alike]
-        merged = [np.empty_like(flat) for _ in parts[0][1]]
-        for members, of_law in parts:
-            for whole, part in zip(merged, of_law, strict=True):
-                whole[..., members] = part
-        return [whole.reshape(*phi.shape) for whole in merged]
+        if len(self._distinct_laws) == 1:
+            return values(self._distinct_laws[0][0], phi)
+        flat_phi = phi.reshape(*phi.shape[:-2], -1)
+        members_and_results = [
+            (members, values(law, flat_phi[..., members])) for law, members in self._distinct_laws
+        ]
+        results = [np.empty_like(flat_phi) for _ in members_and_results[0][1]]
+        for members, law_results in members_and_results:
+            for result, law_result in zip(results, law_results, strict=True):
+                result[..., members] = law_result
+        return [result.reshape(*phi.shape) for result in results]

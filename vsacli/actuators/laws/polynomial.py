@@ -37,7 +37,11 @@ class Polynomial(SpringLaw):
     def _coefficients(self) -> tuple[float, ...]:
         """Coefficients of phi, phi^3, ... up to the last that is not zero."""
         coefficients = (self.c1, self.c3, self.c5, self.c7, self.c9)
-        return coefficients[: max(place for place, each in enumerate(coefficients, 1) if not is_zero(each))]
+        return coefficients[
+            : max(
+                position for position, coefficient in enumerate(coefficients, 1) if not is_zero(coefficient)
+            )
+        ]
 
     @property
     def is_linear(self) -> bool:
@@ -47,34 +51,41 @@ class Polynomial(SpringLaw):
     @property
     def polynomial(self) -> tuple[float, ...]:
         """Coefficients with zeros for even powers."""
-        return tuple(term for each in self._coefficients for term in (each, 0.0))[:-1]
+        return tuple(term for coefficient in self._coefficients for term in (coefficient, 0.0))[:-1]
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Return derivatives as power series, alternately odd and even, which share the square."""
         squared = phi * phi
-        even = [self._derivative(each, squared) for each in range(order + 1)]
-        return tuple(value if each % 2 else phi * value for each, value in enumerate(even))
+        even_parts = [
+            self._even_derivative(derivative_order, squared) for derivative_order in range(order + 1)
+        ]
+        return tuple(
+            value if derivative_order % 2 else phi * value
+            for derivative_order, value in enumerate(even_parts)
+        )
 
     def torque(self, phi: FloatArray) -> FloatArray:
         """Return the torque c1 phi + c3 phi^3 + ..."""
-        return phi * self._derivative(0, phi * phi)
+        return phi * self._even_derivative(0, phi * phi)
 
     def stiffness(self, phi: FloatArray) -> FloatArray:
         """Return the stiffness."""
-        return self._derivative(1, phi * phi)
+        return self._even_derivative(1, phi * phi)
 
     def slope(self, phi: FloatArray) -> FloatArray:
         """Return the slope."""
-        return phi * self._derivative(2, phi * phi)
+        return phi * self._even_derivative(2, phi * phi)
 
     def curvature(self, phi: FloatArray) -> FloatArray:
         """Return the curvature."""
-        return self._derivative(3, phi * phi)
+        return self._even_derivative(3, phi * phi)
 
     def energy(self, phi: FloatArray) -> FloatArray:
         """Return the energy, the integral of the torque."""
         squared = phi * phi
-        return squared * _series([each / (2 * n + 2) for n, each in enumerate(self._coefficients)], squared)
+        return squared * _evaluate_series(
+            [coefficient / (2 * index + 2) for index, coefficient in enumerate(self._coefficients)], squared
+        )
 
     def deflection(self, torque: FloatArray) -> FloatArray:
         """Return the inverse, by safeguarded iteration from the least deflection of any term alone."""
@@ -93,20 +104,23 @@ class Polynomial(SpringLaw):
         high = reduce(np.minimum, bounds)
         return with_sign_of(torque, *deflection_at_torque(self, load, np.zeros_like(load), high, start=high))
 
-    def _derivative(self, order: int, squared: FloatArray) -> FloatArray:
+    def _even_derivative(self, order: int, squared: FloatArray) -> FloatArray:
         """Return a derivative of the torque without the factor phi that those of even order have."""
-        return _series(self._factors[order], squared)
+        return _evaluate_series(self._derivative_coefficients[order], squared)
 
     @cached_property
-    def _factors(self) -> list[list[float]]:
+    def _derivative_coefficients(self) -> list[list[float]]:
         """Coefficients of the torque and of each derivative."""
         return [
-            [math.perm(2 * n + 1, order) * each for n, each in enumerate(self._coefficients)][order // 2 :]
+            [
+                math.perm(2 * index + 1, order) * coefficient
+                for index, coefficient in enumerate(self._coefficients)
+            ][order // 2 :]
             for order in range(4)
         ]
 
 
-def _series(coefficients: Sequence[float], x: FloatArray) -> FloatArray:
+def _evaluate_series(coefficients: Sequence[float], x: FloatArray) -> FloatArray:
     """Return the power series with coefficients from the constant on."""
     if not coefficients:
         return np.zeros_like(x)

@@ -28,11 +28,11 @@ class Sinh(LawByDerivatives):
 
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Return torque and stiffness from one exponential function, and a^2 times each."""
-        grown = np.expm1(np.abs(self.a * phi))
-        shrunk = 1 / (1 + grown)
-        half = self.k / 2 * grown
-        torque = np.copysign(half * (1 + shrunk), phi)
-        stiffness = self.a * (self.k + half * (1 - shrunk))
+        growth = np.expm1(np.abs(self.a * phi))
+        decay = 1 / (1 + growth)
+        half = self.k / 2 * growth
+        torque = np.copysign(half * (1 + decay), phi)
+        stiffness = self.a * (self.k + half * (1 - decay))
         return (torque, stiffness, self.a**2 * torque, self.a**2 * stiffness)[: order + 1]
 
     def energy(self, phi: FloatArray) -> FloatArray:

@@ -43,12 +43,14 @@ class SplineCurve:
 
     def __call__(self, phi: FloatArray, first: int, last: int) -> tuple[FloatArray, ...]:
         """Return the derivatives of the potential from order `first`, 0 or 1, to order `last`, at most 4."""
-        origin, *coefficients = look_up(self._tables[first], self._piece(phi))
-        sizes = _with_derivatives(coefficients, np.abs(phi) - origin, last - first)
+        origin, *coefficients = look_up(self._coefficient_tables[first], self._piece_index(phi))
+        magnitudes = _horner_derivatives(coefficients, np.abs(phi) - origin, last - first)
         side = np.copysign(1.0, phi)
-        return tuple(side * size if order % 2 else size for order, size in enumerate(sizes, first))
+        return tuple(
+            side * magnitude if order % 2 else magnitude for order, magnitude in enumerate(magnitudes, first)
+        )
 
-    def _piece(self, phi: FloatArray) -> IndexArray:
+    def _piece_index(self, phi: FloatArray) -> IndexArray:
         """Return the index of the polynomial; at an edge, rounding may choose the neighbor, equal there."""
         (low, high), (below, above) = self.domain, self.pieces
         position = phi * (above / high)
@@ -58,7 +60,7 @@ class SplineCurve:
         return cell_of(position, below + above)
 
     @cached_property
-    def _tables(self) -> tuple[Values, Values]:
+    def _coefficient_tables(self) -> tuple[Values, Values]:
         """Origins with the coefficients of the potential, and of its derivative, each over the pieces."""
         return (self.origins, *self._derivative(0)), (self.origins, *self._derivative(1))
 
@@ -69,17 +71,17 @@ class SplineCurve:
         return factors[:, None] * self.coefficients[order:]
 
 
-def _with_derivatives(coefficients: Sequence[FloatArray], x: FloatArray, order: int) -> list[FloatArray]:
+def _horner_derivatives(coefficients: Sequence[FloatArray], x: FloatArray, order: int) -> list[FloatArray]:
     """Return a polynomial and its derivatives up to an order, by repeated Horner schemes."""
     *lower, highest = coefficients
     values = [highest]
     for coefficient in reversed(lower):
-        top = values[-1]
+        leading = values[-1]
         for power in range(len(values) - 1, 0, -1):
             values[power] = values[power] * x + values[power - 1]
         values[0] = values[0] * x + coefficient
         if len(values) <= order:
-            values.append(top)
+            values.append(leading)
     return [math.factorial(power) * value if power > 1 else value for power, value in enumerate(values)]
 
 
@@ -94,14 +96,16 @@ def spline_knots(low: float, high: float, pieces: int, degree: int) -> FloatArra
 def spline_curve(knots: FloatArray, weights: FloatArray, degree: int, integrate: Integrate) -> SplineCurve:
     """Return the curve of a spline with such knots, weights and degree."""
     origins, coefficients = _potential_above_zero(knots, weights, degree, integrate)
-    above = origins.size
+    pieces_above = origins.size
     if knots[0] < 0:
-        down, turned = _potential_above_zero(-knots[::-1], weights[::-1], degree, integrate)
-        origins = np.concatenate((down[::-1], origins))
-        coefficients = np.hstack((turned[:, ::-1], coefficients))
+        mirrored_origins, mirrored_coefficients = _potential_above_zero(
+            -knots[::-1], weights[::-1], degree, integrate
+        )
+        origins = np.concatenate((mirrored_origins[::-1], origins))
+        coefficients = np.hstack((mirrored_coefficients[:, ::-1], coefficients))
     return SplineCurve(
         domain=(float(knots[0]), float(knots[-1])),
-        pieces=(origins.size - above, above),
+        pieces=(origins.size - pieces_above, pieces_above),
         origins=origins,
         coefficients=coefficients,
     )
@@ -117,9 +121,9 @@ def _potential_above_zero(
 
 def _spline_above_zero(knots: FloatArray, weights: FloatArray, degree: int) -> PPoly:
     """Return the spline from its knot at zero to the last; the other knots there enclose nothing."""
-    whole = scipy.interpolate.PPoly.from_spline((knots, weights, degree))
-    first = int(np.searchsorted(whole.x, 0.0, side="right")) - 1
-    return scipy.interpolate.PPoly(whole.c[:, first:-degree], whole.x[first:-degree])
+    spline = scipy.interpolate.PPoly.from_spline((knots, weights, degree))
+    first = int(np.searchsorted(spline.x, 0.0, side="right")) - 1
+    return scipy.interpolate.PPoly(spline.c[:, first:-degree], spline.x[first:-degree])
 
 
 def times_deflection(curve: PPoly) -> PPoly:

@@ -43,10 +43,14 @@ def fit_curve(deflection: FloatArray, torque: FloatArray) -> SplineCurve:
     knots = spline_knots(float(deflection[0]), float(deflection[-1]), pieces, DEGREE)
     shapes = [_energy_curve(knots, weights, 0.0) for weights in np.eye(len(knots) - DEGREE - 1)]
     columns = np.column_stack([deflection, *(shape(deflection, 1, 1)[0] for shape in shapes)])
-    sizes = np.maximum(np.abs(columns).max(axis=0), LEAST_SHAPE_SIZE)
-    least = REST_STIFFNESS_SHARE * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
-    excess, *weights = scipy.optimize.nnls(columns / sizes, torque - least * deflection)[0] / sizes
-    return _energy_curve(knots, np.array(weights), least + excess)
+    scales = np.maximum(np.abs(columns).max(axis=0), LEAST_SHAPE_SIZE)
+    smallest_stiffness = (
+        REST_STIFFNESS_SHARE * np.ptp(torque) / np.ptp(deflection) if deflection[0] < 0 else 0.0
+    )
+    excess_stiffness, *weights = (
+        scipy.optimize.nnls(columns / scales, torque - smallest_stiffness * deflection)[0] / scales
+    )
+    return _energy_curve(knots, np.array(weights), smallest_stiffness + excess_stiffness)
 
 
 def _energy_curve(knots: FloatArray, weights: FloatArray, stiffness_at_rest: float) -> SplineCurve:
@@ -68,7 +72,7 @@ SHAPE_TOLERANCE = 1e-3
 """Violation of the shape that counts as measurement noise, as a share of the torque range; for example, of a
 point above its chord."""
 
-NO_MISFIT, POOR_MISFIT = 1e-6, 0.01
+NEGLIGIBLE_MISFIT, POOR_MISFIT = 1e-6, 0.01
 """Misfits of points, as shares of the range: below the first, no test bench could measure it; smooth devices
 stay below the second, while a kink in 20 to 120 points causes 1 to 6 %."""
 
@@ -153,10 +157,10 @@ class MeasuredSpring(LawByDerivatives):
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
         """Return deflection and state by one iteration."""
         low, high = (np.full_like(torque, end) for end in self.domain)
-        least, largest = self.torque_range
-        carried = np.minimum(np.maximum(torque, least), largest)
-        start = np.minimum(np.maximum(self._first_guess(carried), low), high)
-        return deflection_at_torque(self, carried, low, high, start)
+        smallest, largest = self.torque_range
+        clipped = np.minimum(np.maximum(torque, smallest), largest)
+        start = np.minimum(np.maximum(self._first_guess(clipped), low), high)
+        return deflection_at_torque(self, clipped, low, high, start)
 
     @cached_property
     def _first_guess(self) -> FirstGuess:
@@ -168,15 +172,15 @@ class MeasuredSpring(LawByDerivatives):
 def misfit_warnings(table: CsvTable, misfit: FloatArray) -> tuple[str, ...]:
     """Return warnings if the misfit of a curve at the points of a table, (rows,), is large."""
     row, share = worst_misfit(table, misfit)
-    if share < NO_MISFIT:
+    if share < NEGLIGIBLE_MISFIT:
         return ()
-    missed = f"the curve through {table.source.path} misses a measured {table.columns[1]} by up to "
+    message = f"the curve through {table.source.path} misses a measured {table.columns[1]} by up to "
     amount = f"{abs(misfit[row]):.2g} ({100 * share:.2g} % of its range)"
     if share < POOR_MISFIT:
-        return (missed + amount,)
+        return (message + amount,)
     line = table.line_of(row)
-    where = f"at the deflection {table.values[row, 0]:.4g}{f' in line {line}' if line else ''}"
-    return (f"{missed}{amount}, {where}: near a kink or an outlier, which the curve does not follow",)
+    place = f"at the deflection {table.values[row, 0]:.4g}{f' in line {line}' if line else ''}"
+    return (f"{message}{amount}, {place}: near a kink or an outlier, which the curve does not follow",)
 
 
 def worst_misfit(table: CsvTable, misfit: FloatArray) -> tuple[int, float]:
@@ -190,8 +194,8 @@ def wrong_rows(table: CsvTable) -> Iterator[Problem]:
     deflection, path = table.values[:, 0], table.source.path
     if len(deflection) < MIN_ROWS:
         yield Problem(path, 0, f"expected at least {MIN_ROWS} rows, found {len(deflection)}")
-    elif sizes := list(_wrong_sizes(table)):
-        yield from sizes
+    elif problems := list(_unusable_values(table)):
+        yield from problems
     elif (steps := np.flatnonzero(np.diff(deflection) <= 0)).size:
         message = "the deflection does not increase from the row before"
         yield Problem(path, table.line_of(steps[0] + 1), message)
@@ -202,24 +206,26 @@ def _hardening_problems(table: CsvTable) -> Iterator[Problem]:
     deflection, torque = table.values.T
     path = table.source.path
 
-    def at(row: int, message: str) -> Problem:
+    def problem_at(row: int, message: str) -> Problem:
         return Problem(path, table.line_of(row), message)
 
     if rows := list(wrong_rows(table)):
         yield from rows
     elif not deflection[0] <= 0 < deflection[-1]:
-        yield at(0, "the deflections must go from zero (a spring that only pulls) or below to above zero")
+        yield problem_at(
+            0, "the deflections must go from zero (a spring that only pulls) or below to above zero"
+        )
     elif (steps := np.flatnonzero(np.diff(torque) <= 0)).size:
-        yield at(steps[0] + 1, "the torque does not increase from the row before, as a spring's does")
+        yield problem_at(steps[0] + 1, "the torque does not increase from the row before, as a spring's does")
     elif (offset := abs(np.interp(0, deflection, torque))) > 10 * SHAPE_TOLERANCE * np.ptp(torque):
         yield Problem(
             path, 0, f"the torque at zero deflection is {offset:.4g}, expected zero; remove the offset"
         )
     else:
-        yield from (at(row, message) for row, message in _wrong_bends(deflection, torque))
+        yield from (problem_at(row, message) for row, message in _non_hardening_rows(deflection, torque))
 
 
-def _wrong_sizes(table: CsvTable) -> Iterator[Problem]:
+def _unusable_values(table: CsvTable) -> Iterator[Problem]:
     """Yield rows with values too large, or an end of the curve too near to zero, as in declared fields."""
     for name, column in zip(table.columns, table.values.T, strict=True):
         for row in np.flatnonzero(np.abs(column) > LARGEST)[:1]:
@@ -234,11 +240,11 @@ def _wrong_sizes(table: CsvTable) -> Iterator[Problem]:
                 yield Problem(table.source.path, table.line_of(row), message)
 
 
-def _wrong_bends(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
+def _non_hardening_rows(deflection: FloatArray, torque: FloatArray) -> Iterator[tuple[int, str]]:
     """Yield rows where the torque is not convex for positive, or not concave for negative deflections."""
     left, middle, right = deflection[:-2], deflection[1:-1], deflection[2:]
-    share = (middle - left) / (right - left)
-    chord = (1 - share) * torque[:-2] + share * torque[2:]
+    fraction = (middle - left) / (right - left)
+    chord = (1 - fraction) * torque[:-2] + fraction * torque[2:]
     above_chord = torque[1:-1] - chord
     tolerance = SHAPE_TOLERANCE * np.ptp(torque)
     for row in np.flatnonzero((left >= 0) & (above_chord > tolerance)):

@@ -79,7 +79,9 @@ class Mirrored(SpringLaw):
     def derivatives(self, phi: FloatArray, order: int) -> tuple[FloatArray, ...]:
         """Return the torque, odd in the deflection, and its derivatives, even and odd in turn."""
         values = self.law.derivatives(-phi, order)
-        return tuple(value if each % 2 else -value for each, value in enumerate(values))
+        return tuple(
+            value if derivative_order % 2 else -value for derivative_order, value in enumerate(values)
+        )
 
     def deflection_and_state(self, torque: FloatArray) -> tuple[FloatArray, SpringState]:
         """Return deflection and state of the law at the opposite torque, mirrored."""
@@ -243,11 +245,11 @@ class ExponentialPair(Pair):
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
         """Solve (14) for each sample; see `Pair.solve`."""
-        a, rest = self.first.a, self.first.c + self.second.c
-        lower = a * (np.abs(tau_e) + rest)
-        pull = np.maximum(stiffness, lower) / a - rest
+        a, torque_scale = self.first.a, self.first.c + self.second.c
+        lower = a * (np.abs(tau_e) + torque_scale)
+        tension = np.maximum(stiffness, lower) / a - torque_scale
         return tendon_solution(
             lower,
-            phi_1=self.first.deflection((pull + tau_e) / 2),
-            phi_2=-self.second.deflection((pull - tau_e) / 2),
+            phi_1=self.first.deflection((tension + tau_e) / 2),
+            phi_2=-self.second.deflection((tension - tau_e) / 2),
         )

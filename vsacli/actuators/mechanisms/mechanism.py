@@ -55,8 +55,10 @@ class MechanismState(ElasticState):
         The stiffness may be a small difference of two large terms, which the last digits of phi and of the
         setting determine.
         """
-        turned = np.abs(self.matrix.stiffness_1 * unknowns[0]) + np.abs(self.matrix.stiffness_2 * unknowns[1])
-        return np.abs(self.tau_e) + SMALL_DEFLECTION * self.stiffness, self.stiffness + turned
+        stiffness_terms = np.abs(self.matrix.stiffness_1 * unknowns[0]) + np.abs(
+            self.matrix.stiffness_2 * unknowns[1]
+        )
+        return np.abs(self.tau_e) + SMALL_DEFLECTION * self.stiffness, self.stiffness + stiffness_terms
 
 
 class DeflectionState(MechanismState):
@@ -118,10 +120,10 @@ class DeflectionState(MechanismState):
     ) -> tuple[FloatArray, ...]:
         """Return A^-1 of (tau_e'', sigma'') minus terms quadratic in the rates; theta_1'' = phi'' + q''."""
         p, dphi, ds = self._partials, rates[0], rates[1]
-        squared, mixed, of_setting = dphi * dphi, 2 * dphi * ds, ds * ds
+        squared, mixed, setting_squared = dphi * dphi, 2 * dphi * ds, ds * ds
         ddphi, dds = self.matrix.solve(
-            ddtau_e - (p.T_pp * squared + p.T_ps * mixed + p.T_ss * of_setting),
-            ddstiffness - (p.T_ppp * squared + p.T_pps * mixed + p.T_pss * of_setting),
+            ddtau_e - (p.T_pp * squared + p.T_ps * mixed + p.T_ss * setting_squared),
+            ddstiffness - (p.T_ppp * squared + p.T_pps * mixed + p.T_pss * setting_squared),
         )
         return ddphi + ddq, dds
 

@@ -31,9 +31,9 @@ class PairState(NamedTuple):
     @classmethod
     def of(cls, values: Values) -> PairState:
         """Return the state from its `values`."""
-        phi_1, phi_2, *springs = values
+        phi_1, phi_2, *spring_values = values
         count = len(SpringState._fields)
-        return cls(phi_1, phi_2, SpringState(*springs[:count]), SpringState(*springs[count:]))
+        return cls(phi_1, phi_2, SpringState(*spring_values[:count]), SpringState(*spring_values[count:]))
 
     @property
     def values(self) -> Values:
@@ -57,9 +57,9 @@ class PairState(NamedTuple):
 
     def regularized(self) -> PairState:
         """Return the state with both stiffnesses set to 1 where both springs are slack, to avoid 0/0."""
-        slack = self.stiffness == 0
+        is_slack = self.stiffness == 0
         one, two = (
-            spring._replace(sigma=np.where(slack, 1.0, spring.sigma)) for spring in (self.one, self.two)
+            spring._replace(sigma=np.where(is_slack, 1.0, spring.sigma)) for spring in (self.one, self.two)
         )
         return self._replace(one=one, two=two)
 
@@ -74,14 +74,14 @@ class PairState(NamedTuple):
         )
 
 
-def under(law: SpringLaw, torque: FloatArray) -> tuple[FloatArray, SpringState]:
+def spring_under_torque(law: SpringLaw, torque: FloatArray) -> tuple[FloatArray, SpringState]:
     """Return deflection and state of a spring under a torque, as a subroutine of compiled code."""
 
-    def found(torque: FloatArray) -> Values:
+    def deflection_and_state(torque: FloatArray) -> Values:
         phi, state = law.deflection_and_state(torque)
         return phi, *state
 
-    phi, *state = subroutine(found, (torque,))
+    phi, *state = subroutine(deflection_and_state, (torque,))
     return phi, SpringState(*state)
 
 
@@ -123,7 +123,10 @@ class Balance:
 
     def state_under(self, tau_1: FloatArray, tau_2: FloatArray) -> PairState:
         """Return the state of both springs at their torques."""
-        (phi_1, one), (phi_2, two) = under(self.first, tau_1), under(self.second, tau_2)
+        (phi_1, one), (phi_2, two) = (
+            spring_under_torque(self.first, tau_1),
+            spring_under_torque(self.second, tau_2),
+        )
         return PairState(phi_1, phi_2, one, two)
 
     def state(self, phi_1: FloatArray, phi_2: FloatArray) -> PairState:
@@ -221,7 +224,7 @@ def first_guess(inner: PairState, inner_stiffness: FloatArray, demand: FloatArra
     parabola = StiffnessParabola.of(inner)
     spread = np.where(excess > 0, 2 * sign * excess / parabola.slope_sum(sign * excess, sign), 0.0)
     step_1, step_2 = parabola.share_1 * spread, -parabola.share_2 * spread
-    correction = _correction(inner, step_1, step_2, spread, demand)
+    correction = _shift_correction(inner, step_1, step_2, spread, demand)
     return inner.phi_1 + step_1 + correction, inner.phi_2 + step_2 + correction
 
 
@@ -234,8 +237,8 @@ def _quadratic_part(excess: FloatArray) -> FloatArray:
     excess = np.maximum(excess, 0)
     argument = np.log1p(excess + np.sqrt(excess * (excess + 2)))
     squared = argument * argument
-    part: FloatArray = squared * (0.5 - QUARTIC_COEFFICIENT * np.minimum(squared, MAX_SQUARED_ARGUMENT))
-    return part
+    quadratic: FloatArray = squared * (0.5 - QUARTIC_COEFFICIENT * np.minimum(squared, MAX_SQUARED_ARGUMENT))
+    return quadratic
 
 
 def third_order_step(
@@ -243,24 +246,26 @@ def third_order_step(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return steps of phi_1 and phi_2 towards tau_e and the demand, and the relative error after them."""
     parabola = StiffnessParabola.of(state)
-    missing, unbalanced = demand - parabola.stiffness, tau_e - state.torque
-    shift, growth = unbalanced / parabola.stiffness, missing - parabola.shift_slope * unbalanced
+    stiffness_error, torque_error = demand - parabola.stiffness, tau_e - state.torque
+    shift, growth = torque_error / parabola.stiffness, stiffness_error - parabola.shift_slope * torque_error
     slope_sum = parabola.slope_sum(growth, sign)
     spread = 2 * growth / slope_sum
     step_1, step_2 = shift + parabola.share_1 * spread, shift - parabola.share_2 * spread
-    correction = _correction(state, step_1, step_2, spread, demand)
-    shift_size, missing_share = np.abs(shift), np.abs(missing) / demand
-    shift_share = shift_size / (np.abs(state.phi_1) + np.abs(state.phi_2))
+    correction = _shift_correction(state, step_1, step_2, spread, demand)
+    shift_magnitude, missing_share = np.abs(shift), np.abs(stiffness_error) / demand
+    shift_share = shift_magnitude / (np.abs(state.phi_1) + np.abs(state.phi_2))
     change = (
-        np.abs(parabola.curvature / slope_sum) * (np.abs(spread) + shift_size) + missing_share + shift_share
+        np.abs(parabola.curvature / slope_sum) * (np.abs(spread) + shift_magnitude)
+        + missing_share
+        + shift_share
     )
     error = change * (change * missing_share + shift_share)
     return step_1 + correction, step_2 + correction, error
 
 
-def _correction(
+def _shift_correction(
     state: PairState, step_1: FloatArray, step_2: FloatArray, spread: FloatArray, stiffness: FloatArray
 ) -> FloatArray:
     """Return a further shift of both sides, from the tangent back to the curve of equal tau_e."""
-    most = MAX_CORRECTION_SHARE * np.abs(spread)
-    return np.minimum(np.maximum(-state.linearization_error(step_1, step_2) / stiffness, -most), most)
+    largest = MAX_CORRECTION_SHARE * np.abs(spread)
+    return np.minimum(np.maximum(-state.linearization_error(step_1, step_2) / stiffness, -largest), largest)

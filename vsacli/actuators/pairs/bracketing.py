@@ -36,32 +36,32 @@ def bracketed_root(
     """
 
     def value(x: FloatArray, *constants: FloatArray) -> FloatArray:
-        (f,) = subroutine(lambda *known: (function(*known),), (x, *constants))
+        (f,) = subroutine(lambda *arguments: (function(*arguments),), (x, *constants))
         return f
 
     def step(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         share, x_1, f_1, x_2, f_2, _, _ = state
         x = x_1 + share * (x_2 - x_1)
         f = value(x, *constants)
-        same = (f > 0) == (f_1 > 0)
-        x_3, f_3 = np.where(same, x_1, x_2), np.where(same, f_1, f_2)
-        x_2, f_2 = np.where(same, x_2, x_1), np.where(same, f_2, f_1)
+        same_sign = (f > 0) == (f_1 > 0)
+        x_3, f_3 = np.where(same_sign, x_1, x_2), np.where(same_sign, f_1, f_2)
+        x_2, f_2 = np.where(same_sign, x_2, x_1), np.where(same_sign, f_2, f_1)
         width = np.abs(x_2 - x)
         resolution = ROOT_RTOL * np.minimum(np.abs(x), np.abs(x_2)) + ROOT_ATOL
-        least = resolution / np.maximum(width, ROOT_ATOL)
-        share = np.clip(_next_share(x, f, x_2, f_2, x_3, f_3), least, 1 - least)
+        smallest_share = resolution / np.maximum(width, ROOT_ATOL)
+        share = np.clip(_interpolated_share(x, f, x_2, f_2, x_3, f_3), smallest_share, 1 - smallest_share)
         return (share, x, f, x_2, f_2, x_3, f_3), (width <= 2 * resolution) | (f == 0)
 
-    at_low, at_high = value(low, *constants), value(high, *constants)
-    half = np.full_like(low, 0.5)
-    start = (half, low, at_low, high, at_high, high, at_high)
+    f_low, f_high = value(low, *constants), value(high, *constants)
+    half_share = np.full_like(low, 0.5)
+    start = (half_share, low, f_low, high, f_high, high, f_high)
     _, x_1, f_1, x_2, f_2, _, _ = repeat(step, start, constants, MAX_STEPS)
-    enclosed = (at_low < 0) & (at_high > 0) | (at_low > 0) & (at_high < 0)
-    end = np.where(np.abs(at_low) <= np.abs(at_high), low, high)
-    return np.where(enclosed, np.where(np.abs(f_1) <= np.abs(f_2), x_1, x_2), end)
+    is_bracketed = (f_low < 0) & (f_high > 0) | (f_low > 0) & (f_high < 0)
+    nearer_end = np.where(np.abs(f_low) <= np.abs(f_high), low, high)
+    return np.where(is_bracketed, np.where(np.abs(f_1) <= np.abs(f_2), x_1, x_2), nearer_end)
 
 
-def _next_share(
+def _interpolated_share(
     x_1: FloatArray, f_1: FloatArray, x_2: FloatArray, f_2: FloatArray, x_3: FloatArray, f_3: FloatArray
 ) -> FloatArray:
     """Return the next point, as a share of the way from x_1 to x_2.

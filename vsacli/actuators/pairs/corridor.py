@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws.law import SpringState
-from vsacli.actuators.pairs.balance import Balance, PairState, under
+from vsacli.actuators.pairs.balance import Balance, PairState, spring_under_torque
 from vsacli.actuators.pairs.folds import FoldMap, outermost_fold
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, where_needed
@@ -56,10 +56,10 @@ class Corridor(NamedTuple):
 
 def corridor(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Corridor:
     """Return the monotone piece that extends to the largest preload, for each tau_e (samples,)."""
-    least, largest = balance.preload_range(tau_e)
-    carried = least <= largest
+    smallest, largest = balance.preload_range(tau_e)
+    carried = smallest <= largest
     exists, fold = outermost_fold(balance, folds, tau_e)
-    critical = carried & exists & ((tau_e != 0) | ((least < 0) & (largest > 0)))
+    critical = carried & exists & ((tau_e != 0) | ((smallest < 0) & (largest > 0)))
     inner = PairState.of(
         _evaluate_at_end(
             balance, SMALLEST_PRELOAD, tau_e, carried & ~critical, fold.values, lambda state: state.values
@@ -75,7 +75,7 @@ def corridor(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> Corridor:
         outer=_nan_unless_carried(outer, carried),
         rising=outer.stiffness >= inner.stiffness,
         critical=critical,
-        slack=balance.is_slack(tau_e, least),
+        slack=balance.is_slack(tau_e, smallest),
         state=inner,
     )
 
@@ -99,9 +99,9 @@ def _evaluate_at_end(
     balance: Balance,
     end: int,
     tau_e: FloatArray,
-    chosen: BoolArray,
+    mask: BoolArray,
     otherwise: Values,
-    wanted: Callable[[PairState], Values],
+    values_of: Callable[[PairState], Values],
 ) -> Values:
     """Return values of the springs at an end of the preload; arrays (samples,).
 
@@ -109,29 +109,31 @@ def _evaluate_at_end(
         balance: Springs.
         end: `SMALLEST_PRELOAD` or `LARGEST_PRELOAD`.
         tau_e: Elastic torque.
-        chosen: Samples at which to compute the values.
+        mask: Samples at which to compute the values.
         otherwise: Values elsewhere, and where the preload has no end.
-        wanted: Function from the state at the end to the values, as many as in `otherwise`.
+        values_of: Function from the state at the end to the values, as many as in `otherwise`.
     """
     first, second = balance.first, balance.second
     tau_1, tau_2 = first.torque_range[end], second.torque_range[1 - end]
     first_ends = tau_1 <= tau_e - tau_2 if end == LARGEST_PRELOAD else tau_1 >= tau_e - tau_2
 
-    def with_first(tau_e: FloatArray) -> Values:
+    def values_at_first_end(tau_e: FloatArray) -> Values:
         phi_1 = np.full_like(tau_e, first.domain[end])
-        phi_2, two = under(second, tau_e - tau_1)
-        return wanted(PairState(phi_1, phi_2, _broadcast_state(balance.domain_ends[0][end], tau_e), two))
+        phi_2, two = spring_under_torque(second, tau_e - tau_1)
+        return values_of(PairState(phi_1, phi_2, _broadcast_state(balance.domain_ends[0][end], tau_e), two))
 
-    def with_second(tau_e: FloatArray) -> Values:
-        phi_1, one = under(first, tau_e - tau_2)
+    def values_at_second_end(tau_e: FloatArray) -> Values:
+        phi_1, one = spring_under_torque(first, tau_e - tau_2)
         phi_2 = np.full_like(tau_e, second.domain[1 - end])
-        return wanted(PairState(phi_1, phi_2, one, _broadcast_state(balance.domain_ends[1][1 - end], tau_e)))
+        return values_of(
+            PairState(phi_1, phi_2, one, _broadcast_state(balance.domain_ends[1][1 - end], tau_e))
+        )
 
     values = otherwise
     if math.isfinite(tau_1):
-        values = where_needed(chosen & first_ends, with_first, (tau_e,), values)
+        values = where_needed(mask & first_ends, values_at_first_end, (tau_e,), values)
     if math.isfinite(tau_2):
-        values = where_needed(chosen & ~first_ends, with_second, (tau_e,), values)
+        values = where_needed(mask & ~first_ends, values_at_second_end, (tau_e,), values)
     return values
 
 

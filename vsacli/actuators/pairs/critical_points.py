@@ -93,9 +93,9 @@ class CriticalCurve(NamedTuple):
         """Preload torque."""
         return (self.tau_1 - self.tau_2) / 2
 
-    def take(self, chosen: slice | IndexArray) -> CriticalCurve:
+    def take(self, points: slice | IndexArray) -> CriticalCurve:
         """Return a selection of the points."""
-        return CriticalCurve(*(values[chosen] for values in self))
+        return CriticalCurve(*(values[points] for values in self))
 
 
 class _Matches(NamedTuple):
@@ -118,14 +118,14 @@ def sample_hardening(law: SpringLaw) -> Hardening | None:
         phi = law.deflection(SAMPLED_TORQUES)
     phi = np.concatenate(([0.0], phi))
     peaks = _hardening_peaks(law, phi)
-    phi = np.unique(np.concatenate((phi, peaks, *(_around(peak, phi) for peak in peaks))))
+    phi = np.unique(np.concatenate((phi, peaks, *(_samples_near_peak(peak, phi) for peak in peaks))))
     rho = law.hardening(phi)
     finite = np.isfinite(rho)
     phi, rho = phi[finite], rho[finite]
     return Hardening(law, phi, rho, np.searchsorted(phi, peaks))
 
 
-def _around(peak: float, phi: FloatArray) -> FloatArray:
+def _samples_near_peak(peak: float, phi: FloatArray) -> FloatArray:
     """Return deflections on either side of a peak, denser towards it."""
     above = int(np.searchsorted(phi, peak, side="right"))
     below = int(np.searchsorted(phi, peak)) - 1
@@ -144,17 +144,19 @@ def _hardening_peaks(law: SpringLaw, phi: FloatArray) -> FloatArray:
         return np.where(np.abs(difference) <= rounding, 0.0, difference)
 
     sign = np.sign(slope(phi))
-    kept = np.flatnonzero(sign)
-    turn = np.flatnonzero(sign[kept[:-1]] != sign[kept[1:]])
-    peaks: FloatArray = np.unique(bracketed_root(slope, phi[kept[turn]], phi[kept[turn + 1]]))
+    nonzero = np.flatnonzero(sign)
+    sign_changes = np.flatnonzero(sign[nonzero[:-1]] != sign[nonzero[1:]])
+    peaks: FloatArray = np.unique(
+        bracketed_root(slope, phi[nonzero[sign_changes]], phi[nonzero[sign_changes + 1]])
+    )
     inner: FloatArray = peaks[(peaks > phi[0]) & (peaks < phi[-1])]  # rounding moves one onto an end
     return inner
 
 
 def critical_curves(first: SpringLaw, second: SpringLaw) -> Iterator[CriticalCurve]:
     """Yield all critical points of positive torques, in curves over which tau_e increases."""
-    one, two = sample_hardening(first), sample_hardening(second)
-    curves = list(_curves(one, two)) if one and two else []
+    hardening_1, hardening_2 = sample_hardening(first), sample_hardening(second)
+    curves = list(_monotone_curves(hardening_1, hardening_2)) if hardening_1 and hardening_2 else []
     if not curves:
         return
     brackets = [_cusp_brackets(curve.tau_e) for curve in curves]
@@ -166,28 +168,32 @@ def critical_curves(first: SpringLaw, second: SpringLaw) -> Iterator[CriticalCur
     )
     cusps = _cusp_points(first, second, low, high)
     counts = np.cumsum([0, *(len(low) for low, _ in brackets)])
-    for curve, ends, before, after in zip(curves, brackets, counts[:-1], counts[1:], strict=True):
-        yield from _split(curve, *ends, cusps.take(slice(before, after)))
+    for curve, ends, first_cusp, last_cusp in zip(curves, brackets, counts[:-1], counts[1:], strict=True):
+        yield from _split_at_cusps(curve, *ends, cusps.take(slice(first_cusp, last_cusp)))
 
 
-def _curves(one: Hardening, two: Hardening) -> Iterator[CriticalCurve]:
+def _monotone_curves(one: Hardening, two: Hardening) -> Iterator[CriticalCurve]:
     """Yield the curve of each pair of monotone pieces of hardening, if it has at least two points.
 
     Along it both torques increase if both pieces rise or both fall; otherwise one increases while the other
     decreases. Where one hardening is constant to rounding, so is the torque of the other spring.
     """
     pieces = list(product(one.pieces(), two.pieces()))
-    of_one = [_matches(one, first, two, second) for first, second in pieces]
-    of_two = [_matches(two, second, one, first) for first, second in pieces]
+    matches_1 = [_matching_nodes(one, first, two, second) for first, second in pieces]
+    matches_2 = [_matching_nodes(two, second, one, first) for first, second in pieces]
     points = _matched_points(
-        one.law, two.law, _Matches(*_concatenate_parts(of_one)), _Matches(*_concatenate_parts(of_two))
+        one.law, two.law, _Matches(*_concatenate_parts(matches_1)), _Matches(*_concatenate_parts(matches_2))
     )
-    alike = [one.rises(first) == two.rises(second) for first, second in pieces]
-    piece = np.repeat([*range(len(pieces))] * 2, [len(nodes.phi) for nodes in (*of_one, *of_two)])
+    same_direction = [one.rises(first) == two.rises(second) for first, second in pieces]
+    piece_of_point = np.repeat(
+        [*range(len(pieces))] * 2, [len(nodes.phi) for nodes in (*matches_1, *matches_2)]
+    )
     with np.errstate(divide="ignore"):
-        along = np.log(points.tau_1) + np.where(alike, 1.0, -1.0)[piece] * np.log(points.tau_2)
-    order = np.lexsort((along, piece))
-    bounds = np.searchsorted(piece[order], range(len(pieces) + 1))
+        curve_order = np.log(points.tau_1) + np.where(same_direction, 1.0, -1.0)[piece_of_point] * np.log(
+            points.tau_2
+        )
+    order = np.lexsort((curve_order, piece_of_point))
+    bounds = np.searchsorted(piece_of_point[order], range(len(pieces) + 1))
     for first, last in pairwise(bounds.tolist()):
         if last - first > 1:
             yield points.take(order[first:last])
@@ -197,21 +203,23 @@ def _concatenate_parts(parts: Iterable[tuple[FloatArray, ...]]) -> Iterator[Floa
     return map(np.concatenate, zip(*parts, strict=True))
 
 
-def _matches(of: Hardening, piece: slice, among: Hardening, other: slice) -> _Matches:
+def _matching_nodes(spring: Hardening, piece: slice, other_spring: Hardening, other_piece: slice) -> _Matches:
     """Return the nodes of a piece whose hardening occurs in a piece of the other spring, and where."""
-    direction = 1 if among.rises(other) else -1
-    ascending = np.maximum.accumulate(among.rho[other][::direction])
-    phi, rho = of.phi[piece], of.rho[piece]
-    shared = (rho >= ascending[0]) & (rho <= ascending[-1])
-    cell = np.clip(np.searchsorted(ascending, rho[shared]), 1, len(ascending) - 1)
-    ends = among.phi[other][::direction]
-    return _Matches(phi[shared], rho[shared], ends[cell - 1], ends[cell])
+    direction = 1 if other_spring.rises(other_piece) else -1
+    ascending = np.maximum.accumulate(other_spring.rho[other_piece][::direction])
+    phi, rho = spring.phi[piece], spring.rho[piece]
+    in_both = (rho >= ascending[0]) & (rho <= ascending[-1])
+    cell = np.clip(np.searchsorted(ascending, rho[in_both]), 1, len(ascending) - 1)
+    ends = other_spring.phi[other_piece][::direction]
+    return _Matches(phi[in_both], rho[in_both], ends[cell - 1], ends[cell])
 
 
-def _matched_points(first: SpringLaw, second: SpringLaw, of_one: _Matches, of_two: _Matches) -> CriticalCurve:
+def _matched_points(
+    first: SpringLaw, second: SpringLaw, matches_1: _Matches, matches_2: _Matches
+) -> CriticalCurve:
     """Return critical points at the nodes of each spring, with the other at the same hardening."""
-    phi_1 = np.concatenate((of_one.phi, _equal_hardening(first, *of_two[1:])))
-    phi_2 = np.concatenate((_equal_hardening(second, *of_one[1:]), of_two.phi))
+    phi_1 = np.concatenate((matches_1.phi, _equal_hardening(first, *matches_2[1:])))
+    phi_2 = np.concatenate((_equal_hardening(second, *matches_1[1:]), matches_2.phi))
     return CriticalCurve(phi_1, phi_2, first.torque(phi_1), second.torque(phi_2))
 
 
@@ -223,9 +231,9 @@ def _equal_hardening(law: SpringLaw, rho: FloatArray, low: FloatArray, high: Flo
 def _cusp_brackets(tau_e: FloatArray) -> tuple[IndexArray, IndexArray]:
     """Return pairs of points of a curve between which tau_e has a local extremum, by index."""
     change = np.diff(tau_e)
-    noticed = np.flatnonzero(np.abs(change) > CUSP_RTOL * tau_e[1:])
-    turns = np.flatnonzero(np.diff(np.sign(change[noticed])))
-    return noticed[turns], noticed[turns + 1] + 1
+    significant = np.flatnonzero(np.abs(change) > CUSP_RTOL * tau_e[1:])
+    turns = np.flatnonzero(np.diff(np.sign(change[significant])))
+    return significant[turns], significant[turns + 1] + 1
 
 
 def _cusp_points(
@@ -236,11 +244,11 @@ def _cusp_points(
     def partner(phi: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
         return _equal_hardening(second, first.hardening(phi), low, high)
 
-    def turning(phi: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    def tau_e_slope(phi: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
         return _hardening_slope(first, phi) + _hardening_slope(second, partner(phi, low, high))
 
     ends = (low.phi_2, high.phi_2)
-    phi_1 = bracketed_root(turning, low.phi_1, high.phi_1, ends)
+    phi_1 = bracketed_root(tau_e_slope, low.phi_1, high.phi_1, ends)
     phi_2 = partner(phi_1, *ends)
     return CriticalCurve(phi_1, phi_2, first.torque(phi_1), second.torque(phi_2))
 
@@ -251,14 +259,16 @@ def _hardening_slope(law: SpringLaw, phi: FloatArray) -> FloatArray:
     return (eta / sigma - (zeta / sigma) ** 2) / sigma
 
 
-def _split(
+def _split_at_cusps(
     curve: CriticalCurve, low: IndexArray, high: IndexArray, cusps: CriticalCurve
 ) -> Iterator[CriticalCurve]:
     """Yield a curve in parts of ascending tau_e, split at its cusps, each of which is between two points."""
     starts, ends = [0, *high.tolist()], [*low.tolist(), len(curve.phi_1) - 1]
     for index, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        around = cusps.take(slice(max(index - 1, 0), index)), cusps.take(slice(index, index + 1))
-        part = CriticalCurve(*_concatenate_parts((around[0], curve.take(slice(start, end + 1)), around[1])))
+        adjacent_cusps = cusps.take(slice(max(index - 1, 0), index)), cusps.take(slice(index, index + 1))
+        part = CriticalCurve(
+            *_concatenate_parts((adjacent_cusps[0], curve.take(slice(start, end + 1)), adjacent_cusps[1]))
+        )
         tau_e = part.tau_e
         yield part if tau_e[-1] > tau_e[0] else part.take(slice(None, None, -1))
 
@@ -290,8 +300,11 @@ def newton_step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
     """
     one, two = state.one, state.two
     (rho_1, rho_2), (along_1, along_2, divisor) = rho, along_critical_curve(state, rho)
-    torque, apart = tau_e - state.torque, (rho_1 - rho_2) / divisor
-    step_1, step_2 = torque * along_1 - apart * two.sigma, torque * along_2 + apart * one.sigma
+    torque, hardening_step = tau_e - state.torque, (rho_1 - rho_2) / divisor
+    step_1, step_2 = (
+        torque * along_1 - hardening_step * two.sigma,
+        torque * along_2 + hardening_step * one.sigma,
+    )
     stiffness = state.stiffness + one.zeta * step_1 + two.zeta * step_2
     shift = state.linearization_error(step_1, step_2) / stiffness
     return step_1 - shift, step_2 - shift
@@ -299,10 +312,10 @@ def newton_step(state: PairState, rho: Sides, tau_e: FloatArray) -> Sides:
 
 def is_short(state: PairState, rho: Sides, steps: Sides) -> BoolArray:
     """Return whether a step is so short that the next would be rounding; see `SHORT_RTOL`."""
-    (rho_1, rho_2), (size_1, size_2) = rho, map(np.abs, steps)
-    hardened = np.abs(rho_1) * size_1 + np.abs(rho_2) * size_2
-    short: BoolArray = (hardened <= SHORT_RTOL) & (
-        size_1 + size_2 <= SHORT_RTOL * (np.abs(state.phi_1) + np.abs(state.phi_2))
+    (rho_1, rho_2), (magnitude_1, magnitude_2) = rho, map(np.abs, steps)
+    hardening_change = np.abs(rho_1) * magnitude_1 + np.abs(rho_2) * magnitude_2
+    short: BoolArray = (hardening_change <= SHORT_RTOL) & (
+        magnitude_1 + magnitude_2 <= SHORT_RTOL * (np.abs(state.phi_1) + np.abs(state.phi_2))
     )
     return short
 
@@ -316,12 +329,12 @@ def bracketed_in_box(balance: Balance, tau_e: FloatArray, *box: FloatArray) -> V
         *box: Smallest and largest phi_1, smallest and largest phi_2; the box contains one critical point.
     """
     low_1, high_1, low_2, high_2 = box
-    at_least, at_most = balance.state(low_1, high_2), balance.state(high_1, low_2)
-    least = np.maximum(at_least.one.tau, tau_e - at_least.two.tau) - tau_e / 2
-    largest = np.minimum(at_most.one.tau, tau_e - at_most.two.tau) - tau_e / 2
+    smallest_state, largest_state = balance.state(low_1, high_2), balance.state(high_1, low_2)
+    smallest = np.maximum(smallest_state.one.tau, tau_e - smallest_state.two.tau) - tau_e / 2
+    largest = np.minimum(largest_state.one.tau, tau_e - largest_state.two.tau) - tau_e / 2
 
     def slope(t: FloatArray, tau_e: FloatArray) -> FloatArray:
         return balance.stiffness_slope(*balance.deflections_at(tau_e, t))
 
-    t = bracketed_root(slope, least, largest, (tau_e,))
+    t = bracketed_root(slope, smallest, largest, (tau_e,))
     return balance.deflections_at(tau_e, t)

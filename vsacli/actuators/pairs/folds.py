@@ -31,7 +31,7 @@ CUSP_SLOPE_RATIO = 30.0
 
 At cusps the ratio is a billion or more, or some thousand where rounding hides the beginning of the curve."""
 
-NONE = -1
+NO_CURVE = -1
 """Number of the curve where there is no fold."""
 
 
@@ -61,7 +61,7 @@ class _FoldCells(NamedTuple):
     Attributes:
         edges: Torques between the cells, (cells + 1,), ascending.
         corners: tau_e, phi_1 and phi_2 at either end, (3, 2, cells).
-        curve: Number of the curve, (cells,), or `NONE`.
+        curve: Number of the curve, (cells,), or `NO_CURVE`.
     """
 
     edges: FloatArray
@@ -76,13 +76,13 @@ def outermost_folds(balance: Balance) -> FoldPoints:
 
 def _cells_of_both_signs(first: SpringLaw, second: SpringLaw) -> _FoldCells:
     """Return the cells of negative torques, from the mirrored pair, followed by those of positive ones."""
-    above = _positive_cells(first, second)
-    below = _positive_cells(Mirrored(law=second), Mirrored(law=first))
-    turned = np.where(below.curve == NONE, NONE, below.curve + above.curve.max() + 1)
+    positive = _positive_cells(first, second)
+    mirrored = _positive_cells(Mirrored(law=second), Mirrored(law=first))
+    mirrored_curve = np.where(mirrored.curve == NO_CURVE, NO_CURVE, mirrored.curve + positive.curve.max() + 1)
     return _FoldCells(
-        np.concatenate((-below.edges[:0:-1], above.edges)),
-        np.concatenate((-below.corners[(0, 2, 1), ::-1, ::-1], above.corners), axis=-1),
-        np.concatenate((turned[::-1], above.curve)),
+        np.concatenate((-mirrored.edges[:0:-1], positive.edges)),
+        np.concatenate((-mirrored.corners[(0, 2, 1), ::-1, ::-1], positive.corners), axis=-1),
+        np.concatenate((mirrored_curve[::-1], positive.curve)),
     )
 
 
@@ -92,18 +92,18 @@ def _positive_cells(first: SpringLaw, second: SpringLaw) -> _FoldCells:
     knots = np.unique(np.concatenate([[0.0], *(curve.tau_e for curve in curves)]))
     middle = np.append((knots[:-1] + knots[1:]) / 2, np.inf)
     corners = np.full((3, 2, middle.size), np.nan)
-    outermost, number = np.full(middle.size, -np.inf), np.full(middle.size, NONE)
-    for each, curve in enumerate(curves):
+    outermost, curve_number = np.full(middle.size, -np.inf), np.full(middle.size, NO_CURVE)
+    for index, curve in enumerate(curves):
         tau_e = curve.tau_e
         preload = np.interp(middle, tau_e, curve.preload, left=-np.inf, right=-np.inf)
-        further = preload > outermost
-        outermost[further], number[further] = preload[further], each
-        cell = np.clip(np.searchsorted(tau_e, middle[further]) - 1, 0, len(tau_e) - 2)
+        is_outer = preload > outermost
+        outermost[is_outer], curve_number[is_outer] = preload[is_outer], index
+        cell = np.clip(np.searchsorted(tau_e, middle[is_outer]) - 1, 0, len(tau_e) - 2)
         for values, nodes in zip(corners, (tau_e, curve.phi_1, curve.phi_2), strict=True):
-            values[:, further] = nodes[cell], nodes[cell + 1]
+            values[:, is_outer] = nodes[cell], nodes[cell + 1]
     changes = np.flatnonzero(_corners_differ(corners[0, :, 1:], corners[0, :, :-1])) + 1
     cells = np.append(0, changes)
-    return _FoldCells(np.append(knots[cells], np.inf), corners[:, :, cells], number[cells])
+    return _FoldCells(np.append(knots[cells], np.inf), corners[:, :, cells], curve_number[cells])
 
 
 def _corners_differ(cells: FloatArray, next_cells: FloatArray) -> BoolArray:
@@ -116,43 +116,43 @@ def _cut_at_edges(balance: Balance, cells: _FoldCells) -> _FoldCells:
     corners = cells.corners.copy()
     low, high = np.sort(cells.corners, axis=1).swapaxes(0, 1)
     for side, edges in enumerate((cells.edges[:-1], cells.edges[1:])):
-        beyond = np.flatnonzero((cells.curve != NONE) & (corners[0, side] != edges))
-        box = (low[1, beyond], high[1, beyond], low[2, beyond], high[2, beyond])
-        corners[:, side, beyond] = edges[beyond], *bracketed_in_box(balance, edges[beyond], *box)
+        displaced = np.flatnonzero((cells.curve != NO_CURVE) & (corners[0, side] != edges))
+        box = (low[1, displaced], high[1, displaced], low[2, displaced], high[2, displaced])
+        corners[:, side, displaced] = edges[displaced], *bracketed_in_box(balance, edges[displaced], *box)
     return cells._replace(corners=corners)
 
 
 def _fold_points(balance: Balance, cells: _FoldCells) -> FoldPoints:
     """Return the corners of all cells as points, one for cells without a fold, and one at infinity."""
     ends = np.append(np.flatnonzero(np.diff(cells.curve)) + 1, cells.curve.size)
-    rows: list[FloatArray] = []
+    corner_blocks: list[FloatArray] = []
     last: list[int] = []
     for start, end in zip(np.append(0, ends), ends, strict=False):
-        row = cells.corners[:, 0, start:end]
-        if cells.curve[start] == NONE:
-            row = np.array([[cells.edges[start]], [np.nan], [np.nan]])
+        corner_block = cells.corners[:, 0, start:end]
+        if cells.curve[start] == NO_CURVE:
+            corner_block = np.array([[cells.edges[start]], [np.nan], [np.nan]])
         else:
-            row = np.column_stack((row, cells.corners[:, 1, end - 1]))
-        rows.append(row)
-        last += [len(last) + row.shape[1] - 1] * row.shape[1]
-    rows.append(np.array([[np.inf], [np.nan], [np.nan]]))
-    tau_e, *phi = np.concatenate(rows, axis=1)
+            corner_block = np.column_stack((corner_block, cells.corners[:, 1, end - 1]))
+        corner_blocks.append(corner_block)
+        last += [len(last) + corner_block.shape[1] - 1] * corner_block.shape[1]
+    corner_blocks.append(np.array([[np.inf], [np.nan], [np.nan]]))
+    tau_e, *phi = np.concatenate(corner_blocks, axis=1)
     state = balance.state(*phi)
     slope = np.stack(along_critical_curve(state, state.rho)[:2])
-    numbers = np.array([*last, len(last)])
-    cusp = _mark_cusps(tau_e, np.stack(phi), slope, numbers)
-    return FoldPoints(tau_e, np.stack(phi), slope, np.stack(state.rho), numbers, cusp)
+    last_indices = np.array([*last, len(last)])
+    cusp = _mark_cusps(tau_e, np.stack(phi), slope, last_indices)
+    return FoldPoints(tau_e, np.stack(phi), slope, np.stack(state.rho), last_indices, cusp)
 
 
 def _mark_cusps(tau_e: FloatArray, phi: FloatArray, slope: FloatArray, last: IndexArray) -> FloatArray:
     """Return 1 at the ends of stretches whose slope is far above the mean slope, else 0."""
     ends = np.unique(last)
     begins = np.append(0, ends[:-1] + 1)
-    chord = (phi[:, ends] - phi[:, begins]) / (tau_e[ends] - tau_e[begins])
+    chord_slope = (phi[:, ends] - phi[:, begins]) / (tau_e[ends] - tau_e[begins])
     cusp = np.zeros(tau_e.size)
     for nodes in (begins, ends):
-        flat = np.abs(slope[:, nodes]) <= CUSP_SLOPE_RATIO * np.abs(chord)
-        cusp[nodes] = np.where(flat.all(axis=0), 0.0, 1.0)
+        is_flat = np.abs(slope[:, nodes]) <= CUSP_SLOPE_RATIO * np.abs(chord_slope)
+        cusp[nodes] = np.where(is_flat.all(axis=0), 0.0, 1.0)
     return cusp
 
 
@@ -162,9 +162,9 @@ MONOTONE_SLOPE_RATIO = 3.0
 GUESS_RTOL = 0.9 * SHORT_RTOL
 """Largest relative distance of a cubic between nodes from the fold, so that one Newton step is enough.
 
-Below `SHORT_RTOL`, since it is checked at the points `TESTED` only and may be a little larger elsewhere."""
+Below `SHORT_RTOL`, since it is checked at the points `TESTED_SHARES` only; it may be larger elsewhere."""
 
-TESTED = np.linspace(0, 1, 10)[1:-1]
+TESTED_SHARES = np.linspace(0, 1, 10)[1:-1]
 """Shares of the critical points between two nodes at which the cubic is compared with them."""
 
 SAME_SLOPE_RTOL = 1e-6
@@ -200,12 +200,15 @@ class FoldMap(NamedTuple):
     def guess(self, tau_e: FloatArray) -> tuple[BoolArray, Values, Values]:
         """Return whether there is a fold, approximate phi_1 and phi_2, and those of the adjacent nodes."""
         cell = np.searchsorted(self.tau_e[1:-1], tau_e, side="right")
-        low, low_1, low_2, *of_low = look_up(self, cell)
-        high, high_1, high_2, *of_high = look_up(self, cell + 1)
+        low, low_1, low_2, *low_slopes = look_up(self, cell)
+        high, high_1, high_2, *high_slopes = look_up(self, cell + 1)
         width = high - low
-        cubic = _CubicArguments.of((tau_e - low) / width, width, (of_low[-1], of_high[-1]))
-        near = cubic(low_1, high_1, of_low[0], of_high[0]), cubic(low_2, high_2, of_low[1], of_high[1])
-        return ~np.isnan(low_1 + high_1), near, (low_1, high_1, low_2, high_2)
+        cubic = _CubicArguments.of((tau_e - low) / width, width, (low_slopes[-1], high_slopes[-1]))
+        approximate = (
+            cubic(low_1, high_1, low_slopes[0], high_slopes[0]),
+            cubic(low_2, high_2, low_slopes[1], high_slopes[1]),
+        )
+        return ~np.isnan(low_1 + high_1), approximate, (low_1, high_1, low_2, high_2)
 
 
 class _CubicArguments(NamedTuple):
@@ -254,32 +257,34 @@ def _choose_nodes(points: FoldPoints) -> IndexArray:
 def _farthest_points(points: FoldPoints) -> IndexArray:
     """Return the farthest point to which a cubic from each point may extend, by bisection for all at once."""
     start = np.arange(points.tau_e.size)
-    reached = np.minimum(start + 1, points.last)
-    step = 1 << int((points.last - start).max()).bit_length()
-    while step := step // 2:
-        further = reached + step
-        possible = np.flatnonzero(further <= points.last)
-        good = possible[_is_close(points, start[possible], further[possible])]
-        reached[good] = further[good]
-    going = np.flatnonzero(points.last > start)
+    farthest = np.minimum(start + 1, points.last)
+    stride = 1 << int((points.last - start).max()).bit_length()
+    while stride := stride // 2:
+        candidates = farthest + stride
+        possible_points = np.flatnonzero(candidates <= points.last)
+        accepted = possible_points[
+            _cubic_is_close(points, start[possible_points], candidates[possible_points])
+        ]
+        farthest[accepted] = candidates[accepted]
+    unfinished = np.flatnonzero(points.last > start)
     # The end of a stretch, if a cusp, may be attainable from points at which shorter cubics fail.
-    to_end = going[_is_close(points, going, points.last[going])]
-    reached[to_end] = points.last[to_end]
-    return reached
+    to_end = unfinished[_cubic_is_close(points, unfinished, points.last[unfinished])]
+    farthest[to_end] = points.last[to_end]
+    return farthest
 
 
-def _is_close(points: FoldPoints, start: IndexArray, end: IndexArray) -> BoolArray:
+def _cubic_is_close(points: FoldPoints, start: IndexArray, end: IndexArray) -> BoolArray:
     """Return whether the cubics from points `start` to points `end` are close to all points between."""
-    between = start + np.rint(TESTED[:, None] * (end - start)).astype(int)
-    cubic = _cubic_arguments(points, start, end, between)
-    error, hardened, size = (np.zeros(between.shape) for _ in range(3))
+    tested_points = start + np.rint(TESTED_SHARES[:, None] * (end - start)).astype(int)
+    cubic = _cubic_arguments(points, start, end, tested_points)
+    error, hardening_error, magnitude = (np.zeros(tested_points.shape) for _ in range(3))
     for side, (phi, rho) in enumerate(zip(points.phi, points.rho, strict=True)):
         slopes = _slopes(points, side, start, end)
-        missed = np.abs(cubic(phi[start], phi[end], *slopes) - phi[between])
-        error, hardened = error + missed, hardened + np.abs(rho[between]) * missed
-        size = size + np.abs(phi[between])
-    close = np.all((error <= GUESS_RTOL * size) & (hardened <= GUESS_RTOL), axis=0)
-    usable: BoolArray = close & (points.cusp[start] * points.cusp[end] == 0)
+        side_error = np.abs(cubic(phi[start], phi[end], *slopes) - phi[tested_points])
+        error, hardening_error = error + side_error, hardening_error + np.abs(rho[tested_points]) * side_error
+        magnitude = magnitude + np.abs(phi[tested_points])
+    is_within = np.all((error <= GUESS_RTOL * magnitude) & (hardening_error <= GUESS_RTOL), axis=0)
+    usable: BoolArray = is_within & (points.cusp[start] * points.cusp[end] == 0)
     return usable
 
 
@@ -291,29 +296,32 @@ def _slopes(points: FoldPoints, side: int, start: IndexArray, end: IndexArray) -
     tau_e, phi = points.tau_e, points.phi[side]
     first_cusp, last_cusp = points.cusp[start] > 0, points.cusp[end] > 0
     chord = (phi[end] - phi[start]) / (tau_e[end] - tau_e[start])
-    first, last = (_limit_slope(points.slope[side, each], chord) for each in (start, end))
+    first, last = (_limit_slope(points.slope[side, nodes], chord) for nodes in (start, end))
     share = np.where(first_cusp, MIDDLE_ROOT**2, 1 - MIDDLE_ROOT**2)
     middle = np.searchsorted(tau_e, tau_e[start] + share * (tau_e[end] - tau_e[start]))
     middle = np.clip(middle, start + 1, np.maximum(end - 1, start + 1))
     cubic = _cubic_arguments(points, start, end, middle)
-    missed = phi[middle] - cubic(
+    middle_error = phi[middle] - cubic(
         phi[start], phi[end], np.where(first_cusp, 0.0, first), np.where(last_cusp, 0.0, last)
     )
     x = cubic.x
-    at_start, at_end = missed / (cubic.start * x * (1 - x) ** 2), -missed / (cubic.end * x**2 * (1 - x))
+    start_slope, end_slope = (
+        middle_error / (cubic.start * x * (1 - x) ** 2),
+        -middle_error / (cubic.end * x**2 * (1 - x)),
+    )
     has_middle = end > start + 1
     return (
-        np.where(first_cusp, np.where(has_middle, at_start, chord), first),
-        np.where(last_cusp, np.where(has_middle, at_end, chord), last),
+        np.where(first_cusp, np.where(has_middle, start_slope, chord), first),
+        np.where(last_cusp, np.where(has_middle, end_slope, chord), last),
     )
 
 
 def _cubic_arguments(
-    points: FoldPoints, start: IndexArray, end: IndexArray, at: IndexArray
+    points: FoldPoints, start: IndexArray, end: IndexArray, indices: IndexArray
 ) -> _CubicArguments:
-    """Return the arguments of the cubics at the points `at` in cells from `start` to `end`."""
+    """Return the arguments of the cubics at the points `indices` in cells from `start` to `end`."""
     width = points.tau_e[end] - points.tau_e[start]
-    share = (points.tau_e[at] - points.tau_e[start]) / width
+    share = (points.tau_e[indices] - points.tau_e[start]) / width
     return _CubicArguments.of(share, width, (points.cusp[start], points.cusp[end]))
 
 
@@ -323,19 +331,25 @@ def _limit_slope(slope: FloatArray, chord: FloatArray) -> FloatArray:
     return chord * np.clip(ratio, 0, MONOTONE_SLOPE_RATIO)
 
 
-def _map_with_nodes(points: FoldPoints, chosen: IndexArray) -> FoldMap:
+def _map_with_nodes(points: FoldPoints, node_indices: IndexArray) -> FoldMap:
     """Return the map with nodes at some of the points."""
-    connected = np.flatnonzero(points.last[chosen[1:]] == points.last[chosen[:-1]])
-    before, after = np.full((2, 2, chosen.size), np.nan)
+    connected = np.flatnonzero(points.last[node_indices[1:]] == points.last[node_indices[:-1]])
+    slope_before, slope_after = np.full((2, 2, node_indices.size), np.nan)
     for side in range(2):
-        cells = chosen[connected], chosen[connected + 1]
-        after[side, connected], before[side, connected + 1] = _slopes(points, side, *cells)
-    slope = np.where(np.isnan(before) | (np.abs(after) < np.abs(before)), after, before)
+        cells = node_indices[connected], node_indices[connected + 1]
+        slope_after[side, connected], slope_before[side, connected + 1] = _slopes(points, side, *cells)
+    slope = np.where(
+        np.isnan(slope_before) | (np.abs(slope_after) < np.abs(slope_before)), slope_after, slope_before
+    )
     single_slope = round_to_single(slope)
-    nodes = np.stack((points.tau_e[chosen], *points.phi[:, chosen], *single_slope, points.cusp[chosen]))
-    bend = np.abs(after[:, 1:] - before[:, :-1]).sum(axis=0) / np.abs(after[:, 1:]).sum(axis=0)
-    repeated = (nodes[:3, 1:] == nodes[:3, :-1]).all(axis=0) & (bend <= SAME_SLOPE_RTOL)
-    return FoldMap(*np.delete(nodes, np.flatnonzero(repeated), axis=1))
+    nodes = np.stack(
+        (points.tau_e[node_indices], *points.phi[:, node_indices], *single_slope, points.cusp[node_indices])
+    )
+    bend = np.abs(slope_after[:, 1:] - slope_before[:, :-1]).sum(axis=0) / np.abs(slope_after[:, 1:]).sum(
+        axis=0
+    )
+    is_repeated = (nodes[:3, 1:] == nodes[:3, :-1]).all(axis=0) & (bend <= SAME_SLOPE_RTOL)
+    return FoldMap(*np.delete(nodes, np.flatnonzero(is_repeated), axis=1))
 
 
 MAX_NEWTON_STEPS = 12
@@ -348,32 +362,34 @@ NEWTON_RTOL = OfRounding(1e-9, power=0.5)
 def outermost_fold(balance: Balance, folds: FoldMap, tau_e: FloatArray) -> tuple[BoolArray, PairState]:
     """Return whether there is a fold, and the state of the springs at the outermost; arrays (samples,)."""
     if np.isnan(folds.phi_1).all():
-        nowhere = np.full_like(tau_e, np.nan)
-        spring = SpringState(*[nowhere] * len(SpringState._fields))
-        return np.zeros_like(tau_e, dtype=bool), PairState(nowhere, nowhere, spring, spring)
-    exists, near, corners = folds.guess(tau_e)
-    box = (*_ascending(*corners[:2]), *_ascending(*corners[2:]))
-    guess = balance.state(*near)
+        undefined = np.full_like(tau_e, np.nan)
+        spring = SpringState(*[undefined] * len(SpringState._fields))
+        return np.zeros_like(tau_e, dtype=bool), PairState(undefined, undefined, spring, spring)
+    exists, approximate, corners = folds.guess(tau_e)
+    box = (*_ordered_pair(*corners[:2]), *_ordered_pair(*corners[2:]))
+    guess = balance.state(*approximate)
     rho = guess.rho
     steps = newton_step(guess, rho, tau_e)
     fold = where_needed(
         exists & ~is_short(guess, rho, steps),
         lambda *unsolved: _fold_in_box(balance, *unsolved),
-        (tau_e, *near, *box),
-        guess.after(*_clip_to_box(box, near, steps)).values,
+        (tau_e, *approximate, *box),
+        guess.after(*_clip_to_box(box, approximate, steps)).values,
     )
     return exists, PairState.of(fold)
 
 
-def _clip_to_box(box: Values, near: Values, steps: Values) -> Values:
+def _clip_to_box(box: Values, approximate: Values, steps: Values) -> Values:
     """Return the steps, clipped to the box.
 
     By rounding of the elastic torque they would leave it if one spring were stretched 1e16 times farther than
     the other.
     """
     low_1, high_1, low_2, high_2 = box
-    (near_1, near_2), (step_1, step_2) = near, steps
-    return np.clip(step_1, low_1 - near_1, high_1 - near_1), np.clip(step_2, low_2 - near_2, high_2 - near_2)
+    (approximate_1, approximate_2), (step_1, step_2) = approximate, steps
+    return np.clip(step_1, low_1 - approximate_1, high_1 - approximate_1), np.clip(
+        step_2, low_2 - approximate_2, high_2 - approximate_2
+    )
 
 
 def _fold_in_box(
@@ -401,5 +417,5 @@ def _fold_in_box(
     return balance.state(phi_1, phi_2).values
 
 
-def _ascending(first: FloatArray, second: FloatArray) -> Values:
+def _ordered_pair(first: FloatArray, second: FloatArray) -> Values:
     return np.minimum(first, second), np.maximum(first, second)

@@ -63,11 +63,11 @@ class PairOnBranch:
         """The other branch; None if a spring only pulls."""
         if any(law.pulls_only for law in self.laws):
             return None
-        return next(word for word in BRANCHES if word != self.branch)
+        return next(branch for branch in BRANCHES if branch != self.branch)
 
     def opposite_reaches(self, tau_e: FloatArray, stiffness: FloatArray) -> BoolArray:
         """Return where the stiffness is attainable on the other branch, (samples,)."""
         if self.opposite is None:
             return np.zeros(tau_e.shape, dtype=bool)
-        other = replace(self, branch=self.opposite)
-        return ~classify_stiffness(stiffness, other.solve(tau_e, stiffness)).infeasible
+        opposite_pair = replace(self, branch=self.opposite)
+        return ~classify_stiffness(stiffness, opposite_pair.solve(tau_e, stiffness)).infeasible

@@ -88,8 +88,8 @@ class _Box(NamedTuple):
     def of(cls, piece: Corridor, demand: FloatArray) -> _Box:
         """Return the box of a piece."""
         inner, outer = piece.inner, piece.outer
-        near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
-        return cls(inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, near)
+        is_near = np.where(np.abs(outer.stiffness - demand) < demand, 1.0, 0.0)
+        return cls(inner.phi_1, outer.phi_1, inner.phi_2, outer.phi_2, is_near)
 
     def contains(self, phi_1: FloatArray, phi_2: FloatArray) -> BoolArray:
         """Return whether deflections lie in the box, its outer sides excluded."""
@@ -105,19 +105,21 @@ class _Box(NamedTuple):
     ) -> Values:
         """Return the targets of a step from deflections in the box, moved back into it."""
         return (
-            _short_of(phi_1, _not_below(phi_1, target_1, self.inner_1), self.outer_1, self.outer_near > 0),
-            -_short_of(
-                -phi_2, _not_below(-phi_2, -target_2, -self.inner_2), -self.outer_2, self.outer_near > 0
+            _limit_above(
+                phi_1, _limit_below(phi_1, target_1, self.inner_1), self.outer_1, self.outer_near > 0
+            ),
+            -_limit_above(
+                -phi_2, _limit_below(-phi_2, -target_2, -self.inner_2), -self.outer_2, self.outer_near > 0
             ),
         )
 
 
-def _not_below(start: FloatArray, target: FloatArray, inner: FloatArray) -> FloatArray:
+def _limit_below(start: FloatArray, target: FloatArray, inner: FloatArray) -> FloatArray:
     """Return the target; if it lies below the inner end, the point half way to that."""
     return np.where(target < inner, (start + inner) / 2, target)
 
 
-def _short_of(start: FloatArray, target: FloatArray, outer: FloatArray, near: BoolArray) -> FloatArray:
+def _limit_above(start: FloatArray, target: FloatArray, outer: FloatArray, near: BoolArray) -> FloatArray:
     """Return the target; if it lies beyond the outer end, that end, or half way there if it is not near."""
     return np.where(target >= outer, np.where(near, outer, (start + outer) / 2), target)
 
@@ -175,8 +177,12 @@ def _confine_step(
 ) -> Values:
     """Return a step moved back into the box, or no step if the demand is the stiffness at the inner end."""
     confined_1, confined_2 = _Box(*bounds).confine(phi_1, phi_2, target_1, target_2)
-    met = demand == inner_stiffness
-    return np.where(met, phi_1, confined_1), np.where(met, phi_2, confined_2), np.where(met, 0.0, error)
+    is_inner_end = demand == inner_stiffness
+    return (
+        np.where(is_inner_end, phi_1, confined_1),
+        np.where(is_inner_end, phi_2, confined_2),
+        np.where(is_inner_end, 0.0, error),
+    )
 
 
 def _bracket_preload(balance: Balance, tau_e: FloatArray, demand: FloatArray, inner_1: FloatArray) -> Values:
@@ -184,20 +190,22 @@ def _bracket_preload(balance: Balance, tau_e: FloatArray, demand: FloatArray, in
     tau_1 = spring_state(balance.first, inner_1).tau
     tau_2 = tau_e - tau_1
 
-    def missing(x: FloatArray, tau_1: FloatArray, tau_2: FloatArray, demand: FloatArray) -> FloatArray:
+    def stiffness_error(
+        x: FloatArray, tau_1: FloatArray, tau_2: FloatArray, demand: FloatArray
+    ) -> FloatArray:
         return demand - balance.state_under(tau_1 + x, tau_2 - x).stiffness
 
-    least, largest = np.zeros_like(tau_e), balance.preload_range(tau_e)[1] + tau_e / 2 - tau_1
-    endless = np.isinf(largest)
-    guess = np.where(endless, np.abs(tau_1) + np.abs(tau_2) + demand, largest)
+    smallest, largest = np.zeros_like(tau_e), balance.preload_range(tau_e)[1] + tau_e / 2 - tau_1
+    is_unbounded = np.isinf(largest)
+    guess = np.where(is_unbounded, np.abs(tau_1) + np.abs(tau_2) + demand, largest)
 
-    def widened(state: Values, constants: Values) -> tuple[Values, BoolArray]:
+    def widen(state: Values, constants: Values) -> tuple[Values, BoolArray]:
         (width,) = state
-        *torques_and_demand, endless = constants
-        short = (endless > 0) & (missing(width, *torques_and_demand) > 0)
-        return (np.where(short, 2 * width, width),), ~short
+        *torques_and_demand, is_unbounded = constants
+        is_short = (is_unbounded > 0) & (stiffness_error(width, *torques_and_demand) > 0)
+        return (np.where(is_short, 2 * width, width),), ~is_short
 
     torques_and_demand = tau_1, tau_2, demand
-    (width,) = repeat(widened, (guess,), (*torques_and_demand, np.where(endless, 1.0, 0.0)), MAX_DOUBLINGS)
-    x = bracketed_root(missing, least, width, torques_and_demand)
+    (width,) = repeat(widen, (guess,), (*torques_and_demand, np.where(is_unbounded, 1.0, 0.0)), MAX_DOUBLINGS)
+    x = bracketed_root(stiffness_error, smallest, width, torques_and_demand)
     return balance.deflections(tau_1 + x, tau_2 - x)

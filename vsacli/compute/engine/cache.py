@@ -73,24 +73,24 @@ class Cache:
             CacheError: There is no room or no permission.
         """
         try:
-            with self._staged() as folder:
+            with self._staging_folder() as folder:
                 entry = folder / key
                 entry.mkdir(parents=True)
                 shutil.copyfile(library, entry / LIBRARY)
                 (entry / CHECKSUM).write_text(_checksum(library), encoding="ascii")
-                _move(entry, self.folder / key)
+                _move_folder(entry, self.folder / key)
             self._make_room(key)
         except OSError as error:
             raise CacheError(f"the cache folder {self.folder} cannot be written: {error.strerror}") from None
 
     def entries(self) -> list[Entry]:
         """Return all libraries, the least recently used first; other folders are ignored."""
-        found = []
+        libraries = []
         for path in self.folder.iterdir():
             with suppress(FileNotFoundError):  # removed meanwhile
                 if is_folder(path) and owner_of(path.name) is None and _holds_a_library(path):
-                    found.append(Entry(path.stat().st_mtime, size_of(path), path.name))
-        return sorted(found)
+                    libraries.append(Entry(path.stat().st_mtime, size_of(path), path.name))
+        return sorted(libraries)
 
     def clear(self) -> None:
         """Remove all libraries.
@@ -102,12 +102,12 @@ class Cache:
         for entry in self.entries():
             self._remove(entry.key)
 
-    def _make_room(self, new: str) -> None:
+    def _make_room(self, new_key: str) -> None:
         """Remove the least recently used libraries until all are within `MOST_BYTES`; keep the new one."""
         entries = self.entries()
         excess = sum(entry.size for entry in entries) - MOST_BYTES
         for entry in entries:
-            if excess > 0 and entry.key != new:
+            if excess > 0 and entry.key != new_key:
                 self._remove(entry.key)
                 excess -= entry.size
 
@@ -118,7 +118,7 @@ class Cache:
             CacheError: No permission.
         """
         try:
-            with self._staged() as folder:
+            with self._staging_folder() as folder:
                 (self.folder / key).rename(folder)
         except FileNotFoundError:  # another process has removed it
             pass
@@ -126,14 +126,14 @@ class Cache:
             raise CacheError(f"{self.folder / key} cannot be removed: {error.strerror}") from None
 
     @contextmanager
-    def _staged(self) -> Iterator[Path]:
+    def _staging_folder(self) -> Iterator[Path]:
         """Yield a folder name of this process; remove it at the end, and those of killed processes."""
         sweep(self.folder)
-        staged = self.folder / staging_name()
+        staging_folder = self.folder / staging_name()
         try:
-            yield staged
+            yield staging_folder
         finally:
-            remove(staged)
+            remove(staging_folder)
 
 
 def open_cache() -> Cache:
@@ -177,7 +177,7 @@ def _checksum(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _move(entry: Path, target: Path) -> None:
+def _move_folder(entry: Path, target: Path) -> None:
     """Rename a folder, unless the target exists: a folder with files in it is not replaced."""
     try:
         entry.rename(target)

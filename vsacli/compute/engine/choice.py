@@ -1,4 +1,4 @@
-"""The choice of the backend: `choose` for a run, `settle` for many runs that must agree.
+"""The choice of the backend: `choose_engine` for a run, `settle_engine` for many runs that must agree.
 
 "auto" compares the time that compiled code saves with that of compiling, by the estimates in `costs`.
 """
@@ -54,7 +54,7 @@ class ChosenEngine(NamedTuple):
         return {"engine": name, "compiler": self.compiler, "threads": str(self.threads)}
 
 
-def choose(
+def choose_engine(
     name: str,
     kernel: Kernel,
     samples: int,
@@ -78,27 +78,29 @@ def choose(
             cannot be compiled.
     """
     check_engine(name)
-    usual = in_usual_blocks(samples, kernel.inputs)
+    usual_samples = usual_block_samples(samples, kernel.inputs)
     if name == "numpy":
-        return ChosenEngine(_numpy(usual), "NumPy computes, as requested")
-    if name == "auto" and usual < LOOK_FROM:
+        return ChosenEngine(_numpy_engine(usual_samples), "NumPy computes, as requested")
+    if name == "auto" and usual_samples < LOOK_FROM:
         return ChosenEngine(NUMPY, f"NumPy computes: {samples} samples are few")
     from vsacli.compute.engine.compiled_engine import CompiledEngine
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
-    threads = threads or processors()
-    asked = name == "c"
+    threads = threads or processor_count()
+    required = name == "c"
     try:
-        with compiled_as_asked() if asked else nullcontext():
+        with compiled_as_asked() if required else nullcontext():
             compiler = system_compiler()
             engine = CompiledEngine(compiler, max(1, threads - busy), tell)
-            loaded = engine.prepare(kernel, lambda code: asked or _repays(code, usual))
+            loaded = engine.prepare(kernel, lambda code: required or _repays_compiling(code, usual_samples))
     except (CompilerError, NotImplementedError) as error:
-        return ChosenEngine(_numpy(usual), f"NumPy computes: {error}")
+        return ChosenEngine(_numpy_engine(usual_samples), f"NumPy computes: {error}")
     if loaded is None:
-        return ChosenEngine(_numpy(usual), f"NumPy computes: {samples} samples would not repay compiling")
-    when = "now" if loaded.compiled else "before"
-    reason = f"C code computes, compiled {when}, in {_counted(threads)}"
+        return ChosenEngine(
+            _numpy_engine(usual_samples), f"NumPy computes: {samples} samples would not repay compiling"
+        )
+    compile_time = "now" if loaded.compiled else "before"
+    reason = f"C code computes, compiled {compile_time}, in {_threads_text(threads)}"
     return ChosenEngine(engine, reason, compiler.name, threads)
 
 
@@ -109,7 +111,7 @@ class Settled(NamedTuple):
     compiler: str = ""
 
 
-def settle(name: str, kernel: Kernel, samples: int) -> Settled:
+def settle_engine(name: str, kernel: Kernel, samples: int) -> Settled:
     """Return the engine for many computations that must agree, whichever process runs them, and when.
 
     So the choice does not depend on the cache of compiled code.
@@ -123,17 +125,17 @@ def settle(name: str, kernel: Kernel, samples: int) -> Settled:
         InputError: The engine is unknown; or it is "c", and there is no working C compiler.
     """
     check_engine(name)
-    usual = in_usual_blocks(samples, kernel.inputs)
-    if name == "numpy" or (name == "auto" and usual < LOOK_FROM):
+    usual_samples = usual_block_samples(samples, kernel.inputs)
+    if name == "numpy" or (name == "auto" and usual_samples < LOOK_FROM):
         return Settled("numpy")
     from vsacli.compute.engine.compiled_engine import kernel_code
     from vsacli.compute.engine.compiler import CompilerError, system_compiler
 
-    asked = name == "c"
+    required = name == "c"
     try:
-        with compiled_as_asked() if asked else nullcontext():
+        with compiled_as_asked() if required else nullcontext():
             compiler = system_compiler()
-            repays = asked or _repays(kernel_code(kernel), usual)
+            repays = required or _repays_compiling(kernel_code(kernel), usual_samples)
     except (CompilerError, NotImplementedError):
         return Settled("numpy")
     return Settled("c", compiler.name) if repays else Settled("numpy")
@@ -166,25 +168,27 @@ def compiled_as_asked() -> Iterator[None]:
         raise InputError.one(f"this cannot be compiled: {error}; take the engine numpy") from error
 
 
-def in_usual_blocks(samples: int, inputs: int) -> float:
+def usual_block_samples(samples: int, inputs: int) -> float:
     """Return the number of samples in blocks of the usual size that would take NumPy the same time."""
-    calls, fewest = (NUMPY_CALL_SAMPLES / size for size in (samples_per_pass(inputs), SAMPLES_PER_PASS))
-    return samples * (1 + calls) / (1 + fewest)
+    call_share, usual_call_share = (
+        NUMPY_CALL_SAMPLES / size for size in (samples_per_pass(inputs), SAMPLES_PER_PASS)
+    )
+    return samples * (1 + call_share) / (1 + usual_call_share)
 
 
-def _repays(code: Code, samples: float) -> bool:
+def _repays_compiling(code: Code, samples: float) -> bool:
     """Return whether NumPy would take longer than the compiler, and the compiler not too long."""
     return samples * code.seconds_saved > code.compiling_seconds and not code.takes_too_long
 
 
-def _numpy(samples: float) -> Engine:
+def _numpy_engine(samples: float) -> Engine:
     return NUMPY if samples < TRACE_FROM else TracedEngine()
 
 
-def _counted(threads: int) -> str:
+def _threads_text(threads: int) -> str:
     return f"{threads} threads" if threads > 1 else "1 thread"
 
 
-def processors() -> int:
+def processor_count() -> int:
     """Return the number of CPU cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

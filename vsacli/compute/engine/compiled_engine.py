@@ -44,9 +44,11 @@ class CompiledEngine:
             CompilerError: The code cannot be compiled.
         """
         if kernel not in self._loaded:
-            opened = partial(Library, outputs=kernel.outputs)
-            trying = partial(_trial, kernel)
-            loaded = load(kernel_code(kernel), opened, self._compiler, self._tell, trying, worthwhile)
+            open_library = partial(Library, outputs=kernel.outputs)
+            make_trial = partial(_kernel_trial, kernel)
+            loaded = load(
+                kernel_code(kernel), open_library, self._compiler, self._tell, make_trial, worthwhile
+            )
             if loaded is None:
                 return None
             self._loaded[kernel] = loaded
@@ -58,13 +60,13 @@ class CompiledEngine:
         return self._loaded[kernel].library(rows, self._threads)
 
 
-def _trial(kernel: Kernel) -> Trial:
+def _kernel_trial(kernel: Kernel) -> Trial:
     """Return a call of a kernel's code on drawn samples, of sizes that positions and stiffnesses have."""
     inputs = 10.0 ** np.random.default_rng(0).uniform(-1, 3.5, (kernel.inputs, TRIED_SAMPLES))
     with np.errstate(all="ignore"):
         expected = NumPyEngine().run(kernel, list(inputs))
-    rows = [row.tobytes() for row in inputs], [(row.nbytes,) for row in expected]
-    return Trial("run", [0, TRIED_SAMPLES, *rows], expected)
+    word_arguments = [row.tobytes() for row in inputs], [(row.nbytes,) for row in expected]
+    return Trial("run", [0, TRIED_SAMPLES, *word_arguments], expected)
 
 
 @lru_cache(maxsize=32)
@@ -76,12 +78,14 @@ def kernel_code(kernel: Kernel) -> Code:
     """
     program = kernel_program(kernel)
     calls = [symbol.operands[0] for symbol in program.operations if symbol.operation == "call"]
-    functions = {id(call.body): call.body for call in calls} or {id(program): program}
-    carried_out = {identity: _carried_out(each) for identity, each in functions.items()}
-    operations = sum(carried_out[id(call.body)] for call in calls) if calls else carried_out[id(program)]
-    straight = not any(map(conditional_count, functions.values()))
+    bodies = {id(call.body): call.body for call in calls} or {id(program): program}
+    operations_run = {identity: _operations_run(body) for identity, body in bodies.items()}
+    operations = (
+        sum(operations_run[id(call.body)] for call in calls) if calls else operations_run[id(program)]
+    )
+    straight = not any(map(conditional_count, bodies.values()))
     return Code(
-        batch_source(program), round(operations), tuple(map(compiling_size, functions.values())), straight
+        batch_source(program), round(operations), tuple(map(compiling_size, bodies.values())), straight
     )
 
 
@@ -90,13 +94,13 @@ def compiling_size(program: Program) -> int:
     return operation_count(program) + CONDITIONAL_OPERATIONS * conditional_count(program)
 
 
-def _carried_out(program: Program) -> float:
+def _operations_run(program: Program) -> float:
     """Return the usual number of operations per sample, those of loops and branches as often as they run."""
-    return sum(map(_weight, program.operations))
+    return sum(map(_runs_of_operation, program.operations))
 
 
-def _weight(symbol: Symbol) -> float:
+def _runs_of_operation(symbol: Symbol) -> float:
     if symbol.operation not in NESTED:
         return 1
-    often = {"loop": USUAL_ITERATIONS, "branch": BRANCH_SHARE}
-    return often.get(symbol.operation, 1) * _carried_out(symbol.operands[0].body)
+    repetitions = {"loop": USUAL_ITERATIONS, "branch": BRANCH_SHARE}
+    return repetitions.get(symbol.operation, 1) * _operations_run(symbol.operands[0].body)

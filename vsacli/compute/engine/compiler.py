@@ -35,7 +35,12 @@ ZIG_COMPILER = (sys.executable, "-m", "ziglang", "cc")
 TIMEOUT = 120.0
 """Largest time of the compiler, s."""
 
-LIES = ("__FINITE_MATH_ONLY__ 1", "__FAST_MATH__ 1", "__ASSOCIATIVE_MATH__ 1", "__RECIPROCAL_MATH__ 1")
+FORBIDDEN_MACROS = (
+    "__FINITE_MATH_ONLY__ 1",
+    "__FAST_MATH__ 1",
+    "__ASSOCIATIVE_MATH__ 1",
+    "__RECIPROCAL_MATH__ 1",
+)
 """Macros set by options that ignore NaN or reorder arithmetic; a compiler with one of them is refused."""
 
 SAMPLES_PER_THREAD = 2048
@@ -67,8 +72,8 @@ class Compiler:
     @property
     def name(self) -> str:
         """Command and version, for the provenance of results."""
-        found = re.search(r'^#define __VERSION__ "(.*)"$', self.identity, re.MULTILINE)
-        return " ".join([_spoken(self.command), *([found[1]] if found else [])])
+        version = re.search(r'^#define __VERSION__ "(.*)"$', self.identity, re.MULTILINE)
+        return " ".join([_command_text(self.command), *([version[1]] if version else [])])
 
     def build(self, source: Path, library: Path) -> None:
         """Compile a source file to a shared library.
@@ -76,9 +81,11 @@ class Compiler:
         Raises:
             CompilerError: The compiler fails.
         """
-        _output(self.command, *FLAGS, "-o", str(library), str(source), "-lm", kept=library.parent)
+        _compiler_output(
+            self.command, *FLAGS, "-o", str(library), str(source), "-lm", cache_folder=library.parent
+        )
         if not library.exists():
-            raise CompilerError(f"the C compiler {_spoken(self.command)!r} made no library")
+            raise CompilerError(f"the C compiler {_command_text(self.command)!r} made no library")
 
 
 def system_compiler() -> Compiler:
@@ -88,30 +95,33 @@ def system_compiler() -> Compiler:
         CompilerError: There is no compiler, or it does not work.
     """
     path = os.environ.get("PATH", "")
-    if wanted := os.environ.get("CC"):
-        return _examined(_command(wanted), path)
+    if command_line := os.environ.get("CC"):
+        return _checked_compiler(_split_command(command_line), path)
     try:
-        return _examined(("cc",), path)
+        return _checked_compiler(("cc",), path)
     except CompilerError as error:
         if find_spec("ziglang") is None:
             raise CompilerError(f"{error} (pip install 'vsacli[compiler]' gets one)") from None
-    return _examined(ZIG_COMPILER, path)
+    return _checked_compiler(ZIG_COMPILER, path)
 
 
-def _command(wanted: str) -> tuple[str, ...]:
+def _split_command(command_line: str) -> tuple[str, ...]:
     try:
-        return tuple(shlex.split(wanted)) or ("cc",)
+        return tuple(shlex.split(command_line)) or ("cc",)
     except ValueError as error:
-        raise CompilerError(f"the environment variable CC is not a command: {wanted!r} ({error})") from None
+        raise CompilerError(
+            f"the environment variable CC is not a command: {command_line!r} ({error})"
+        ) from None
 
 
 @lru_cache(maxsize=4)
-def _examined(command: tuple[str, ...], _path: str) -> Compiler:
+def _checked_compiler(command: tuple[str, ...], _path: str) -> Compiler:
     """Return a compiler; asked anew, five runs of a 3R with 20,000 samples take 1.6 times as long."""
-    macros = _output(command, NATIVE, "-dM", "-E", "-x", "c", os.devnull)
-    if any(f"#define {lie}\n" in f"{macros}\n" for lie in LIES):
+    macros = _compiler_output(command, NATIVE, "-dM", "-E", "-x", "c", os.devnull)
+    if any(f"#define {macro}\n" in f"{macros}\n" for macro in FORBIDDEN_MACROS):
         raise CompilerError(
-            f"{_spoken(command)!r} enables -ffast-math or a similar option, under which NaN goes unnoticed"
+            f"{_command_text(command)!r} enables -ffast-math or a similar option, under which NaN goes "
+            "unnoticed"
         )
     programs = map(_file_identity, filter(None, map(shutil.which, command)))
     return Compiler(command, "\n".join((macros, *platform.libc_ver(), *FLAGS, *command, *programs)))
@@ -123,17 +133,17 @@ def _file_identity(program: str) -> str:
     return f"{os.path.realpath(program)} {status.st_size} {status.st_mtime_ns}"
 
 
-def _spoken(command: tuple[str, ...]) -> str:
+def _command_text(command: tuple[str, ...]) -> str:
     """Return a command for messages and provenance, without the folder of Python."""
     return shlex.join("python" if part == sys.executable else part for part in command)
 
 
-def _output(compiler: tuple[str, ...], *arguments: str, kept: Path | None = None) -> str:
-    """Return the output of a compiler; its own cache, such as zig's, is placed in the folder `kept`."""
-    environment = None if kept is None else {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(kept)}
-    name = f"C compiler {_spoken(compiler)!r}"
+def _compiler_output(compiler: tuple[str, ...], *arguments: str, cache_folder: Path | None = None) -> str:
+    """Return the output of a compiler; its own cache, such as zig's, is placed in `cache_folder`."""
+    environment = None if cache_folder is None else {**os.environ, "ZIG_LOCAL_CACHE_DIR": str(cache_folder)}
+    name = f"C compiler {_command_text(compiler)!r}"
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [*compiler, *arguments],
             capture_output=True,
             text=True,
@@ -148,10 +158,10 @@ def _output(compiler: tuple[str, ...], *arguments: str, kept: Path | None = None
         raise CompilerError(f"the {name} cannot be run: {error}") from None
     except subprocess.TimeoutExpired:
         raise CompilerError(f"the {name} took more than {TIMEOUT:g} s") from None
-    if done.returncode:
-        lines = done.stderr.strip().splitlines() or [f"it ended with {done.returncode} and no message"]
+    if process.returncode:
+        lines = process.stderr.strip().splitlines() or [f"it ended with {process.returncode} and no message"]
         raise CompilerError(f"the {name} fails: {lines[0]}")
-    return done.stdout
+    return process.stdout
 
 
 class Library:
@@ -182,13 +192,13 @@ class Library:
         sources = np.array([row.ctypes.data for row in rows], dtype=np.uintp)
         offsets = np.arange(self._outputs, dtype=np.uintp) * np.uintp(outputs.strides[0])
         targets = outputs.ctypes.data + offsets
-        given = sources.ctypes.data, targets.ctypes.data
-        count = min(threads, max(1, samples // SAMPLES_PER_THREAD))
-        own, *others = _parts(samples, count)
-        running = [_pool(count - 1).submit(self._run, *part, *given) for part in others]
-        self._run(*own, *given)
-        for part in running:
-            part.result()
+        pointers = sources.ctypes.data, targets.ctypes.data
+        thread_count = min(threads, max(1, samples // SAMPLES_PER_THREAD))
+        own_part, *other_parts = _thread_slices(samples, thread_count)
+        futures = [_thread_pool(thread_count - 1).submit(self._run, *part, *pointers) for part in other_parts]
+        self._run(*own_part, *pointers)
+        for future in futures:
+            future.result()
         return outputs
 
 
@@ -198,9 +208,9 @@ def _aligned_rows(rows: int, samples: int) -> FloatArray:
     Rows are an odd number of lines apart: at a power of two, all would be in the same sets of a cache.
     """
     distance = DOUBLES_PER_VECTOR * (samples // DOUBLES_PER_VECTOR // 2 * 2 + 3)
-    space = np.empty(rows * distance + DOUBLES_PER_VECTOR)
-    first = -space.ctypes.data % LINE // space.itemsize
-    return space[first : first + rows * distance].reshape(rows, distance)[:, :samples]
+    buffer = np.empty(rows * distance + DOUBLES_PER_VECTOR)
+    first = -buffer.ctypes.data % LINE // buffer.itemsize
+    return buffer[first : first + rows * distance].reshape(rows, distance)[:, :samples]
 
 
 @cache
@@ -211,16 +221,19 @@ def _load_vector_functions() -> None:
 
 
 @lru_cache(maxsize=1)
-def _pool(threads: int) -> ThreadPoolExecutor:
+def _thread_pool(threads: int) -> ThreadPoolExecutor:
     """Return the threads in addition to the calling one; they last as long as the process."""
     return ThreadPoolExecutor(threads)
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_pool.cache_clear)  # a child process has none of the threads
+    os.register_at_fork(after_in_child=_thread_pool.cache_clear)  # a child process has none of the threads
 
 
-def _parts(samples: int, count: int) -> list[tuple[int, int]]:
+def _thread_slices(samples: int, thread_count: int) -> list[tuple[int, int]]:
     """Return start and end of the samples of each thread; whole vectors, except for the last."""
-    ends = [DOUBLES_PER_VECTOR * (samples * number // count // DOUBLES_PER_VECTOR) for number in range(count)]
-    return list(pairwise([*ends, samples]))
+    starts = [
+        DOUBLES_PER_VECTOR * (samples * thread // thread_count // DOUBLES_PER_VECTOR)
+        for thread in range(thread_count)
+    ]
+    return list(pairwise([*starts, samples]))

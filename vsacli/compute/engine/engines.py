@@ -77,9 +77,11 @@ class NumPyEngine:
         keep_freed_memory()
         outputs = np.empty((kernel.outputs, len(rows[0])))
         with subnormals_as_zero():
-            for part in passes(rows):
-                for output, row in zip(outputs, kernel([row[part] for row in rows]), strict=True):
-                    output[part] = row
+            for pass_slice in passes(rows):
+                for output, result in zip(
+                    outputs, kernel([result[pass_slice] for result in rows]), strict=True
+                ):
+                    output[pass_slice] = result
         return outputs
 
 

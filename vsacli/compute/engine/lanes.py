@@ -11,13 +11,13 @@ from vsacli.compute.tracing.c_code import Dialect, Tables, Writer, digits, table
 from vsacli.compute.tracing.c_functions import VALUES, CallingCode
 
 _INTEGERS = [kind for kind in Kind if kind is not Kind.REAL]
-_CHOOSE: dict[Kind, str] = {
+_SELECTION: dict[Kind, str] = {
     Kind.REAL: "choose({0}, {1}, {2})",
     **dict.fromkeys(_INTEGERS, "choose_integer({0}, {1}, {2})"),
 }
 
 
-def _function(kind: Kind, name: str) -> str:
+def _lane_function(kind: Kind, name: str) -> str:
     """Return the name of a function in lanes.c."""
     return name if name == "search" else f"each_{name}_integer" if kind is Kind.INDEX else f"each_{name}"
 
@@ -28,7 +28,7 @@ VECTORS = Dialect(
     literal=digits,
     array_type=lambda _values, _searched: "double",
     take=lambda place, index: f"each_take({place.pointer}, {index})",
-    function=_function,
+    function=_lane_function,
     templates={
         "integer": "spread_integer({0})",
         "true": "spread_integer(-1)",
@@ -40,8 +40,8 @@ VECTORS = Dialect(
         "any": "any({0})",
         "spread": "spread({0})",
     },
-    where=_CHOOSE,
-    replaced=_CHOOSE,
+    where=_SELECTION,
+    replaced=_SELECTION,
 )
 """Vector types of GCC and Clang, as in lanes.c: comparisons give masks, all bits set or none."""
 
@@ -49,12 +49,12 @@ VECTORS = Dialect(
 def batch_source(program: Program) -> str:
     """Return a translation unit with the function `run` over rows of samples."""
     counts = [f"#define INPUTS {len(program.inputs)}", f"#define OUTPUTS {len(program.outputs)}"]
-    support = files("vsacli.compute.engine").joinpath("lanes.c").read_text(encoding="utf-8")
-    group = _calling_group(program) if is_of_calls(program) else _group(program)
-    return "\n".join([*counts, "", support, *group, ""])
+    lane_code = files("vsacli.compute.engine").joinpath("lanes.c").read_text(encoding="utf-8")
+    group_function = _calling_group_lines(program) if is_of_calls(program) else _group_lines(program)
+    return "\n".join([*counts, "", lane_code, *group_function, ""])
 
 
-def _group(program: Program) -> Iterator[str]:
+def _group_lines(program: Program) -> Iterator[str]:
     """Yield the function that computes one sample in each lane."""
     tables = Tables([program], VECTORS.array_type)
     yield from table_declarations(tables, VECTORS)
@@ -72,7 +72,7 @@ def _group(program: Program) -> Iterator[str]:
     yield "}"
 
 
-def _calling_group(program: Program) -> Iterator[str]:
+def _calling_group_lines(program: Program) -> Iterator[str]:
     """Yield the function for a program of calls: loops copy between the rows and the workspace."""
     tables = Tables([program], VECTORS.array_type)
     yield from table_declarations(tables, VECTORS)
@@ -80,23 +80,23 @@ def _calling_group(program: Program) -> Iterator[str]:
     yield from code.declarations("static __attribute__((noinline))")
     yield "static void group(const double *const *in, double *const *out, int64_t at)"
     yield "{"
-    yield f"static _Thread_local reals {VALUES}[{code.slots}];"
+    yield f"static _Thread_local reals {VALUES}[{code.slot_count}];"
     yield "for (int row = 0; row < INPUTS; row++)"
     yield f"{VALUES}[row] = load(in[row] + at);"
     yield from code.statements()
     outputs = list(enumerate(program.outputs))
     computed = [(row, output) for row, output in outputs if isinstance(output, Symbol)]
     for real, name, value in ((True, "reals_to", "{}"), (False, "counts_to", "counted((integers){})")):
-        places = [
+        slots_of_rows = [
             (row, code.slot[symbol.index]) for row, symbol in computed if (symbol.kind is Kind.REAL) is real
         ]
-        yield from _stores("int", name, places, value.format(f"{VALUES}[{{}}]"))
+        yield from _store_loop("int", name, slots_of_rows, value.format(f"{VALUES}[{{}}]"))
     constants = [(row, digits(float(output))) for row, output in outputs if not isinstance(output, Symbol)]
-    yield from _stores("double", "constants_to", constants, "spread({})")
+    yield from _store_loop("double", "constants_to", constants, "spread({})")
     yield "}"
 
 
-def _stores(type_: str, name: str, entries: list[tuple[int, Any]], value: str) -> Iterator[str]:
+def _store_loop(type_: str, name: str, entries: list[tuple[int, Any]], value: str) -> Iterator[str]:
     """Yield a loop that stores values to rows; a table has the indices of both."""
     if not entries:
         return

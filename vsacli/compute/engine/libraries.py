@@ -19,7 +19,7 @@ from vsacli.compute.engine.costs import (
     TRACED_SECONDS,
     UNTRACED_SECONDS,
 )
-from vsacli.compute.engine.trial import Trying, check_library
+from vsacli.compute.engine.trial import TrialFactory, check_library
 
 LONG_SECONDS = 5.0
 """Estimated time of the compiler, s, from which on it is announced to the user."""
@@ -51,9 +51,9 @@ class Code(NamedTuple):
     @property
     def compiling_seconds(self) -> float:
         """Estimated time of the compiler, s."""
-        linear, squares = sum(self.functions), sum(count**2 for count in self.functions)
-        needed = COMPILER_SECONDS_PER_OPERATION * linear + COMPILER_SECONDS_PER_SQUARE * squares
-        return COMPILER_START_SECONDS + needed
+        operations, squared = sum(self.functions), sum(count**2 for count in self.functions)
+        seconds = COMPILER_SECONDS_PER_OPERATION * operations + COMPILER_SECONDS_PER_SQUARE * squared
+        return COMPILER_START_SECONDS + seconds
 
     @property
     def takes_too_long(self) -> bool:
@@ -74,40 +74,40 @@ class Loaded(NamedTuple, Generic[_Opened]):
 
 def load(
     code: Code,
-    opened: Callable[[Path], _Opened],
+    open_library: Callable[[Path], _Opened],
     compiler: Compiler,
     tell: Tell,
-    trying: Trying,
+    make_trial: TrialFactory,
     worthwhile: Worthwhile = lambda _code: True,
 ) -> Loaded[_Opened] | None:
     """Return the library of some code; None if it is not cached and not worth compiling.
 
     Args:
         code: Code to compile.
-        opened: Function that loads a library, equal for equal code; the file may be removed once loaded.
+        open_library: Function that loads a library, equal for equal code; the file may then be removed.
         compiler: Compiler to use.
         tell: Callback for problems with the cache, which are no errors, and announcements of long work.
-        trying: Trial of new code; only code that passes is loaded and kept.
+        make_trial: Trial of new code; only code that passes is loaded and kept.
         worthwhile: Whether to compile code that is not in the cache.
 
     Raises:
         CompilerError: The code cannot be compiled or loaded, or fails its trial.
     """
     key = key_of(code.text, compiler.identity)
-    if key not in _loaded:
-        cache = _open_cache(tell)
-        kept = None if cache is None else _found(cache, key, opened, tell)
-        if kept is not None:
-            _loaded[key] = Loaded(kept, compiled=False)
+    if key not in _loaded_libraries:
+        cache = _cache_if_usable(tell)
+        cached = None if cache is None else _load_cached(cache, key, open_library, tell)
+        if cached is not None:
+            _loaded_libraries[key] = Loaded(cached, compiled=False)
         elif worthwhile(code):
-            _announce(code, tell)
-            _loaded[key] = Loaded(
-                _built(code.text, key, opened, compiler, trying, cache, tell), compiled=True
+            _announce_compilation(code, tell)
+            _loaded_libraries[key] = Loaded(
+                _build_library(code.text, key, open_library, compiler, make_trial, cache, tell), compiled=True
             )
-    return _loaded.get(key)
+    return _loaded_libraries.get(key)
 
 
-def _announce(code: Code, tell: Tell) -> None:
+def _announce_compilation(code: Code, tell: Tell) -> None:
     """Announce a compilation that takes long.
 
     Raises:
@@ -115,19 +115,19 @@ def _announce(code: Code, tell: Tell) -> None:
     """
     seconds = code.compiling_seconds
     if code.takes_too_long:
-        count = sum(code.functions)
+        operations = sum(code.functions)
         raise CompilerError(
-            f"compiling {count} operations would take about {seconds:.0f} s, more than {TIMEOUT:g} s"
+            f"compiling {operations} operations would take about {seconds:.0f} s, more than {TIMEOUT:g} s"
         )
     if seconds > LONG_SECONDS:
         tell(f"compiling takes about {seconds:.0f} s, this once (at most {TIMEOUT:g} s)")
 
 
-_loaded: dict[str, Loaded[Any]] = {}
+_loaded_libraries: dict[str, Loaded[Any]] = {}
 """Libraries loaded by this process, by key."""
 
 
-def _open_cache(tell: Tell) -> Cache | None:
+def _cache_if_usable(tell: Tell) -> Cache | None:
     try:
         return open_cache()
     except CacheError as error:
@@ -135,10 +135,12 @@ def _open_cache(tell: Tell) -> Cache | None:
         return None
 
 
-def _found(cache: Cache, key: str, opened: Callable[[Path], _Opened], tell: Tell) -> _Opened | None:
+def _load_cached(
+    cache: Cache, key: str, open_library: Callable[[Path], _Opened], tell: Tell
+) -> _Opened | None:
     try:
         path = cache.find(key)
-        return None if path is None else opened(path)
+        return None if path is None else open_library(path)
     except CacheError as error:
         tell(str(error))
     except CompilerError as error:  # such as a folder mounted noexec
@@ -146,32 +148,32 @@ def _found(cache: Cache, key: str, opened: Callable[[Path], _Opened], tell: Tell
     return None
 
 
-def _built(
+def _build_library(
     source: str,
     key: str,
-    opened: Callable[[Path], _Opened],
+    open_library: Callable[[Path], _Opened],
     compiler: Compiler,
-    trying: Trying,
+    make_trial: TrialFactory,
     cache: Cache | None,
     tell: Tell,
 ) -> _Opened:
     try:
         with temporary_folder() as folder:
-            text, library = folder / "program.c", folder / LIBRARY
+            source_path, library_path = folder / "program.c", folder / LIBRARY
             with reporting_temporary_errors():
-                text.write_text(source, encoding="utf-8")
-            compiler.build(text, library)
-            check_library(library, trying())
-            loaded = opened(library)
+                source_path.write_text(source, encoding="utf-8")
+            compiler.build(source_path, library_path)
+            check_library(library_path, make_trial())
+            opened_library = open_library(library_path)
             if cache is not None:
-                _keep(cache, key, library, tell)
-            return loaded
+                _store_library(cache, key, library_path, tell)
+            return opened_library
     except StorageError as error:
         raise CompilerError(str(error)) from None
 
 
-def _keep(cache: Cache, key: str, library: Path, tell: Tell) -> None:
+def _store_library(cache: Cache, key: str, library_path: Path, tell: Tell) -> None:
     try:
-        cache.store(key, library)
+        cache.store(key, library_path)
     except CacheError as error:
         tell(f"{error}; compiled code is not kept")

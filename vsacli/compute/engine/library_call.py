@@ -24,31 +24,31 @@ def call(path: str, name: str, arguments: list[Any]) -> bytes:
     with suppress(OSError):
         ctypes.CDLL("libmvec.so.1", mode=ctypes.RTLD_GLOBAL)
     function = getattr(ctypes.CDLL(path), name)
-    kept: list[Any] = []
+    buffers: list[Any] = []
     results: list[tuple[int, int]] = []
 
-    def word(part: Any) -> int:
-        if isinstance(part, int):
-            return part
-        if isinstance(part, tuple):
-            kept.append(ctypes.create_string_buffer(part[0] + ALIGNMENT))
-            first = ctypes.addressof(kept[-1])
-            results.append((first - first % -ALIGNMENT, *part))
+    def word_of(content: Any) -> int:
+        if isinstance(content, int):
+            return content
+        if isinstance(content, tuple):
+            buffers.append(ctypes.create_string_buffer(content[0] + ALIGNMENT))
+            first = ctypes.addressof(buffers[-1])
+            results.append((first - first % -ALIGNMENT, *content))
             return results[-1][0]
-        kept.append(
-            (ctypes.c_int64 * len(part))(*map(word, part))
-            if isinstance(part, list)
-            else ctypes.create_string_buffer(part)
+        buffers.append(
+            (ctypes.c_int64 * len(content))(*map(word_of, content))
+            if isinstance(content, list)
+            else ctypes.create_string_buffer(content)
         )
-        return ctypes.addressof(kept[-1])
+        return ctypes.addressof(buffers[-1])
 
     function(
         *(
-            ctypes.c_double(each) if isinstance(each, float) else ctypes.c_int64(word(each))
-            for each in arguments
+            ctypes.c_double(argument) if isinstance(argument, float) else ctypes.c_int64(word_of(argument))
+            for argument in arguments
         )
     )
-    return b"".join(ctypes.string_at(*each) for each in results)
+    return b"".join(ctypes.string_at(*argument) for argument in results)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vsacli.base.arrays import FloatArray
-from vsacli.compute.engine.choice import NUMPY, choose
+from vsacli.compute.engine.choice import NUMPY, choose_engine
 from vsacli.compute.engine.engines import KEPT_PROGRAMS, Engine, Kernel, kernel_program
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class NumberEngine:
     def run(self, kernel: Kernel, rows: Sequence[FloatArray]) -> FloatArray:
         """See `Engine.run`."""
         samples = len(rows[0])
-        function = _recorded(kernel).called() if samples <= MOST_SAMPLES else None
+        function = _recorded_kernel(kernel).function_of_call() if samples <= MOST_SAMPLES else None
         if function is None:
             return NUMPY.run(kernel, rows)
         outputs = np.empty((kernel.outputs, samples))
@@ -63,13 +63,13 @@ def engine_of_call(engine: str | Engine, kernel: Kernel, samples: int) -> Engine
         samples: Number of samples.
 
     Raises:
-        InputError: See `choose`.
+        InputError: See `choose_engine`.
     """
     if not isinstance(engine, str):
         return engine
     if engine in ("numpy", "auto") and samples <= MOST_SAMPLES:
         return NUMBERS
-    return choose(engine, kernel, samples).engine
+    return choose_engine(engine, kernel, samples).engine
 
 
 class _RecordedKernel:
@@ -80,7 +80,7 @@ class _RecordedKernel:
         self._calls = 0
         self._function: NumberFunction | None = None
 
-    def called(self) -> NumberFunction | None:
+    def function_of_call(self) -> NumberFunction | None:
         """Count a call, and return the function; None while calls are few, or if it cannot be recorded."""
         self._calls += 1
         if self._calls == RECORDED_FROM:
@@ -94,5 +94,5 @@ class _RecordedKernel:
 
 
 @lru_cache(maxsize=KEPT_PROGRAMS)
-def _recorded(kernel: Kernel) -> _RecordedKernel:
+def _recorded_kernel(kernel: Kernel) -> _RecordedKernel:
     return _RecordedKernel(kernel)

@@ -24,7 +24,7 @@ AGREEMENT = 1e-6
 """Largest difference of results, relative to the peak of a row or to 1. Sound code differs by 1e-12 of the
 peak, near a singularity by more; rows of residuals, which are rounding, are far below 1."""
 
-DIFFERING = 0.25
+MAX_DIFFERING_SHARE = 0.25
 """Share of the samples that may differ: at a threshold, rounding decides on which side a sample lies."""
 
 
@@ -44,7 +44,7 @@ class Trial(NamedTuple):
     expected: FloatArray
 
 
-Trying: TypeAlias = Callable[[], Trial]
+TrialFactory: TypeAlias = Callable[[], Trial]
 """Function that returns a trial; called only if code is compiled."""
 
 
@@ -54,24 +54,24 @@ def check_library(path: Path, trial: Trial) -> None:
     Raises:
         CompilerError: The library cannot be loaded, crashes, or computes something else.
     """
-    found = np.frombuffer(_results(path, trial)).reshape(
+    results = np.frombuffer(_library_results(path, trial)).reshape(
         trial.expected.shape, order="C" if trial.expected.flags.c_contiguous else "F"
     )
-    valid = np.isfinite(trial.expected)
-    peak = np.max(np.abs(trial.expected), axis=1, where=valid, initial=1.0, keepdims=True)
+    finite = np.isfinite(trial.expected)
+    peak = np.max(np.abs(trial.expected), axis=1, where=finite, initial=1.0, keepdims=True)
     with np.errstate(invalid="ignore"):
-        agrees = ~valid | (np.abs(found - trial.expected) <= AGREEMENT * peak)
-    if np.mean(~agrees.all(axis=0)) > DIFFERING:
+        agrees = ~finite | (np.abs(results - trial.expected) <= AGREEMENT * peak)
+    if np.mean(~agrees.all(axis=0)) > MAX_DIFFERING_SHARE:
         raise CompilerError("what the C compiler made computes something else than NumPy does")
 
 
-def _results(path: Path, trial: Trial) -> bytes:
-    text = files("vsacli.compute.engine").joinpath("library_call.py").read_text(encoding="utf-8")
-    call = marshal.dumps((str(path), trial.function, trial.arguments))
+def _library_results(path: Path, trial: Trial) -> bytes:
+    script = files("vsacli.compute.engine").joinpath("library_call.py").read_text(encoding="utf-8")
+    message = marshal.dumps((str(path), trial.function, trial.arguments))
     try:
-        done = subprocess.run(
-            [sys.executable, "-I", "-S", "-c", text],
-            input=call,
+        process = subprocess.run(
+            [sys.executable, "-I", "-S", "-c", script],
+            input=message,
             capture_output=True,
             timeout=TIMEOUT,
             check=False,
@@ -80,9 +80,9 @@ def _results(path: Path, trial: Trial) -> bytes:
         raise CompilerError(f"what the C compiler made does not end within {TIMEOUT:g} s") from None
     except OSError as error:
         raise CompilerError(f"what the C compiler made cannot be tried: {error}") from None
-    if done.returncode < 0:
-        raise CompilerError(f"what the C compiler made crashes ({signal.Signals(-done.returncode).name})")
-    if done.returncode or len(done.stdout) != trial.expected.nbytes:
-        *_, last = done.stderr.decode(errors="replace").splitlines() or ["it returns nothing"]
+    if process.returncode < 0:
+        raise CompilerError(f"what the C compiler made crashes ({signal.Signals(-process.returncode).name})")
+    if process.returncode or len(process.stdout) != trial.expected.nbytes:
+        *_, last = process.stderr.decode(errors="replace").splitlines() or ["it returns nothing"]
         raise CompilerError(f"what the C compiler made cannot be loaded: {last.partition(': ')[2] or last}")
-    return done.stdout
+    return process.stdout

@@ -22,7 +22,7 @@ def apply_ufunc(
 ) -> Any:
     """Return the entries of `ufunc(*operands)`, or of `ufunc.reduce(operand, axis=...)`."""
     if ufunc is np.matmul:
-        return _matmul(tape, *operands)
+        return _record_matmul(tape, *operands)
     if method == "reduce":
         rows = np.moveaxis(operands[0], options.get("axis", 0) or 0, 0)
         return reduce(lambda a, b: elementwise(tape, ufunc, a, b), rows)
@@ -34,34 +34,34 @@ def apply_ufunc(
 def elementwise(tape: Tape, ufunc: np.ufunc, *operands: Cells) -> Cells:
     """Return a ufunc of arrays, entry by entry."""
     if all(cells.size == 1 for cells in operands):
-        single = np.empty(max((cells.shape for cells in operands), key=len), dtype=object)
-        single[...] = _one(tape, ufunc, *(cells.item() for cells in operands))
-        return single
-    return each_entry(lambda *entries: _one(tape, ufunc, *entries), *operands)
+        result = np.empty(max((cells.shape for cells in operands), key=len), dtype=object)
+        result[...] = _record_scalar(tape, ufunc, *(cells.item() for cells in operands))
+        return result
+    return each_entry(lambda *entries: _record_scalar(tape, ufunc, *entries), *operands)
 
 
 def each_entry(function: Callable[..., Operand], *operands: Any) -> Cells:
     """Return a function of scalars, applied to each entry of arrays."""
-    spread = np.broadcast_arrays(*(np.asarray(cells, dtype=object) for cells in operands))
-    result = np.empty(spread[0].size, dtype=object)
-    result[:] = [function(*entries) for entries in zip(*(cells.flat for cells in spread), strict=True)]
-    return result.reshape(spread[0].shape)
+    broadcast = np.broadcast_arrays(*(np.asarray(cells, dtype=object) for cells in operands))
+    result = np.empty(broadcast[0].size, dtype=object)
+    result[:] = [function(*entries) for entries in zip(*(cells.flat for cells in broadcast), strict=True)]
+    return result.reshape(broadcast[0].shape)
 
 
-def _one(tape: Tape, ufunc: np.ufunc, *operands: Operand) -> Operand:
+def _record_scalar(tape: Tape, ufunc: np.ufunc, *operands: Operand) -> Operand:
     """Return a ufunc of symbols or constants."""
     if not any(isinstance(operand, Symbol) for operand in operands):
         with np.errstate(all="ignore"):
             number: Operand = ufunc(*operands).item()
         return number
-    name = ufunc.__name__
-    if name in _COMPOSED:
-        return _COMPOSED[name](tape, *operands)
-    if name in BITWISE and _any_truth(operands):
-        name = f"logical_{BITWISE[name]}"
-    if name == "multiply" and (shifted := _scaled_bits(tape, operands)) is not None:
-        return shifted
-    return tape.emit(name, *operands)
+    operation = ufunc.__name__
+    if operation in _COMPOSED:
+        return _COMPOSED[operation](tape, *operands)
+    if operation in BITWISE and _any_truth(operands):
+        operation = f"logical_{BITWISE[operation]}"
+    if operation == "multiply" and (scaled := _scaled_bits(tape, operands)) is not None:
+        return scaled
+    return tape.emit(operation, *operands)
 
 
 def _any_truth(operands: Sequence[Operand]) -> bool:
@@ -80,7 +80,7 @@ def _scaled_bits(tape: Tape, operands: Sequence[Operand]) -> Operand | None:
     return None
 
 
-def _power(tape: Tape, base: Operand, exponent: Operand) -> Operand:
+def _record_power(tape: Tape, base: Operand, exponent: Operand) -> Operand:
     """Return a power, as products if the exponent is a small integer or 1.5."""
     if exponent == 1.5:
         return tape.emit("multiply", base, tape.emit("sqrt", base))
@@ -92,34 +92,38 @@ def _power(tape: Tape, base: Operand, exponent: Operand) -> Operand:
     return tape.emit("multiply", square, base if exponent == 3 else square)
 
 
-def _isfinite(tape: Tape, a: Operand) -> Operand:
+def _record_isfinite(tape: Tape, a: Operand) -> Operand:
     return tape.emit("less", tape.emit("absolute", a), float("inf"))
 
 
-def _isinf(tape: Tape, a: Operand) -> Operand:
+def _record_isinf(tape: Tape, a: Operand) -> Operand:
     return tape.emit("equal", tape.emit("absolute", a), float("inf"))
 
 
 _COMPOSED: dict[str, Callable[..., Operand]] = {
-    "power": _power,
-    "float_power": _power,
+    "power": _record_power,
+    "float_power": _record_power,
     "square": lambda tape, a: tape.emit("multiply", a, a),
     "reciprocal": lambda tape, a: tape.emit("divide", 1.0, a),
     "positive": lambda _tape, a: a,
     "fabs": lambda tape, a: tape.emit("absolute", a),
-    "isfinite": _isfinite,
-    "isinf": _isinf,
+    "isfinite": _record_isfinite,
+    "isinf": _record_isinf,
 }
 """Functions that are recorded as several operations."""
 
 
-def _matmul(tape: Tape, a: Cells, b: Cells) -> Cells:
+def _record_matmul(tape: Tape, a: Cells, b: Cells) -> Cells:
     """Return the matrix product; zeros of a constant matrix add no term."""
 
     def dot(row: Cells, column: Cells) -> Operand:
         pairs = [pair for pair in zip(row, column, strict=True) if 0 not in pair]
-        products = [_one(tape, np.multiply, *pair) for pair in pairs]
-        return reduce(lambda total, term: _one(tape, np.add, total, term), products) if products else 0.0
+        products = [_record_scalar(tape, np.multiply, *pair) for pair in pairs]
+        return (
+            reduce(lambda total, term: _record_scalar(tape, np.add, total, term), products)
+            if products
+            else 0.0
+        )
 
     result = [[dot(row, column) for column in b.reshape(len(b), -1).T] for row in np.atleast_2d(a)]
     return np.array(result, dtype=object).reshape(*a.shape[:-1], *b.shape[1:])
@@ -135,38 +139,38 @@ ARRANGING: frozenset[Callable[..., Any]] = frozenset(
 """Functions that only rearrange entries."""
 
 
-def _where(tape: Tape, truth: Any, a: Any, b: Any) -> Cells:
+def _record_where(tape: Tape, truth: Any, a: Any, b: Any) -> Cells:
     if any(np.asarray(argument).dtype.kind == "u" for argument in (a, b)):
         raise NotImplementedError("bits are recorded as set or not: truth.astype(FLAG_TYPE) * bits")
-    return each_entry(lambda *entries: _choice(tape, *entries), truth, a, b)
+    return each_entry(lambda *entries: _record_choice(tape, *entries), truth, a, b)
 
 
-def _choice(tape: Tape, truth: Operand, a: Operand, b: Operand) -> Operand:
+def _record_choice(tape: Tape, truth: Operand, a: Operand, b: Operand) -> Operand:
     if not isinstance(truth, Symbol):
         return a if truth else b
     return tape.emit("where", truth, a, b)
 
 
-def _clip(tape: Tape, values: Any, low: Any, high: Any) -> Cells:
-    raised = elementwise(tape, np.maximum, *map(_objects, (values, low)))
-    return elementwise(tape, np.minimum, raised, _objects(high))
+def _record_clip(tape: Tape, values: Any, low: Any, high: Any) -> Cells:
+    clipped_below = elementwise(tape, np.maximum, *map(_object_array, (values, low)))
+    return elementwise(tape, np.minimum, clipped_below, _object_array(high))
 
 
-def _searchsorted(tape: Tape, nodes: Any, values: Any, *, side: str = "left") -> Cells:
+def _record_searchsorted(tape: Tape, nodes: Any, values: Any, *, side: str = "left") -> Cells:
     if side != "right":
         raise NotImplementedError("numpy.searchsorted is recorded with side='right' only")
     table = SelectionTable(tuple(np.asarray(nodes, dtype=np.float64).tolist()))
     return each_entry(lambda cell: tape.emit("searchsorted", table, cell), values)
 
 
-def _objects(argument: Any) -> Cells:
+def _object_array(argument: Any) -> Cells:
     return np.asarray(argument, dtype=object)
 
 
 FUNCTIONS: dict[Callable[..., Any], Callable[..., Cells]] = {
-    np.where: _where,
-    np.clip: _clip,
-    np.searchsorted: _searchsorted,
+    np.where: _record_where,
+    np.clip: _record_clip,
+    np.searchsorted: _record_searchsorted,
 }
 """Functions that compute entries."""
 
@@ -199,19 +203,19 @@ class TracedArray(NDArrayOperatorsMixin):
         self, function: Callable[..., Any], _types: Any, arguments: tuple[Any, ...], options: dict[str, Any]
     ) -> Any:
         if function in FUNCTIONS:
-            return TracedArray(self.tape, FUNCTIONS[function](self.tape, *_unpacked(arguments), **options))
+            return TracedArray(self.tape, FUNCTIONS[function](self.tape, *_untraced(arguments), **options))
         if function not in ARRANGING:
             raise NotImplementedError(f"numpy.{function.__name__} cannot be recorded")
         result = function(
-            *_unpacked(arguments), **{name: _unpacked(value) for name, value in options.items()}
+            *_untraced(arguments), **{name: _untraced(value) for name, value in options.items()}
         )
         return TracedArray(self.tape, result) if isinstance(result, np.ndarray) else result
 
     def __getitem__(self, index: Any) -> TracedArray:
-        return TracedArray(self.tape, self.cells[_index(index)])
+        return TracedArray(self.tape, self.cells[_untraced_index(index)])
 
     def __setitem__(self, index: Any, value: Any) -> None:
-        self.cells[_index(index)] = cells_of(value)
+        self.cells[_untraced_index(index)] = cells_of(value)
 
     def __iter__(self) -> Iterator[TracedArray]:
         return (self[index] for index in range(len(self)))
@@ -220,15 +224,15 @@ class TracedArray(NDArrayOperatorsMixin):
         return len(self.cells)
 
     def __bool__(self) -> bool:
-        return bool(self._known())
+        return bool(self._constant_cells())
 
     def __float__(self) -> float:
-        return float(self._known().item())
+        return float(self._constant_cells().item())
 
     def __hash__(self) -> int:
         return hash(float(self))
 
-    def _known(self) -> Cells:
+    def _constant_cells(self) -> Cells:
         """Return the entries, if all of them are constants."""
         if any(isinstance(cell, Symbol) for cell in self.cells.flat):
             raise NotImplementedError(
@@ -258,19 +262,19 @@ class TracedArray(NDArrayOperatorsMixin):
 
     def astype(self, dtype: npt.DTypeLike) -> TracedArray:
         """Return the array with another type; a Boolean becomes the lowest bit of an unsigned integer."""
-        wanted = np.dtype(dtype).kind
+        dtype_kind = np.dtype(dtype).kind
         return TracedArray(
-            self.tape, np.vectorize(lambda cell: self._cast(cell, wanted), otypes=[object])(self.cells)
+            self.tape, np.vectorize(lambda cell: self._cast(cell, dtype_kind), otypes=[object])(self.cells)
         )
 
-    def _cast(self, cell: Operand, wanted: str) -> Operand:
+    def _cast(self, cell: Operand, dtype_kind: str) -> Operand:
         if isinstance(cell, Symbol):
-            if cell.kind is Kind.TRUTH and wanted == "u":
+            if cell.kind is Kind.TRUTH and dtype_kind == "u":
                 return self.tape.emit("bits", cell, 1)
-            if (cell.kind, wanted) in {(Kind.REAL, "f"), (Kind.TRUTH, "b"), (Kind.BITS, "u")}:
+            if (cell.kind, dtype_kind) in {(Kind.REAL, "f"), (Kind.TRUTH, "b"), (Kind.BITS, "u")}:
                 return cell
-            raise NotImplementedError(f"no conversion of {cell.kind} to the NumPy kind {wanted!r}")
-        return _CASTS[wanted](cell)
+            raise NotImplementedError(f"no conversion of {cell.kind} to the NumPy kind {dtype_kind!r}")
+        return _CASTS[dtype_kind](cell)
 
     def copy(self) -> TracedArray:
         """Return a copy."""
@@ -299,24 +303,24 @@ def cells_of(array: Any) -> Cells:
     return np.asarray(array, dtype=object)
 
 
-def _unpacked(argument: Any) -> Any:
+def _untraced(argument: Any) -> Any:
     """Return cells in place of traced arrays, also inside lists and tuples."""
     if isinstance(argument, TracedArray):
         return argument.cells
     if isinstance(argument, list | tuple):
-        return type(argument)(map(_unpacked, argument))
+        return type(argument)(map(_untraced, argument))
     return argument
 
 
-def _index(index: Any) -> Any:
+def _untraced_index(index: Any) -> Any:
     """Return an index; a traced array is allowed only if it consists of constant Booleans."""
-    return index._known().astype(bool) if isinstance(index, TracedArray) else index
+    return index._constant_cells().astype(bool) if isinstance(index, TracedArray) else index
 
 
 def trace(
     function: Callable[[Sequence[Any]], Sequence[Any]],
     kinds: Sequence[Kind],
-    most: int = sys.maxsize,
+    max_operations: int = sys.maxsize,
     *,
     calling: bool = False,
     short: bool = False,
@@ -327,7 +331,7 @@ def trace(
     Args:
         function: Function from rows of samples to rows of results; each sample is computed independently.
         kinds: Kinds of the input rows.
-        most: Largest number of operations.
+        max_operations: Largest number of operations.
         calling: Whether calls are recorded as such, or expanded.
         short: Whether subroutines are separate functions.
         conditional: See `Tape`.
@@ -335,7 +339,7 @@ def trace(
     Raises:
         NotImplementedError: The function cannot be traced; `TooLongError` if it has more operations.
     """
-    tape = Tape(most, calling, short, conditional)
+    tape = Tape(max_operations, calling, short, conditional)
     rows = [TracedArray(tape, [tape.input(kind)]) for kind in kinds]
     return tape.program([cells_of(result).item() for result in function(rows)])
 
@@ -344,7 +348,7 @@ def trace_by_size(
     function: Callable[[Sequence[Any]], Sequence[Any]],
     kinds: Sequence[Kind],
     written_out: int,
-    most: int = sys.maxsize,
+    max_operations: int = sys.maxsize,
     *,
     short: bool = False,
     conditional: int | None = None,
@@ -355,7 +359,7 @@ def trace_by_size(
         function: See `trace`.
         kinds: See `trace`.
         written_out: Largest number of operations of a program without calls.
-        most: Largest number of operations, including calls, of another program.
+        max_operations: Largest number of operations, including calls, of another program.
         short: See `trace`.
         conditional: See `Tape`; applies to programs without calls.
 
@@ -365,4 +369,4 @@ def trace_by_size(
     try:
         return trace(function, kinds, written_out, short=short, conditional=conditional)
     except TooLongError:
-        return trace(function, kinds, most, calling=True, short=short)
+        return trace(function, kinds, max_operations, calling=True, short=short)

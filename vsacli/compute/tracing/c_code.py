@@ -70,7 +70,7 @@ class ConstantArray(NamedTuple):
     values: tuple[float, ...]
 
 
-class Place(NamedTuple):
+class TableLocation(NamedTuple):
     """Place of a table: an array and an offset."""
 
     array: ConstantArray
@@ -99,34 +99,34 @@ class Tables:
 
     def __init__(self, programs: Iterable[Program], array_type: ArrayType) -> None:
         uses = list(table_uses(*programs))
-        distinct = dict.fromkeys(table for table, _ in uses)
-        contents: list[tuple[float, ...]] = []
-        self._places = {
-            table: _part(contents, table.values)
-            for table in sorted(distinct, key=lambda table: -len(table.values))
+        tables = dict.fromkeys(table for table, _ in uses)
+        arrays: list[tuple[float, ...]] = []
+        self._locations = {
+            table: _find_or_append(arrays, table.values)
+            for table in sorted(tables, key=lambda table: -len(table.values))
         }
-        searched = {self._places[table][0] for table, operation in uses if operation == "searchsorted"}
+        searched = {self._locations[table][0] for table, operation in uses if operation == "searchsorted"}
         self.arrays = [
-            ConstantArray(f"table_{number}", array_type(values, number in searched), values)
-            for number, values in enumerate(contents)
+            ConstantArray(f"table_{index}", array_type(values, index in searched), values)
+            for index, values in enumerate(arrays)
         ]
 
-    def place(self, table: SelectionTable) -> Place:
+    def place(self, table: SelectionTable) -> TableLocation:
         """Return the place of a table."""
-        number, offset = self._places[table]
-        return Place(self.arrays[number], offset)
+        index, offset = self._locations[table]
+        return TableLocation(self.arrays[index], offset)
 
 
-def _part(contents: list[tuple[float, ...]], values: tuple[float, ...]) -> tuple[int, int]:
+def _find_or_append(arrays: list[tuple[float, ...]], values: tuple[float, ...]) -> tuple[int, int]:
     """Return the index of an array that contains the values bit for bit, or of a new one, and the offset."""
-    wanted = array("d", values)
-    for number, others in enumerate(contents):
-        whole, at = array("d", others).tobytes(), -1
-        while (at := whole.find(wanted.tobytes(), at + 1)) >= 0:
-            if at % wanted.itemsize == 0:
-                return number, at // wanted.itemsize
-    contents.append(values)
-    return len(contents) - 1, 0
+    entries = array("d", values)
+    for index, array_values in enumerate(arrays):
+        array_bytes, byte_offset = array("d", array_values).tobytes(), -1
+        while (byte_offset := array_bytes.find(entries.tobytes(), byte_offset + 1)) >= 0:
+            if byte_offset % entries.itemsize == 0:
+                return index, byte_offset // entries.itemsize
+    arrays.append(values)
+    return len(arrays) - 1, 0
 
 
 class Dialect(NamedTuple):
@@ -152,7 +152,7 @@ class Dialect(NamedTuple):
     real: Callable[[float], str]
     literal: Callable[[float], str]
     array_type: ArrayType
-    take: Callable[[Place, str], str]
+    take: Callable[[TableLocation, str], str]
     function: Callable[[Kind, str], str]
     templates: Mapping[str, str]
     where: Mapping[Kind, str]
@@ -210,31 +210,31 @@ class Writer:
     ) -> None:
         self.dialect = dialect
         self._tables = tables
-        self._name_of = subroutines
+        self._subroutine_name = subroutines
 
     def statements(self, operations: Iterable[Symbol], names: Names, prefix: str = "v") -> Iterator[str]:
         """Yield declarations of the values of operations in order; names of values begin with the prefix."""
         for symbol in operations:
             if symbol.operation == "subroutine":
-                yield from self._subroutine(symbol, names, prefix)
+                yield from self._subroutine_statements(symbol, names, prefix)
             elif symbol.operation == "loop":
-                yield from self._loop(symbol, names, prefix)
+                yield from self._loop_statements(symbol, names, prefix)
             elif symbol.operation == "branch":
-                yield from self._branch(symbol, names, prefix)
+                yield from self._branch_statements(symbol, names, prefix)
             elif symbol.operation != "item":
-                text = self._expression(symbol, names, prefix)
-                yield f"const {self.dialect.types[symbol.kind]} {_name(symbol, names, prefix)} = {text};"
+                name, text = _symbol_name(symbol, names, prefix), self._expression(symbol, names, prefix)
+                yield f"const {self.dialect.types[symbol.kind]} {name} = {text};"
 
     def value(self, operand: Operand, kind: Kind, names: Names, prefix: str = "v") -> str:
         """Return a value, or a constant of that kind."""
         if isinstance(operand, Symbol):
-            return _name(operand, names, prefix)
+            return _symbol_name(operand, names, prefix)
         return self.dialect.constant(operand, kind)
 
     def _expression(self, symbol: Symbol, names: Names, prefix: str) -> str:
         operation, dialect = symbol.operation, self.dialect
         if isinstance(table := symbol.operands[0], SelectionTable):
-            return self._from_table(table, symbol, names, prefix)
+            return self._table_expression(table, symbol, names, prefix)
         texts = [
             self.value(operand, kind, names, prefix)
             for operand, kind in zip(symbol.operands, kinds_of_operands(symbol), strict=True)
@@ -262,78 +262,86 @@ class Writer:
             yield f"{results}[{number}] = {self.value(output, Kind.REAL, names)};"
         yield "}"
 
-    def _subroutine(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
+    def _subroutine_statements(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
         """Yield an array of the results, and the statements that fill it."""
-        assert self._name_of is not None
+        assert self._subroutine_name is not None
         (body,), *operands = symbol.operands
-        own = _name(symbol, names, prefix)
+        result_name = _symbol_name(symbol, names, prefix)
         arguments = [self.value(operand, Kind.REAL, names, prefix) for operand in operands]
-        yield f"{self.dialect.types[Kind.REAL]} {own}[{len(body.outputs)}];"
-        yield f"{self._name_of(body)}({', '.join([*arguments, own])});"
+        yield f"{self.dialect.types[Kind.REAL]} {result_name}[{len(body.outputs)}];"
+        yield f"{self._subroutine_name(body)}({', '.join([*arguments, result_name])});"
 
-    def _from_table(self, table: SelectionTable, symbol: Symbol, names: Names, prefix: str) -> str:
-        place, taken = self._tables.place(table), symbol.operation == "take"
-        operand = self.value(symbol.operands[1], Kind.INDEX if taken else Kind.REAL, names, prefix)
-        if taken:
-            return self.dialect.take(place, operand)
-        searched = (place.pointer, str(len(table.values)), operand)
-        return self.dialect.call(Kind.INDEX, C_NAMES[symbol.operation], searched)
+    def _table_expression(self, table: SelectionTable, symbol: Symbol, names: Names, prefix: str) -> str:
+        location, takes_entry = self._tables.place(table), symbol.operation == "take"
+        operand = self.value(symbol.operands[1], Kind.INDEX if takes_entry else Kind.REAL, names, prefix)
+        if takes_entry:
+            return self.dialect.take(location, operand)
+        arguments = (location.pointer, str(len(table.values)), operand)
+        return self.dialect.call(Kind.INDEX, C_NAMES[symbol.operation], arguments)
 
-    def _loop(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
+    def _loop_statements(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
         """Yield the variables of the state, and the loop that changes them."""
         loop, *operands = symbol.operands
-        own, body, dialect = _name(symbol, names, prefix), loop.body, self.dialect
-        state = [f"{own}_{number}" for number in loop.numbers]
+        result_name, body, dialect = _symbol_name(symbol, names, prefix), loop.body, self.dialect
+        state_names = [f"{result_name}_{index}" for index in loop.indices]
         kinds = [symbol.kind for symbol in body.inputs]
-        given = [
+        operand_texts = [
             self.value(operand, kind, names, prefix) for operand, kind in zip(operands, kinds, strict=True)
         ]
-        going, step = f"{own}_going", f"{own}_step"
-        yield f"{dialect.types[Kind.TRUTH]} {going} = {dialect.constant(True, Kind.TRUTH)};"
-        yield from self._variables(state, given, kinds)
-        yield f"for (int {step} = 0; {step} < {loop.limit} && {dialect.write('any', going)}; {step}++) {{"
-        inner = _renamed(body, [*state, *given[len(state) :]])
-        yield from self._body(body, own, inner, state, going)
-        done = self.value(body.outputs[-1], Kind.TRUTH, inner, f"{own}_v")
-        ongoing = dialect.write("not", done)
-        yield f"{going} = {dialect.write('and', going, f'({ongoing})')};"
+        running, step = f"{result_name}_going", f"{result_name}_step"
+        yield f"{dialect.types[Kind.TRUTH]} {running} = {dialect.constant(True, Kind.TRUTH)};"
+        yield from self._declare_variables(state_names, operand_texts, kinds)
+        yield f"for (int {step} = 0; {step} < {loop.limit} && {dialect.write('any', running)}; {step}++) {{"
+        input_names = _argument_names(body, [*state_names, *operand_texts[len(state_names) :]])
+        yield from self._body_statements(body, result_name, input_names, state_names, running)
+        done = self.value(body.outputs[-1], Kind.TRUTH, input_names, f"{result_name}_v")
+        not_done = dialect.write("not", done)
+        yield f"{running} = {dialect.write('and', running, f'({not_done})')};"
         yield "}"
 
-    def _branch(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
+    def _branch_statements(self, symbol: Symbol, names: Names, prefix: str) -> Iterator[str]:
         """Yield the variables of the results, and the block that changes them."""
         branch, *operands = symbol.operands
-        own, body, dialect = _name(symbol, names, prefix), branch.body, self.dialect
-        count = len(body.outputs)
-        truth, otherwise, arguments = operands[0], operands[1 : 1 + count], operands[1 + count :]
-        results = [f"{own}_{number}" for number in branch.numbers]
+        result_name, body, dialect = _symbol_name(symbol, names, prefix), branch.body, self.dialect
+        output_count = len(body.outputs)
+        truth, otherwise, arguments = (
+            operands[0],
+            operands[1 : 1 + output_count],
+            operands[1 + output_count :],
+        )
+        results = [f"{result_name}_{index}" for index in branch.indices]
         kinds = [kind_of(output) for output in body.outputs]
-        given = [
+        initial_texts = [
             self.value(operand, kind, names, prefix) for operand, kind in zip(otherwise, kinds, strict=True)
         ]
-        yield from self._variables(results, given, kinds)
-        where = self.value(truth, Kind.TRUTH, names, prefix)
-        yield f"if ({dialect.write('any', where)}) {{"
-        texts = [
+        yield from self._declare_variables(results, initial_texts, kinds)
+        mask = self.value(truth, Kind.TRUTH, names, prefix)
+        yield f"if ({dialect.write('any', mask)}) {{"
+        argument_texts = [
             self.value(operand, symbol.kind, names, prefix)
             for operand, symbol in zip(arguments, body.inputs, strict=True)
         ]
-        yield from self._body(body, own, _renamed(body, texts), results, where)
+        yield from self._body_statements(
+            body, result_name, _argument_names(body, argument_texts), results, mask
+        )
         yield "}"
 
-    def _variables(self, names: list[str], values: list[str], kinds: list[Kind]) -> Iterator[str]:
+    def _declare_variables(self, names: list[str], values: list[str], kinds: list[Kind]) -> Iterator[str]:
         for name, value, kind in zip(names, values, kinds, strict=False):
             yield f"{self.dialect.types[kind]} {name} = {value};"
 
-    def _body(self, body: Program, own: str, names: Names, results: list[str], where: str) -> Iterator[str]:
+    def _body_statements(
+        self, body: Program, result_name: str, names: Names, results: list[str], mask: str
+    ) -> Iterator[str]:
         """Yield the statements of a body, and the simultaneous assignment of its outputs."""
-        prefix = f"{own}_v"
+        prefix = f"{result_name}_v"
         yield from self.statements(body.operations, names, prefix)
         kinds = [kind_of(output) for output in body.outputs]
         for result, output, kind in zip(results, body.outputs, kinds, strict=False):
             value = self.value(output, kind, names, prefix)
             yield f"const {self.dialect.types[kind]} {result}_new = {value};"
         for result, kind in zip(results, kinds, strict=False):
-            yield f"{result} = {self.dialect.replaced[kind].format(where, f'{result}_new', result)};"
+            yield f"{result} = {self.dialect.replaced[kind].format(mask, f'{result}_new', result)};"
 
 
 def table_declarations(tables: Tables, dialect: Dialect) -> Iterator[str]:
@@ -343,14 +351,18 @@ def table_declarations(tables: Tables, dialect: Dialect) -> Iterator[str]:
         yield f"static const {array_type} {name}[{len(values)}] = {{{entries}}};"
 
 
-def _name(symbol: Symbol, names: Names, prefix: str) -> str:
+def _symbol_name(symbol: Symbol, names: Names, prefix: str) -> str:
     if symbol.operation == "item" and symbol.index not in names:
-        nested, number = symbol.operands
-        own = _name(nested, names, prefix)
-        return f"{own}[{number}]" if nested.operation == "subroutine" else f"{own}_{number}"
+        container, index = symbol.operands
+        container_name = _symbol_name(container, names, prefix)
+        return (
+            f"{container_name}[{index}]"
+            if container.operation == "subroutine"
+            else f"{container_name}_{index}"
+        )
     return names.get(symbol.index, f"{prefix}{symbol.index}")
 
 
-def _renamed(body: Program, texts: list[str]) -> Names:
+def _argument_names(body: Program, texts: list[str]) -> Names:
     """Return the names of the inputs of a body: the texts of its arguments."""
     return {symbol.index: text for symbol, text in zip(body.inputs, texts, strict=True)}

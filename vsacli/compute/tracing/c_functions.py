@@ -29,35 +29,35 @@ class Subroutines:
         self._names: dict[Hashable, str] = {}
         self.bodies: dict[str, Program] = {}
         for program in programs:
-            for body in _bodies(program):
-                name = self._names.setdefault(_key(body), f"subroutine_{len(self._names)}")
+            for body in _subroutine_bodies(program):
+                name = self._names.setdefault(_program_key(body), f"subroutine_{len(self._names)}")
                 self.bodies.setdefault(name, body)
 
     def name(self, body: Program) -> str:
         """Return the name of the function of a body."""
-        return self._names[_key(body)]
+        return self._names[_program_key(body)]
 
     def functions(self, writer: Writer) -> Iterator[Iterator[str]]:
         """Yield the text of each function, with arguments by value and a pointer to its results."""
         real = writer.dialect.types[Kind.REAL]
         for name, body in self.bodies.items():
-            names = {symbol.index: f"x{number}" for number, symbol in enumerate(body.inputs)}
-            arguments = [f"{real} {each}" for each in names.values()]
+            names = {symbol.index: f"x{index}" for index, symbol in enumerate(body.inputs)}
+            arguments = [f"{real} {argument}" for argument in names.values()]
             head = f"static void {name}({', '.join([*arguments, f'{real} *y'])})"
             yield writer.definition(head, body, names, "y")
 
 
-def _bodies(program: Program) -> Iterator[Program]:
+def _subroutine_bodies(program: Program) -> Iterator[Program]:
     """Yield the bodies of subroutines, the inner ones first."""
     for symbol in program.operations:
         if symbol.operation in NESTED:
             nested = symbol.operands[0]
-            yield from _bodies(nested.body)
+            yield from _subroutine_bodies(nested.body)
             if isinstance(nested, Subroutine):
                 yield nested.body
 
 
-def _key(program: Program) -> Hashable:
+def _program_key(program: Program) -> Hashable:
     """Return a key that is equal for programs with the same operations in the same order."""
     operations = tuple(
         (symbol.index, symbol.operation, symbol.kind, *map(_operand_key, symbol.operands))
@@ -73,8 +73,8 @@ def _operand_key(operand: Any) -> Hashable:
     if isinstance(operand, SelectionTable):
         return array("d", operand.values).tobytes()
     if isinstance(operand, tuple):  # a loop, branch, call or subroutine
-        body, *rest = operand
-        return type(operand), _key(body), repr(rest)
+        body, *attributes = operand
+        return type(operand), _program_key(body), repr(attributes)
     return repr(operand)
 
 
@@ -107,75 +107,79 @@ class CallingCode:
         self._name = name
         self._writer = writer
         self._dialect = writer.dialect
-        self._number = self._dialect.array_type((), True)
+        self._constant_type = self._dialect.array_type((), True)
         self._functions: dict[int, _Function] = {}
         self._constants: list[float] = []
-        self._places: list[int] = []
+        self._slot_table: list[int] = []
         self._statements: list[str] = []
         workspace = Workspace(program)
         for symbol in program.operations:
             if symbol.operation == "call":
-                self._call(symbol, [*values_of(symbol), *workspace.results(symbol)], workspace)
-        self.slot, self.slots = workspace.slot, workspace.counts[Kind.REAL]
+                self._add_call(symbol, [*values_of(symbol), *workspace.results(symbol)], workspace)
+        self.slot, self.slot_count = workspace.slot, workspace.counts[Kind.REAL]
 
     def declarations(self, qualifiers: str) -> Iterator[str]:
         """Return the tables, and the functions with these qualifiers."""
-        constants = ", ".join(self._dialect.entry(value, self._number) for value in self._constants) or "0"
-        yield f"static const {self._number} {self._name}_{CONSTANTS}[] = {{{constants}}};"
-        yield f"static const int {self._name}_{PLACES}[] = {{{', '.join(map(str, self._places))}}};"
+        constants = (
+            ", ".join(self._dialect.entry(value, self._constant_type) for value in self._constants) or "0"
+        )
+        yield f"static const {self._constant_type} {self._name}_{CONSTANTS}[] = {{{constants}}};"
+        yield f"static const int {self._name}_{PLACES}[] = {{{', '.join(map(str, self._slot_table))}}};"
         for function in self._functions.values():
-            yield from self._definition(function, qualifiers)
+            yield from self._function_definition(function, qualifiers)
 
     def statements(self) -> Iterator[str]:
         """Yield the statements that compute the outputs in the workspace from the inputs there."""
         return iter(self._statements)
 
-    def value(self, symbol: Symbol, place: str | int) -> str:
+    def value(self, symbol: Symbol, index: str | int) -> str:
         """Return a value in the workspace."""
-        return self._dialect.from_slot(symbol.kind, f"{VALUES}[{place}]")
+        return self._dialect.from_slot(symbol.kind, f"{VALUES}[{index}]")
 
-    def _call(self, symbol: Symbol, values: list[Symbol], workspace: Workspace) -> None:
+    def _add_call(self, symbol: Symbol, slot_values: list[Symbol], workspace: Workspace) -> None:
         (body, _), *operands = symbol.operands
         constant = tuple(not isinstance(operand, Symbol) for operand in operands)
-        unnamed = _Function(f"{self._name}_{len(self._functions)}", body, constant)
-        function = self._functions.setdefault(id(body), unnamed)
+        new_function = _Function(f"{self._name}_{len(self._functions)}", body, constant)
+        function = self._functions.setdefault(id(body), new_function)
         constants = f"{self._name}_{CONSTANTS} + {len(self._constants)}"
         self._statements.append(
-            f"{function.name}({VALUES}, {constants}, {self._name}_{PLACES} + {len(self._places)});"
+            f"{function.name}({VALUES}, {constants}, {self._name}_{PLACES} + {len(self._slot_table)});"
         )
         self._constants += [float(operand) for operand in operands if not isinstance(operand, Symbol)]
-        self._places += [workspace.slot[value.index] for value in values]
+        self._slot_table += [workspace.slot[value.index] for value in slot_values]
 
-    def _definition(self, function: _Function, qualifiers: str) -> Iterator[str]:
+    def _function_definition(self, function: _Function, qualifiers: str) -> Iterator[str]:
         """Yield a function that loads inputs at first use and stores results at once, to save registers."""
         types, body = self._dialect.types, function.body
-        values, table = f"{types[Kind.REAL]} *{VALUES}", f"const {self._number} *{CONSTANTS}"
+        values, table = f"{types[Kind.REAL]} *{VALUES}", f"const {self._constant_type} *{CONSTANTS}"
         yield f"{qualifiers} void {function.name}({values}, {table}, const int *{PLACES})"
         yield "{"
         if not any(function.constant):
             yield f"(void){CONSTANTS};"
-        sources, names = self._sources(function), dict[int, str]()
+        sources, names = self._input_sources(function), dict[int, str]()
         results = (output.index for output in body.outputs if isinstance(output, Symbol))
-        stored = dict(zip(results, count(function.constant.count(False)), strict=False))
+        result_indices = dict(zip(results, count(function.constant.count(False)), strict=False))
         for symbol in body.operations:
             for operand in values_of(symbol):
                 if operand.index in sources and operand.index not in names:
                     names[operand.index] = f"x{operand.index}"
                     yield f"const {types[operand.kind]} x{operand.index} = {sources[operand.index]};"
             yield from self._writer.statements([symbol], names)
-            if symbol.index in stored:
-                value = self._dialect.to_slot(symbol.kind, self._writer.value(symbol, symbol.kind, names))
-                yield f"{VALUES}[{PLACES}[{stored[symbol.index]}]] = {value};"
+            if symbol.index in result_indices:
+                stored_value = self._dialect.to_slot(
+                    symbol.kind, self._writer.value(symbol, symbol.kind, names)
+                )
+                yield f"{VALUES}[{PLACES}[{result_indices[symbol.index]}]] = {stored_value};"
         yield "}"
 
-    def _sources(self, function: _Function) -> dict[int, str]:
+    def _input_sources(self, function: _Function) -> dict[int, str]:
         """Return the sources of the inputs of a body."""
-        sources, values, constants = {}, 0, 0
-        for symbol, constant in zip(function.body.inputs, function.constant, strict=True):
-            if constant:
-                sources[symbol.index] = self._dialect.write("spread", f"{CONSTANTS}[{constants}]")
-                constants += 1
+        sources, value_count, constant_count = {}, 0, 0
+        for symbol, is_constant in zip(function.body.inputs, function.constant, strict=True):
+            if is_constant:
+                sources[symbol.index] = self._dialect.write("spread", f"{CONSTANTS}[{constant_count}]")
+                constant_count += 1
             else:
-                sources[symbol.index] = self.value(symbol, f"{PLACES}[{values}]")
-                values += 1
+                sources[symbol.index] = self.value(symbol, f"{PLACES}[{value_count}]")
+                value_count += 1
         return sources

@@ -29,19 +29,19 @@ def with_outlined_runs(program: Program) -> Program:
     """Return the program with all operations between calls turned into calls."""
     parts = list(_calls_and_runs(program.operations))
     last_part = {
-        operand.index: number
-        for number, part in enumerate(parts)
+        operand.index: position
+        for position, part in enumerate(parts)
         for symbol in (part.operations if isinstance(part, _OperationRun) else [part])
         for operand in symbol.operands
         if isinstance(operand, Symbol)
     }
     last_part |= {output.index: len(parts) for output in program.outputs if isinstance(output, Symbol)}
-    free = count(1 + max((symbol.index for symbol in program.operations), default=0))
+    free_indices = count(1 + max((symbol.index for symbol in program.operations), default=0))
     operations: list[Symbol] = []
-    for number, part in enumerate(parts):
+    for position, part in enumerate(parts):
         if isinstance(part, _OperationRun):
-            results = [symbol for symbol in part.operations if last_part.get(symbol.index, 0) > number]
-            operations += _called(part.operations, results, next(free))
+            results = [symbol for symbol in part.operations if last_part.get(symbol.index, 0) > position]
+            operations += _outlined_call(part.operations, results, next(free_indices))
         else:
             operations.append(part)
     return program._replace(operations=tuple(operations))
@@ -67,19 +67,20 @@ def _is_item_of_call(symbol: Symbol) -> bool:
     return symbol.operation == "item" and symbol.operands[0].operation == "call"
 
 
-def _called(operations: Sequence[Symbol], results: Sequence[Symbol], index: int) -> list[Symbol]:
+def _outlined_call(operations: Sequence[Symbol], results: Sequence[Symbol], index: int) -> list[Symbol]:
     """Return a call of operations, and the results that are read after it, which keep their numbers."""
-    own = {symbol.index for symbol in operations}
-    given = {
+    own_indices = {symbol.index for symbol in operations}
+    arguments = {
         operand.index: operand
         for symbol in operations
         for operand in symbol.operands
-        if isinstance(operand, Symbol) and operand.index not in own
+        if isinstance(operand, Symbol) and operand.index not in own_indices
     }
     inputs = {
-        number: Symbol(operand.tape, number, "input", (), operand.kind) for number, operand in given.items()
+        position: Symbol(operand.tape, position, "input", (), operand.kind)
+        for position, operand in arguments.items()
     }
-    inner = [
+    body_operations = [
         symbol.with_operands(
             [
                 inputs.get(operand.index, operand) if isinstance(operand, Symbol) else operand
@@ -88,23 +89,23 @@ def _called(operations: Sequence[Symbol], results: Sequence[Symbol], index: int)
         )
         for symbol in operations
     ]
-    body = Program(tuple(inputs.values()), tuple(inner), tuple(results))
+    body = Program(tuple(inputs.values()), tuple(body_operations), tuple(results))
     first = operations[0]
     call = Symbol(
-        first.tape, index, "call", (Call(body, tuple(range(len(results)))), *given.values()), first.kind
+        first.tape, index, "call", (Call(body, tuple(range(len(results)))), *arguments.values()), first.kind
     )
     items = [
-        Symbol(first.tape, symbol.index, "item", (call, number), symbol.kind)
-        for number, symbol in enumerate(results)
+        Symbol(first.tape, symbol.index, "item", (call, position), symbol.kind)
+        for position, symbol in enumerate(results)
     ]
     return [call, *items]
 
 
-Place = tuple[int, ...]
+ConstantPath = tuple[int, ...]
 """Place of a constant in a program: indices of operation and operand; in a loop or conditional, the index of
 that operation and the place in its body."""
 
-Constants = dict[Place, float]
+Constants = dict[ConstantPath, float]
 
 
 class _Body(NamedTuple):
@@ -114,11 +115,11 @@ class _Body(NamedTuple):
     constants: Constants
 
 
-class _Common(NamedTuple):
+class _CommonBody(NamedTuple):
     """Common body of several calls, and the places in their own bodies of constants that became arguments."""
 
     body: Program
-    places: list[Place]
+    places: list[ConstantPath]
 
 
 class SharedBody(NamedTuple):
@@ -137,102 +138,113 @@ def with_shared_bodies(program: Program) -> Program:
     def of_shared_body(symbol: Symbol) -> Symbol:
         if symbol.operation != "call":
             return symbol
-        (body, numbers), *given = symbol.operands
+        (body, numbers), *arguments = symbol.operands
         common, constants = shared[id(body)]
-        return symbol.with_operands([Call(common, numbers), *given, *constants])
+        return symbol.with_operands([Call(common, numbers), *arguments, *constants])
 
     return program._replace(operations=tuple(map(of_shared_body, program.operations)))
 
 
 def share_bodies(programs: Sequence[Program]) -> list[SharedBody]:
     """Return the body of each program, the same object for those that differ only in constants."""
-    bodies = list(map(_read, programs))
-    alike: dict[Hashable, list[int]] = defaultdict(list)
-    for number, body in enumerate(bodies):
-        alike[body.shape].append(number)
+    bodies = list(map(_read_body, programs))
+    groups: dict[Hashable, list[int]] = defaultdict(list)
+    for index, body in enumerate(bodies):
+        groups[body.shape].append(index)
     shared: dict[int, SharedBody] = {}
-    for group in alike.values():
-        common, places = _common(programs[group[0]], [bodies[number].constants for number in group])
-        for number in group:
-            shared[number] = SharedBody(common, [bodies[number].constants[place] for place in places])
-    return [shared[number] for number in range(len(programs))]
+    for members in groups.values():
+        common, paths = _common_body(programs[members[0]], [bodies[index].constants for index in members])
+        for index in members:
+            shared[index] = SharedBody(common, [bodies[index].constants[path] for path in paths])
+    return [shared[index] for index in range(len(programs))]
 
 
-def _read(program: Program) -> _Body:
-    number = {symbol.index: at for at, symbol in enumerate((*program.inputs, *program.operations))}
+def _read_body(program: Program) -> _Body:
+    positions = {
+        symbol.index: position for position, symbol in enumerate((*program.inputs, *program.operations))
+    }
     constants: Constants = {}
     operations = tuple(
-        (symbol.operation, symbol.kind, *_operand_shapes(symbol, at, number, constants))
-        for at, symbol in enumerate(program.operations)
+        (symbol.operation, symbol.kind, *_operand_structures(symbol, position, positions, constants))
+        for position, symbol in enumerate(program.operations)
     )
-    outputs = tuple(_operand_shape(output, number) for output in program.outputs)
+    outputs = tuple(_operand_structure(output, positions) for output in program.outputs)
     return _Body((tuple(symbol.kind for symbol in program.inputs), operations, outputs), constants)
 
 
-def _operand_shapes(
-    symbol: Symbol, at: int, number: Mapping[int, int], constants: Constants
+def _operand_structures(
+    symbol: Symbol, position: int, positions: Mapping[int, int], constants: Constants
 ) -> Iterator[Hashable]:
     """Yield the structure of an operation's operands, and collect their real constants."""
-    for place, (operand, kind) in enumerate(zip(symbol.operands, kinds_of_operands(symbol), strict=True)):
-        if place == 0 and symbol.operation in NESTED:
-            inner = _read(operand.body)
-            constants.update({(at, *deeper): constant for deeper, constant in inner.constants.items()})
-            yield inner.shape, operand[1:]
+    for operand_index, (operand, kind) in enumerate(
+        zip(symbol.operands, kinds_of_operands(symbol), strict=True)
+    ):
+        if operand_index == 0 and symbol.operation in NESTED:
+            nested = _read_body(operand.body)
+            constants.update(
+                {(position, *inner_path): constant for inner_path, constant in nested.constants.items()}
+            )
+            yield nested.shape, operand[1:]
         elif kind is Kind.REAL and isinstance(operand, float | int):
-            constants[at, place] = float(operand)
+            constants[position, operand_index] = float(operand)
             yield None
         else:
-            yield _operand_shape(operand, number)
+            yield _operand_structure(operand, positions)
 
 
-def _operand_shape(operand: Any, number: Mapping[int, int]) -> Hashable:
+def _operand_structure(operand: Any, positions: Mapping[int, int]) -> Hashable:
     """Return the number of a value; for a constant its type and digits, for other operands themselves."""
     if isinstance(operand, Symbol):
-        return number[operand.index]
+        return positions[operand.index]
     return (type(operand), repr(operand)) if isinstance(operand, float | int) else operand
 
 
-def _common(program: Program, of_bodies: Sequence[Constants]) -> _Common:
+def _common_body(program: Program, constants_of_bodies: Sequence[Constants]) -> _CommonBody:
     """Return one body for several that differ only in constants; equal constants stay in the body."""
-    first: dict[tuple[str, ...], Place] = {}
-    same: dict[Place, Place] = {}
-    for place in of_bodies[0]:
-        values = tuple(repr(constants[place]) for constants in of_bodies)
+    first_paths: dict[tuple[str, ...], ConstantPath] = {}
+    first_equal: dict[ConstantPath, ConstantPath] = {}
+    for path in constants_of_bodies[0]:
+        values = tuple(repr(constants[path]) for constants in constants_of_bodies)
         if len(set(values)) > 1:
-            same[place] = first.setdefault(values, place)
-    number = {place: at for at, place in enumerate(first.values())}
-    return _Common(_opened(program, {place: number[other] for place, other in same.items()}), list(number))
+            first_equal[path] = first_paths.setdefault(values, path)
+    input_numbers = {path: position for position, path in enumerate(first_paths.values())}
+    return _CommonBody(
+        _with_parameters(
+            program, {path: input_numbers[first_path] for path, first_path in first_equal.items()}
+        ),
+        list(input_numbers),
+    )
 
 
-def _opened(program: Program, parameters: Mapping[Place, int]) -> Program:
+def _with_parameters(program: Program, parameters: Mapping[ConstantPath, int]) -> Program:
     """Return a program with inputs in place of constants; places with equal numbers share an input."""
     if not parameters:
         return program
     values = [*program.inputs, *program.operations]
-    free = 1 + max(symbol.index for symbol in values)
+    free_index = 1 + max(symbol.index for symbol in values)
     inputs = {
-        number: Symbol(values[0].tape, free + at, "input", (), Kind.REAL)
-        for at, number in enumerate(sorted(set(parameters.values())))
+        input_number: Symbol(values[0].tape, free_index + position, "input", (), Kind.REAL)
+        for position, input_number in enumerate(sorted(set(parameters.values())))
     }
-    of_operations: dict[int, dict[Place, int]] = defaultdict(dict)
-    for (at, *place), number in parameters.items():
-        of_operations[at][tuple(place)] = number
+    paths_of_operations: dict[int, dict[ConstantPath, int]] = defaultdict(dict)
+    for (position, *path), input_number in parameters.items():
+        paths_of_operations[position][tuple(path)] = input_number
     operations = list(program.operations)
-    for at, places in of_operations.items():
-        operations[at] = _given(operations[at], places, inputs)
+    for position, paths in paths_of_operations.items():
+        operations[position] = _with_inputs(operations[position], paths, inputs)
     return Program((*program.inputs, *inputs.values()), tuple(operations), program.outputs)
 
 
-def _given(symbol: Symbol, places: Mapping[Place, int], inputs: Mapping[int, Symbol]) -> Symbol:
+def _with_inputs(symbol: Symbol, paths: Mapping[ConstantPath, int], inputs: Mapping[int, Symbol]) -> Symbol:
     """Return an operation with values in place of constants among its operands, or in its body."""
     operands: list[Any] = list(symbol.operands)
-    deeper = {place: number for place, number in places.items() if len(place) > 1}
-    for place, number in places.items():
-        if len(place) == 1:
-            operands[place[0]] = inputs[number]
-    if deeper:
-        operands[0] = operands[0]._replace(body=_opened(operands[0].body, deeper))
-        operands += [inputs[number] for number in sorted(set(deeper.values()))]
+    nested_paths = {path: input_number for path, input_number in paths.items() if len(path) > 1}
+    for path, input_number in paths.items():
+        if len(path) == 1:
+            operands[path[0]] = inputs[input_number]
+    if nested_paths:
+        operands[0] = operands[0]._replace(body=_with_parameters(operands[0].body, nested_paths))
+        operands += [inputs[input_number] for input_number in sorted(set(nested_paths.values()))]
     return symbol.with_operands(operands)
 
 
@@ -250,7 +262,7 @@ class Workspace:
 
     def __init__(self, program: Program, *, by_kind: bool = False) -> None:
         self._by_kind = by_kind
-        self.slot = {symbol.index: place for place, symbol in enumerate(program.inputs)}
+        self.slot = {symbol.index: slot for slot, symbol in enumerate(program.inputs)}
         self.counts: dict[Kind, int] = defaultdict(int, {Kind.REAL: len(program.inputs)})
         self._free: dict[Kind, list[int]] = defaultdict(list)
         self._items: dict[int, list[Symbol]] = defaultdict(list)
@@ -260,14 +272,16 @@ class Workspace:
                 self._items[symbol.operands[0].index].append(symbol)
             else:
                 self._last_use |= {value.index: symbol.index for value in values_of(symbol)}
-        for kept in (*program.inputs, *program.outputs):
-            if isinstance(kept, Symbol):
-                self._last_use.pop(kept.index, None)
+        for live in (*program.inputs, *program.outputs):
+            if isinstance(live, Symbol):
+                self._last_use.pop(live.index, None)
 
     def results(self, call: Symbol) -> list[Symbol]:
         """Return the results of the next call, in the order of its body's outputs, and assign places."""
-        order = {number: place for place, number in enumerate(call.operands[0].numbers)}
-        items = sorted(self._items[call.index], key=lambda item: order[item.operands[1]])
+        output_order = {
+            output_index: position for position, output_index in enumerate(call.operands[0].indices)
+        }
+        items = sorted(self._items[call.index], key=lambda item: output_order[item.operands[1]])
         for item in items:
             self._allocate(item)
         for value in {value.index: value for value in values_of(call)}.values():

@@ -125,18 +125,18 @@ def is_of_calls(program: Program) -> bool:
 
 def operation_count(program: Program) -> int:
     """Return the number of operations of a program, those of programs nested in it in place of these."""
-    return sum(operation_count(body) for body in _nested(program)) + sum(
+    return sum(operation_count(body) for body in _nested_programs(program)) + sum(
         symbol.operation not in NESTED for symbol in program.operations
     )
 
 
 def conditional_count(program: Program) -> int:
     """Return the number of loops and branches of a program, at any depth."""
-    conditional = sum(symbol.operation in CONDITIONAL for symbol in program.operations)
-    return conditional + sum(map(conditional_count, _nested(program)))
+    own_count = sum(symbol.operation in CONDITIONAL for symbol in program.operations)
+    return own_count + sum(map(conditional_count, _nested_programs(program)))
 
 
-def _nested(program: Program) -> Iterator[Program]:
+def _nested_programs(program: Program) -> Iterator[Program]:
     return (symbol.operands[0].body for symbol in program.operations if symbol.operation in NESTED)
 
 
@@ -146,12 +146,12 @@ class Loop(NamedTuple):
     Attributes:
         body: Program from state and constants to the next state and whether it is the last.
         limit: Largest number of repetitions.
-        numbers: Indices of the entries of the state among those that were traced.
+        indices: Indices of the entries of the state among those that were traced.
     """
 
     body: Program
     limit: int
-    numbers: tuple[int, ...]
+    indices: tuple[int, ...]
 
 
 class Branch(NamedTuple):
@@ -159,11 +159,11 @@ class Branch(NamedTuple):
 
     Attributes:
         body: Program.
-        numbers: Indices of the outputs among those that were traced.
+        indices: Indices of the outputs among those that were traced.
     """
 
     body: Program
-    numbers: tuple[int, ...]
+    indices: tuple[int, ...]
 
 
 class Call(NamedTuple):
@@ -171,11 +171,11 @@ class Call(NamedTuple):
 
     Attributes:
         body: Program.
-        numbers: Indices of the outputs among those that were traced.
+        indices: Indices of the outputs among those that were traced.
     """
 
     body: Program
-    numbers: tuple[int, ...]
+    indices: tuple[int, ...]
 
 
 class Subroutine(NamedTuple):
@@ -241,8 +241,8 @@ def kinds_of_operands(symbol: Symbol) -> list[Kind]:
         inputs = [inner.kind for inner in nested.body.inputs]
         results = list(map(kind_of, nested.body.outputs))
         return [Kind.REAL, *([Kind.TRUTH, *results] if symbol.operation == "branch" else []), *inputs]
-    of_constants = Kind.INDEX if symbol.operation == "take" else Kind.REAL
-    kind = next((operand.kind for operand in symbol.operands if isinstance(operand, Symbol)), of_constants)
+    constant_kind = Kind.INDEX if symbol.operation == "take" else Kind.REAL
+    kind = next((operand.kind for operand in symbol.operands if isinstance(operand, Symbol)), constant_kind)
     return [kind] * len(symbol.operands)
 
 
@@ -283,18 +283,18 @@ def _common_kind(operands: Sequence[Any]) -> Kind:
 
 def table_uses(*programs: Program) -> Iterator[tuple[SelectionTable, str]]:
     """Yield tables with the operations on them, also of nested programs, each of which is visited once."""
-    seen: set[int] = set()
+    visited: set[int] = set()
     for program in programs:
-        yield from _uses(program, seen)
+        yield from _table_uses(program, visited)
 
 
-def _uses(program: Program, seen: set[int]) -> Iterator[tuple[SelectionTable, str]]:
-    if id(program) in seen:
+def _table_uses(program: Program, visited: set[int]) -> Iterator[tuple[SelectionTable, str]]:
+    if id(program) in visited:
         return
-    seen.add(id(program))
+    visited.add(id(program))
     for symbol in program.operations:
         for operand in symbol.operands:
             if isinstance(operand, SelectionTable):
                 yield operand, symbol.operation
             elif isinstance(operand, Loop | Branch | Call | Subroutine):
-                yield from _uses(operand.body, seen)
+                yield from _table_uses(operand.body, visited)

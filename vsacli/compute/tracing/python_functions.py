@@ -43,7 +43,7 @@ NumberFunction = Callable[[Sequence[float]], list[float]]
 
 Raises ArithmeticError or ValueError where Python raises instead of returning NaN or infinity."""
 
-_ON_NUMBERS: dict[str, Any] = {
+_NUMBER_FUNCTIONS: dict[str, Any] = {
     **{name: getattr(math, name) for name in ("sqrt", "cbrt", "exp", "expm1", "log", "log1p", "hypot")},
     **{name: getattr(math, name) for name in ("copysign", "sin", "cos", "tan", "sinh", "cosh", "tanh")},
     **{f"arc{name}": getattr(math, f"a{name}") for name in ("sin", "cos", "tan", "tan2", "sinh")},
@@ -67,7 +67,7 @@ NESTING = 20
 takes 1.7 times as long. Deeper expressions save no more, and Python's parser has a limit."""
 
 
-def _as_number(name: str) -> Callable[..., float]:
+def _scalar_ufunc(name: str) -> Callable[..., float]:
     """Return a function of NumPy that returns a plain number, with which Python computes faster."""
     function = getattr(np, name)
     if function.nin == 1:
@@ -79,8 +79,8 @@ def _square_root(number: float) -> float:
     return math.sqrt(number) if number >= 0 else math.nan
 
 
-_EXACT: dict[str, Any] = {
-    **{name: _as_number(name) for name in sorted(FUNCTIONS - {"absolute", "copysign"})},
+_EXACT_FUNCTIONS: dict[str, Any] = {
+    **{name: _scalar_ufunc(name) for name in sorted(FUNCTIONS - {"absolute", "copysign"})},
     "sqrt": _square_root,
 }
 """Functions with the results of NumPy to the last bit; the square root is rounded correctly in both."""
@@ -98,16 +98,16 @@ def function_text(program: Program, name: str, arguments: Mapping[str, int], nes
     Raises:
         NotImplementedError: The program has calls or subroutines.
     """
-    distinct = dict.fromkeys(table for table, _ in table_uses(program))
-    writer = _PythonWriter({table: f"table_{number}" for number, table in enumerate(distinct)}, nesting)
-    constants = [f"{own} = array({list(table.values)})" for table, own in writer.tables.items()]
-    names = {symbol.index: f"v{symbol.index}" for symbol in program.inputs}
+    tables = dict.fromkeys(table for table, _ in table_uses(program))
+    writer = _PythonWriter({table: f"table_{index}" for index, table in enumerate(tables)}, nesting)
+    constants = [f"{table_name} = array({list(table.values)})" for table, table_name in writer.tables.items()]
+    value_names = {symbol.index: f"v{symbol.index}" for symbol in program.inputs}
     inputs, lines = iter(program.inputs), []
     for argument, count in arguments.items():
-        lines.append(f"{', '.join(names[next(inputs).index] for _ in range(count))}, = {argument}")
-    results = writer.body(program, names, "v", lines)
+        lines.append(f"{', '.join(value_names[next(inputs).index] for _ in range(count))}, = {argument}")
+    results = writer.body(program, value_names, "v", lines)
     head = f"def {name}({', '.join(arguments)}):"
-    return "\n".join([*constants, head, *_indented([*lines, f"return [{', '.join(results)}]"]), ""])
+    return "\n".join([*constants, head, *_indented_lines([*lines, f"return [{', '.join(results)}]"]), ""])
 
 
 class _NestedText(NamedTuple):
@@ -137,66 +137,75 @@ class _PythonWriter:
             prefix: Beginning of the names of values.
             lines: Statements so far.
         """
-        uses = Counter(
+        use_counts = Counter(
             operand.index
             for operands in (*(symbol.operands for symbol in program.operations), program.outputs)
             for operand in operands
             if isinstance(operand, Symbol)
         )
-        nested: dict[int, _NestedText] = {}
+        nested_texts: dict[int, _NestedText] = {}
 
-        def value(operand: Any) -> str:
-            if isinstance(operand, Symbol) and operand.index in nested:
-                return nested[operand.index].text
-            return self._value(operand, names)
+        def value_text(operand: Any) -> str:
+            if isinstance(operand, Symbol) and operand.index in nested_texts:
+                return nested_texts[operand.index].text
+            return self._operand_text(operand, names)
 
         for symbol in program.operations:
-            own = f"{prefix}{symbol.index}"
+            result_name = f"{prefix}{symbol.index}"
             if symbol.operation == "item":
                 names[symbol.index] = f"{names[symbol.operands[0].index]}_{symbol.operands[1]}"
             elif symbol.operation in ("loop", "branch"):
-                names[symbol.index] = own
-                write = self._loop if symbol.operation == "loop" else self._branch
-                write(symbol.operands[0], own, list(map(value, symbol.operands[1:])), lines)
+                names[symbol.index] = result_name
+                write = self._write_loop if symbol.operation == "loop" else self._write_branch
+                write(symbol.operands[0], result_name, list(map(value_text, symbol.operands[1:])), lines)
             else:
-                deep = [
-                    nested[each.index].depth
-                    for each in symbol.operands
-                    if isinstance(each, Symbol) and each.index in nested
+                operand_depths = [
+                    nested_texts[nested_operand.index].depth
+                    for nested_operand in symbol.operands
+                    if isinstance(nested_operand, Symbol) and nested_operand.index in nested_texts
                 ]
-                depth = 1 + max(deep, default=0)
-                text = self._expression(symbol, list(map(value, self._operands(symbol))))
-                if uses[symbol.index] == 1 and depth <= self._nesting:
-                    nested[symbol.index] = _NestedText(f"({text})", depth)
+                depth = 1 + max(operand_depths, default=0)
+                expression = self._expression(symbol, list(map(value_text, self._typed_operands(symbol))))
+                if use_counts[symbol.index] == 1 and depth <= self._nesting:
+                    nested_texts[symbol.index] = _NestedText(f"({expression})", depth)
                 else:
-                    names[symbol.index] = own
-                    lines.append(f"{own} = {text}")
-        return list(map(value, program.outputs))
+                    names[symbol.index] = result_name
+                    lines.append(f"{result_name} = {expression}")
+        return list(map(value_text, program.outputs))
 
-    def _loop(self, loop: Loop, own: str, given: list[str], lines: list[str]) -> None:
+    def _write_loop(self, loop: Loop, result_name: str, operand_texts: list[str], lines: list[str]) -> None:
         """Append a loop whose state has names such as `v5_0`."""
-        state = [f"{own}_{number}" for number in loop.numbers]
-        constants = [f"{own}_c{number}" for number in range(len(given) - len(state))]
-        lines += [f"{name} = {text}" for name, text in zip([*state, *constants], given, strict=True)]
-        inner: list[str] = []
-        names = _named(loop.body, [*state, *constants])
-        results = self.body(loop.body, names, f"{own}_v", inner)
-        inner.append(f"{', '.join([*state, f'{own}_done'])} = {', '.join(results)}")
-        inner += [f"if {own}_done:", "    break"]
-        lines += [f"for _ in range({loop.limit}):", *_indented(inner)]
+        state_names = [f"{result_name}_{index}" for index in loop.indices]
+        constant_names = [f"{result_name}_c{index}" for index in range(len(operand_texts) - len(state_names))]
+        lines += [
+            f"{name} = {text}"
+            for name, text in zip([*state_names, *constant_names], operand_texts, strict=True)
+        ]
+        body_lines: list[str] = []
+        names = _input_names(loop.body, [*state_names, *constant_names])
+        results = self.body(loop.body, names, f"{result_name}_v", body_lines)
+        body_lines.append(f"{', '.join([*state_names, f'{result_name}_done'])} = {', '.join(results)}")
+        body_lines += [f"if {result_name}_done:", "    break"]
+        lines += [f"for _ in range({loop.limit}):", *_indented_lines(body_lines)]
 
-    def _branch(self, branch: Branch, own: str, given: list[str], lines: list[str]) -> None:
+    def _write_branch(
+        self, branch: Branch, result_name: str, operand_texts: list[str], lines: list[str]
+    ) -> None:
         """Append a conditional whose results have names such as `v5_0`."""
         count = len(branch.body.outputs)
-        truth, otherwise, arguments = given[0], given[1 : 1 + count], given[1 + count :]
-        results = [f"{own}_{number}" for number in branch.numbers]
-        constants = [f"{own}_c{number}" for number in range(len(arguments))]
-        inner = [f"{name} = {text}" for name, text in zip(constants, arguments, strict=True)]
-        names = _named(branch.body, constants)
-        found = self.body(branch.body, names, f"{own}_v", inner)
-        inner += [f"{name} = {text}" for name, text in zip(results, found, strict=True)]
-        spared = [f"{name} = {text}" for name, text in zip(results, otherwise, strict=True)]
-        lines += [f"if {truth}:", *_indented(inner), "else:", *_indented(spared)]
+        truth, otherwise, arguments = (
+            operand_texts[0],
+            operand_texts[1 : 1 + count],
+            operand_texts[1 + count :],
+        )
+        result_names = [f"{result_name}_{index}" for index in branch.indices]
+        constant_names = [f"{result_name}_c{index}" for index in range(len(arguments))]
+        body_lines = [f"{name} = {text}" for name, text in zip(constant_names, arguments, strict=True)]
+        names = _input_names(branch.body, constant_names)
+        output_texts = self.body(branch.body, names, f"{result_name}_v", body_lines)
+        body_lines += [f"{name} = {text}" for name, text in zip(result_names, output_texts, strict=True)]
+        else_lines = [f"{name} = {text}" for name, text in zip(result_names, otherwise, strict=True)]
+        lines += [f"if {truth}:", *_indented_lines(body_lines), "else:", *_indented_lines(else_lines)]
 
     def _expression(self, symbol: Symbol, operands: list[str]) -> str:
         operation = symbol.operation
@@ -209,7 +218,7 @@ class _PythonWriter:
         side = ", 'right'" if operation == "searchsorted" else ""
         return f"{operation}({', '.join(operands)}{side})"
 
-    def _operands(self, symbol: Symbol) -> list[Any]:
+    def _typed_operands(self, symbol: Symbol) -> list[Any]:
         """Return the operands of an operation; constants among bits as integers.
 
         Where a single sample counts, integers among real numbers become floats, with which Python multiplies
@@ -223,21 +232,21 @@ class _PythonWriter:
             for operand, kind in zip(symbol.operands, kinds_of_operands(symbol), strict=True)
         ]
 
-    def _value(self, operand: Any, names: Mapping[int, str]) -> str:
+    def _operand_text(self, operand: Any, value_names: Mapping[int, str]) -> str:
         """Return a name, or a constant exactly."""
         if isinstance(operand, SelectionTable):
             return self.tables[operand]
         if isinstance(operand, Symbol):
-            return names[operand.index]
+            return value_names[operand.index]
         return f"({operand!r})" if operand < 0 else repr(operand)  # nan and inf are names of NumPy
 
 
-def _named(body: Program, names: Sequence[str]) -> dict[int, str]:
+def _input_names(body: Program, names: Sequence[str]) -> dict[int, str]:
     """Return the names of the inputs of a body by index."""
     return {symbol.index: name for symbol, name in zip(body.inputs, names, strict=True)}
 
 
-def _indented(lines: Sequence[str]) -> list[str]:
+def _indented_lines(lines: Sequence[str]) -> list[str]:
     return [f"    {line}" for line in lines]
 
 
@@ -252,21 +261,21 @@ def number_function(program: Program, exactly: bool = False) -> NumberFunction:
     Raises:
         NotImplementedError: The program has calls or subroutines.
     """
-    names = {**_ON_NUMBERS, **_EXACT} if exactly else dict(_ON_NUMBERS)
-    function: NumberFunction = defined(_code(program), "run", names)
+    names = {**_NUMBER_FUNCTIONS, **_EXACT_FUNCTIONS} if exactly else dict(_NUMBER_FUNCTIONS)
+    function: NumberFunction = define_function(_function_code(program), "run", names)
     return function
 
 
-def _code(program: Program) -> CodeType:
-    return compiled(function_text(program, "run", {"values": len(program.inputs)}, NESTING))
+def _function_code(program: Program) -> CodeType:
+    return compile_function(function_text(program, "run", {"values": len(program.inputs)}, NESTING))
 
 
-def compiled(text: str) -> CodeType:
+def compile_function(text: str) -> CodeType:
     """Return the code of a text that defines a function."""
     return compile(text, "<traced program>", "exec")
 
 
-def defined(code: CodeType, name: str, names: dict[str, Any]) -> Callable[..., Any]:
+def define_function(code: CodeType, name: str, names: dict[str, Any]) -> Callable[..., Any]:
     """Return the function with a name that code defines, with `names` as globals."""
     exec(code, names)
     function: Callable[..., Any] = names[name]
@@ -277,9 +286,9 @@ class StateFunction:
     """A program without control flow and tables, for single states or rows of states."""
 
     def __init__(self, program: Program) -> None:
-        code = _code(program)
-        self._on_numbers: NumberFunction = defined(code, "run", dict(_ON_NUMBERS))
-        self._on_rows = defined(code, "run", dict(vars(np)))
+        code = _function_code(program)
+        self._on_numbers: NumberFunction = define_function(code, "run", dict(_NUMBER_FUNCTIONS))
+        self._on_rows = define_function(code, "run", dict(vars(np)))
 
     def __call__(self, *inputs: FloatArray) -> FloatArray:
         """Run on arrays (n,) or (samples, n), whose columns are the inputs; the outputs have the same form.
@@ -287,8 +296,8 @@ class StateFunction:
         On traced arrays it becomes part of the program on their tape.
         """
         if isinstance(first := inputs[0], TracedArray):
-            entries = np.concatenate([cells_of(array) for array in inputs])
-            return TracedArray(first.tape, self._on_rows(entries))
+            cells = np.concatenate([cells_of(array) for array in inputs])
+            return TracedArray(first.tape, self._on_rows(cells))
         if inputs[0].ndim == 1:
             return np.array(self._on_numbers([number for array in inputs for number in array.tolist()]))
         outputs = self._on_rows([row for array in inputs for row in by_joint(array)])

@@ -23,7 +23,7 @@ from vsacli.compute.tracing.program import (
     operation_count,
     result_kind,
 )
-from vsacli.compute.tracing.simplification import folded, without_dead_code
+from vsacli.compute.tracing.simplification import fold_operation, without_dead_code
 
 MOST_RECORDED = 50_000
 """Largest number of operations recorded for one function: gcc then takes a minute and 0.6 GB."""
@@ -37,7 +37,7 @@ class Tape:
     """Operations in the order of their execution; a common subexpression is recorded once.
 
     Args:
-        most: Largest number of operations; beyond it `TooLongError` is raised.
+        max_operations: Largest number of operations; beyond it `TooLongError` is raised.
         calling: Whether calls are recorded as such, or expanded.
         short: Whether subroutines are separate functions, or recorded inline.
         conditional: Number of operations as which a loop or branch counts, in addition to those of its body;
@@ -49,19 +49,19 @@ class Tape:
 
     def __init__(
         self,
-        most: int = sys.maxsize,
+        max_operations: int = sys.maxsize,
         calling: bool = False,
         short: bool = False,
         conditional: int | None = None,
     ) -> None:
-        self._most, self._conditional = most, conditional
-        self._nested = 0
+        self._max_operations, self._conditional = max_operations, conditional
+        self._nested_count = 0
         self.short = short
         self.calling = calling
         self.calls: dict[Hashable, Any] = {}
         self._symbols: dict[Hashable, Symbol] = {}
         self._inputs: list[Symbol] = []
-        self._ended = False
+        self._is_finished = False
 
     def inputs(self, count: int) -> list[Symbol]:
         """Return new real variables, which a program receives in this order."""
@@ -69,7 +69,7 @@ class Tape:
 
     def input(self, kind: Kind) -> Symbol:
         """Return a new variable."""
-        symbol = self._new("input", (), kind)
+        symbol = self._new_symbol("input", (), kind)
         self._inputs.append(symbol)
         return symbol
 
@@ -79,18 +79,18 @@ class Tape:
         In addition there are `bits(truth, mask)`, the mask where true, else 0; and `take(table, index)`.
         """
         arguments = tuple(map(_python_number, operands))
-        known = folded(operation, arguments)
-        if known is not None:
-            return known
-        key = _key(operation, arguments)
-        common = self._symbols.get(key)
-        return common or self._new(operation, arguments, result_kind(operation, arguments), key)
+        constant = fold_operation(operation, arguments)
+        if constant is not None:
+            return constant
+        key = _expression_key(operation, arguments)
+        recorded = self._symbols.get(key)
+        return recorded or self._new_symbol(operation, arguments, result_kind(operation, arguments), key)
 
     def emit_loop(
         self, body: Program, limit: int, state: Sequence[Operand], constants: Sequence[Operand]
     ) -> list[Symbol]:
         """Return the state after the repetition of a program that was traced on a separate tape."""
-        self._count(body)
+        self._count_nested(body)
         loop = Loop(body, limit, tuple(range(len(state))))
         return self._emit_nested("loop", body.outputs[:-1], (loop, *state, *constants))
 
@@ -98,7 +98,7 @@ class Tape:
         self, truth: Operand, body: Program, arguments: Sequence[Operand], otherwise: Sequence[Operand]
     ) -> list[Symbol]:
         """Add a program that runs where a Boolean is true, and values elsewhere; return the results."""
-        self._count(body)
+        self._count_nested(body)
         branch = Branch(body, tuple(range(len(otherwise))))
         return self._emit_nested("branch", body.outputs, (branch, truth, *otherwise, *arguments))
 
@@ -111,27 +111,30 @@ class Tape:
         """Add a call of a subroutine, which several places may share; return its results."""
         return self._emit_nested("subroutine", body.outputs, (Subroutine(body), *arguments))
 
-    def _count(self, body: Program) -> None:
+    def _count_nested(self, body: Program) -> None:
         if self._conditional is not None:
-            self._nested += self._conditional + operation_count(body)
+            self._nested_count += self._conditional + operation_count(body)
 
     def _emit_nested(
         self, operation: str, outputs: Sequence[Operand], operands: tuple[Any, ...]
     ) -> list[Symbol]:
-        nested = self._new(operation, operands, Kind.REAL)
-        return [self._new("item", (nested, number), kind_of(output)) for number, output in enumerate(outputs)]
+        nested = self._new_symbol(operation, operands, Kind.REAL)
+        return [
+            self._new_symbol("item", (nested, number), kind_of(output))
+            for number, output in enumerate(outputs)
+        ]
 
-    def _new(
+    def _new_symbol(
         self, operation: str, operands: tuple[Any, ...], kind: Kind, key: Hashable | None = None
     ) -> Symbol:
         """Return a new symbol; without a key it is never a common subexpression."""
         if any(isinstance(operand, Symbol) and operand.tape is not self for operand in operands):
             message = "a value of another program cannot be used in this one; pass it as an argument"
             raise NotImplementedError(message)
-        if self._ended:
+        if self._is_finished:
             raise RuntimeError("nothing can be added to a tape once its program is made")
-        if len(self._symbols) + self._nested >= self._most:
-            raise TooLongError(f"a step takes more than {self._most} operations")
+        if len(self._symbols) + self._nested_count >= self._max_operations:
+            raise TooLongError(f"a step takes more than {self._max_operations} operations")
         symbol = Symbol(self, len(self._symbols), operation, operands, kind)
         self._symbols[symbol if key is None else key] = symbol
         return symbol
@@ -144,7 +147,7 @@ class Tape:
         """
         operations = [symbol for symbol in self._symbols.values() if symbol.operation != "input"]
         program = without_dead_code(self._inputs, operations, [*map(_python_number, outputs)])
-        self._ended = True
+        self._is_finished = True
         self._symbols.clear()
         self.calls.clear()
         return with_shared_bodies(with_outlined_runs(program)) if self.calling else program
@@ -155,9 +158,9 @@ def _python_number(operand: Any) -> Any:
     return operand if isinstance(operand, Symbol | SelectionTable | int | OfRounding) else float(operand)
 
 
-def _key(operation: str, operands: tuple[Any, ...]) -> Hashable:
+def _expression_key(operation: str, operands: tuple[Any, ...]) -> Hashable:
     """Return the key of a common subexpression: operands, constants by digits, integers apart from floats."""
-    names = [
+    operand_keys = [
         operand.index
         if isinstance(operand, Symbol)
         else operand
@@ -165,4 +168,4 @@ def _key(operation: str, operands: tuple[Any, ...]) -> Hashable:
         else repr(operand)
         for operand in operands
     ]
-    return (operation, *(sorted(names, key=str) if operation in COMMUTATIVE else names))
+    return (operation, *(sorted(operand_keys, key=str) if operation in COMMUTATIVE else operand_keys))

@@ -35,17 +35,17 @@ def repeat_traced(
     first: TracedArray, step: Function, state: Sequence[Any], constants: Sequence[Any], limit: int
 ) -> tuple[TracedArray, ...]:
     """Record `control_flow.repeat`: the step is traced once, and repeated when the program runs."""
-    count = len(state)
+    state_size = len(state)
 
     def body(rows: Sequence[Any]) -> Sequence[Any]:
-        next_state, done = step(tuple(rows[:count]), tuple(rows[count:]))
+        next_state, done = step(tuple(rows[:state_size]), tuple(rows[state_size:]))
         return [*next_state, done]
 
-    def loop(*entries: Operand) -> Sequence[Operand]:
-        program = _nested(first.tape, body, entries)
-        return first.tape.emit_loop(program, limit, entries[:count], entries[count:])
+    def loop(*operands: Operand) -> Sequence[Operand]:
+        program = _nested_program(first.tape, body, operands)
+        return first.tape.emit_loop(program, limit, operands[:state_size], operands[state_size:])
 
-    return _for_each_entry(loop, first, [*state, *constants], count)
+    return _for_each_entry(loop, first, [*state, *constants], state_size)
 
 
 @where_needed_on.register(TracedArray)
@@ -53,15 +53,15 @@ def where_needed_traced(
     mask: TracedArray, function: Function, arguments: Sequence[Any], otherwise: Sequence[Any]
 ) -> tuple[TracedArray, ...]:
     """Record `control_flow.where_needed`: the function is traced, and runs where the mask holds."""
-    count = len(otherwise)
+    output_count = len(otherwise)
 
     def branch(truth: Operand, *entries: Operand) -> Sequence[Operand]:
         if truth is False:
-            return entries[:count]
-        program = _nested(mask.tape, lambda rows: function(*rows), entries[count:])
-        return mask.tape.emit_branch(truth, program, entries[count:], entries[:count])
+            return entries[:output_count]
+        program = _nested_program(mask.tape, lambda rows: function(*rows), entries[output_count:])
+        return mask.tape.emit_branch(truth, program, entries[output_count:], entries[:output_count])
 
-    return _for_each_entry(branch, mask, [mask, *otherwise, *arguments], count)
+    return _for_each_entry(branch, mask, [mask, *otherwise, *arguments], output_count)
 
 
 @subroutine_on.register(TracedArray)
@@ -69,8 +69,8 @@ def subroutine_traced(first: TracedArray, function: Function, arguments: Sequenc
     """Record `control_flow.subroutine`: a separate function if the code is to be short."""
     if not first.tape.short:
         return tuple(function(*arguments))
-    entries: list[Any] = [cells_of(each).flat[0] for each in arguments]
-    body = _nested(first.tape, lambda rows: function(*rows), entries)
+    entries: list[Any] = [cells_of(argument).flat[0] for argument in arguments]
+    body = _nested_program(first.tape, lambda rows: function(*rows), entries)
     if len(body.operations) < LEAST_OPERATIONS:
         return tuple(function(*arguments))
     return _for_each_entry(
@@ -78,7 +78,7 @@ def subroutine_traced(first: TracedArray, function: Function, arguments: Sequenc
     )
 
 
-def _nested(
+def _nested_program(
     tape: Tape, function: Callable[[Sequence[Any]], Sequence[Any]], entries: Sequence[Operand]
 ) -> Program:
     """Return the program of a body nested in the program of a tape."""
@@ -89,7 +89,8 @@ def _nested(
 def look_up_traced(index: TracedArray, tables: Sequence[Any]) -> tuple[TracedArray, ...]:
     """Record `control_flow.look_up`."""
     return tuple(
-        _taken(index, SelectionTable(tuple(np.asarray(table, dtype=np.float64).tolist()))) for table in tables
+        _taken_entries(index, SelectionTable(tuple(np.asarray(table, dtype=np.float64).tolist())))
+        for table in tables
     )
 
 
@@ -99,7 +100,7 @@ def cell_traced(position: Any, count: int) -> Any:
     return np.searchsorted(np.arange(1, count), position, side="right")
 
 
-def _taken(index: TracedArray, table: SelectionTable) -> TracedArray:
+def _taken_entries(index: TracedArray, table: SelectionTable) -> TracedArray:
     tape = index.tape
     return TracedArray(tape, each_entry(lambda cell: tape.emit("take", table, cell), index.cells))
 
@@ -108,18 +109,18 @@ def _for_each_entry(
     emit: Callable[..., Sequence[Operand]], like: TracedArray, arrays: Sequence[Any], count: int
 ) -> tuple[TracedArray, ...]:
     """Return a loop or branch with `count` results for each entry of arrays."""
-    spread = np.broadcast_arrays(*map(cells_of, arrays), subok=False)
+    broadcast = np.broadcast_arrays(*map(cells_of, arrays), subok=False)
     results: Iterator[Sequence[Operand]] = (
-        emit(*entries) for entries in zip(*(cells.flat for cells in spread), strict=True)
+        emit(*entries) for entries in zip(*(cells.flat for cells in broadcast), strict=True)
     )
     columns = zip(*results, strict=True)
-    shape = spread[0].shape
-    made = tuple(TracedArray(like.tape, _shaped(column, shape)) for column in columns)
-    assert len(made) == count
-    return made
+    shape = broadcast[0].shape
+    traced = tuple(TracedArray(like.tape, _reshaped_cells(column, shape)) for column in columns)
+    assert len(traced) == count
+    return traced
 
 
-def _shaped(entries: Sequence[Operand], shape: tuple[int, ...]) -> Any:
+def _reshaped_cells(entries: Sequence[Operand], shape: tuple[int, ...]) -> Any:
     cells = np.empty(len(entries), dtype=object)
     cells[:] = entries
     return cells.reshape(shape)
@@ -147,7 +148,7 @@ class _ArrayForm(NamedTuple):
     cells: tuple[Any, ...]
 
 
-class _Several(NamedTuple):
+class _Collection(NamedTuple):
     """A tuple, list or dictionary with the forms of its entries, and the keys of a dictionary."""
 
     type: type
@@ -161,22 +162,25 @@ def call_traced(row: TracedArray, function: Function, arguments: Sequence[Any]) 
     tape = row.tape
     if not tape.calling:
         return function(*arguments)
-    given: dict[Symbol, int] = {}
-    form = _form(list(arguments), given)
+    symbol_numbers: dict[Symbol, int] = {}
+    form = _form_of(list(arguments), symbol_numbers)
     try:
-        called = tape.calls.get((function, form))
+        recorded = tape.calls.get((function, form))
     except TypeError:  # an unhashable argument may contain symbols
         return function(*arguments)
-    if called is None:
-        called = _recorded(function, form, [symbol.kind for symbol in given], short=tape.short)
-        tape.calls[function, form] = called
-    arguments = list(given)
-    items = iter(tape.emit_call(called.body, arguments))
-    values = [next(items) if place is None else arguments[place] for place in called.returned]
-    return _made(called.result, tape, values)
+    if recorded is None:
+        recorded = _record_call(function, form, [symbol.kind for symbol in symbol_numbers], short=tape.short)
+        tape.calls[function, form] = recorded
+    arguments = list(symbol_numbers)
+    outputs = iter(tape.emit_call(recorded.body, arguments))
+    values = [
+        next(outputs) if input_number is None else arguments[input_number]
+        for input_number in recorded.returned
+    ]
+    return _rebuild_form(recorded.result, tape, values)
 
 
-class _Called(NamedTuple):
+class _RecordedCall(NamedTuple):
     """A function that has been called.
 
     Attributes:
@@ -190,30 +194,32 @@ class _Called(NamedTuple):
     returned: tuple[int | None, ...]
 
 
-def _recorded(function: Function, form: Any, kinds: Sequence[Kind], *, short: bool) -> _Called:
+def _record_call(function: Function, form: Any, kinds: Sequence[Kind], *, short: bool) -> _RecordedCall:
     """Return the program of a function for arguments of a form."""
     tape = Tape(short=short)
     inputs = {tape.input(kind): number for number, kind in enumerate(kinds)}
-    found: dict[Symbol, int] = {}
-    result = _form(function(*_made(form, tape, list(inputs))), found)
-    body = tape.program([symbol for symbol in found if symbol not in inputs])
-    return _Called(body, result, tuple(map(inputs.get, found)))
+    result_symbols: dict[Symbol, int] = {}
+    result = _form_of(function(*_rebuild_form(form, tape, list(inputs))), result_symbols)
+    body = tape.program([symbol for symbol in result_symbols if symbol not in inputs])
+    return _RecordedCall(body, result, tuple(map(inputs.get, result_symbols)))
 
 
-def _form(tree: Any, found: dict[Symbol, int]) -> Any:
+def _form_of(value: Any, symbol_numbers: dict[Symbol, int]) -> Any:
     """Return the form of arguments or a result without its symbols, which are collected."""
-    if isinstance(tree, TracedArray):
-        return _ArrayForm(tree.shape, tuple(_form(cell, found) for cell in tree.cells.flat))
-    if isinstance(tree, Symbol):
-        return _Value(found.setdefault(tree, len(found)), tree.kind)
-    if isinstance(tree, dict):
-        return _Several(dict, tuple(tree), tuple(_form(entry, found) for entry in tree.values()))
-    if isinstance(tree, tuple | list):
-        return _Several(type(tree), (), tuple(_form(entry, found) for entry in tree))
-    return _Constant(_key(tree), tree)
+    if isinstance(value, TracedArray):
+        return _ArrayForm(value.shape, tuple(_form_of(cell, symbol_numbers) for cell in value.cells.flat))
+    if isinstance(value, Symbol):
+        return _Value(symbol_numbers.setdefault(value, len(symbol_numbers)), value.kind)
+    if isinstance(value, dict):
+        return _Collection(
+            dict, tuple(value), tuple(_form_of(entry, symbol_numbers) for entry in value.values())
+        )
+    if isinstance(value, tuple | list):
+        return _Collection(type(value), (), tuple(_form_of(entry, symbol_numbers) for entry in value))
+    return _Constant(_constant_key(value), value)
 
 
-def _key(constant: Any) -> Hashable:
+def _constant_key(constant: Any) -> Hashable:
     if isinstance(constant, np.ndarray):
         return "array", constant.shape, constant.dtype.str, constant.tobytes()
     if isinstance(constant, float | int):
@@ -221,7 +227,7 @@ def _key(constant: Any) -> Hashable:
     return type(constant), constant
 
 
-def _made(form: Any, tape: Tape, values: Sequence[Operand]) -> Any:
+def _rebuild_form(form: Any, tape: Tape, values: Sequence[Operand]) -> Any:
     """Return arguments or a result of a form, with values on a tape."""
     if isinstance(form, _Value):
         return values[form.number]
@@ -229,9 +235,9 @@ def _made(form: Any, tape: Tape, values: Sequence[Operand]) -> Any:
         return form.value
     if isinstance(form, _ArrayForm):
         cells = np.empty(len(form.cells), dtype=object)
-        cells[:] = [_made(cell, tape, values) for cell in form.cells]
+        cells[:] = [_rebuild_form(cell, tape, values) for cell in form.cells]
         return TracedArray(tape, cells.reshape(form.shape))
-    entries: Iterator[Any] = (_made(entry, tape, values) for entry in form.entries)
+    entries: Iterator[Any] = (_rebuild_form(entry, tape, values) for entry in form.entries)
     if form.type is dict:
         return dict(zip(form.keys, entries, strict=True))
     return form.type(*entries) if hasattr(form.type, "_fields") else form.type(entries)

@@ -18,7 +18,7 @@ from vsacli.compute.tracing import Program
 from vsacli.compute.tracing.calls import share_bodies
 from vsacli.compute.tracing.program import NESTED, SelectionTable
 from vsacli.compute.vector import Scalar
-from vsacli.control.codegen.interface import Array, Function, Rows, Structure, unpacked
+from vsacli.control.codegen.interface import Array, Function, Rows, Structure, rows_by_array
 from vsacli.control.codegen.parameters import with_parameters
 from vsacli.control.codegen.robot_functions import (
     command_structure,
@@ -68,7 +68,7 @@ class JointFunctions(NamedTuple):
     constants: list[list[float]]
 
 
-def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> JointFunctions | None:
+def actuation(robot: Robot, inverse: Function, free_parameters: Sequence[Parameter]) -> JointFunctions | None:
     """Return the functions of the actuation of the joints; None for one joint, or if the loop does not pay.
 
     It does not where springs are solved by iteration, which takes most of the time, where a damped
@@ -77,24 +77,24 @@ def actuation(robot: Robot, inverse: Function, chosen: Sequence[Parameter]) -> J
     Args:
         robot: Robot.
         inverse: Its inverse dynamics.
-        chosen: Parameters that are an argument.
+        free_parameters: Parameters that are an argument.
     """
     damped = any(joint.damper_at("transmission") for joint in robot.joints)
     sprung = any(joint.actuator.sprung for joint in robot.joints)
-    several = 1 < len(robot.joints) <= MOST_JOINTS
-    if not (several and sprung) or damped or not _is_straight(inverse.program):
+    fits_loop = 1 < len(robot.joints) <= MOST_JOINTS
+    if not (fits_loop and sprung) or damped or not _is_straight(inverse.program):
         return None
     makers = (partial(_joint_function, index=index) for index in range(len(robot.joints)))
-    functions = [with_parameters(make, robot, None, chosen) for make in makers]
+    functions = [with_parameters(make, robot, None, free_parameters) for make in makers]
     bodies = share_bodies([function.program for function in functions])
-    distinct = {id(body.program): body for body in bodies}
-    numbers = {identity: number for number, identity in enumerate(distinct)}
-    of_joint = [numbers[id(body.program)] for body in bodies]
+    shared_bodies = {id(body.program): body for body in bodies}
+    function_indices = {identity: number for number, identity in enumerate(shared_bodies)}
+    indices = [function_indices[id(body.program)] for body in bodies]
     shared = [
-        _shared_function(number, functions[of_joint.index(number)], body.program, len(body.constants))
-        for number, body in enumerate(distinct.values())
+        _shared_function(number, functions[indices.index(number)], body.program, len(body.constants))
+        for number, body in enumerate(shared_bodies.values())
     ]
-    return JointFunctions(shared, of_joint, [body.constants for body in bodies])
+    return JointFunctions(shared, indices, [body.constants for body in bodies])
 
 
 def _is_straight(program: Program) -> bool:
@@ -105,13 +105,13 @@ def _is_straight(program: Program) -> bool:
     )
 
 
-def _shared_function(number: int, function: Function, body: Program, constants: int) -> SharedFunction:
-    values = Array("value", (constants,), "those of one joint")
-    structure = Structure(f"{CONSTANTS}_{number}", "Numbers in which joints differ.", (values,))
+def _shared_function(index: int, function: Function, body: Program, constant_count: int) -> SharedFunction:
+    values = Array("value", (constant_count,), "those of one joint")
+    structure = Structure(f"{CONSTANTS}_{index}", "Numbers in which joints differ.", (values,))
     return SharedFunction(
-        name=f"{function.name}_{number}",
+        name=f"{function.name}_{index}",
         meaning=function.meaning,
-        arguments=(*function.arguments, *([(CONSTANTS, structure)] if constants else [])),
+        arguments=(*function.arguments, *([(CONSTANTS, structure)] if constant_count else [])),
         result=function.result,
         compute=function.compute,
         body=body,
@@ -122,8 +122,8 @@ class _TorqueRows:
     """Link torques as inputs, in place of the recursion."""
 
     def __init__(self, robot: Robot) -> None:
-        of_joints = (len(robot.joints),)
-        self.results = RowLayout(dict.fromkeys(TORQUES, of_joints))
+        joint_shape = (len(robot.joints),)
+        self.results = RowLayout(dict.fromkeys(TORQUES, joint_shape))
         self.arguments = RowLayout({**LinkTorques(robot).arguments.shapes, **self.results.shapes})
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
@@ -144,22 +144,25 @@ def _joint_function(robot: Robot, _frame: WrenchFrame | None, index: int) -> Fun
     joint = dataclasses.replace(robot.joints[index], parent=None, mount=None)
     kernel = _ActuationKernel(dataclasses.replace(robot, joints=(joint,), tools=()))
     torques = Structure("torques", "Link torques.", tuple(variable_array(robot, name) for name in TORQUES))
-    arguments = (("torques", _of_one(torques)), ("command", _of_one(command_structure(robot))))
+    arguments = (
+        ("torques", _single_joint_structure(torques)),
+        ("command", _single_joint_structure(command_structure(robot))),
+    )
 
     def compute(rows: Rows) -> Rows:
-        values = unpacked(arguments, rows)
+        values = rows_by_array(arguments, rows)
         return drive_rows(values, kernel.results.unpack(kernel(kernel.arguments.pack(values))))
 
     return Function(
         name="actuation",
         meaning="Motion and torques of the motors of a joint; returns its flags.",
         arguments=arguments,
-        result=_of_one(drive_structure(robot)),
+        result=_single_joint_structure(drive_structure(robot)),
         compute=compute,
     )
 
 
-def _of_one(structure: Structure) -> Structure:
+def _single_joint_structure(structure: Structure) -> Structure:
     """Return the structure of one joint from that of all."""
     arrays = tuple(dataclasses.replace(array, shape=(1, *array.shape[1:])) for array in structure.arrays)
     return dataclasses.replace(structure, name=f"joint_{structure.name}", arrays=arrays)

@@ -11,7 +11,7 @@ from vsacli.compute.tracing.c_code import Tables
 from vsacli.compute.tracing.program import FUNCTIONS, Branch, Call, Loop, SelectionTable, Subroutine
 from vsacli.control.codegen.scalar import BYTES, scalar_dialect
 
-BYTES_OF_PLACE = 4
+INDEX_BYTES = 4
 """Bytes of an int."""
 
 
@@ -37,27 +37,27 @@ class Cost:
 
 def worst_cost(program: Program) -> Cost:
     """Return the worst-case cost of a call."""
-    return sum(map(_of_operation, program.operations), Cost(0, 0, 0))
+    return sum(map(_operation_cost, program.operations), Cost(0, 0, 0))
 
 
 def table_bytes(programs: Iterable[Program], precision: str) -> int:
     """Return the bytes of all constant tables, including those whose rows are passed to calls."""
     programs = list(programs)
     tables = Tables(programs, scalar_dialect(precision).array_type)
-    of_calls = sum(_bytes_of_calls(program, precision) for program in programs)
-    return of_calls + sum(BYTES[array.type] * len(array.values) for array in tables.arrays)
+    call_bytes = sum(_call_bytes(program, precision) for program in programs)
+    return call_bytes + sum(BYTES[array.type] * len(array.values) for array in tables.arrays)
 
 
-def _bytes_of_calls(program: Program, precision: str) -> int:
+def _call_bytes(program: Program, precision: str) -> int:
     """Return the bytes of constants passed to calls, and of the indices of their inputs and outputs."""
     calls = [symbol.operands for symbol in program.operations if symbol.operation == "call"]
-    places = sum(len(call.numbers) for call, *_ in calls)
-    places += sum(isinstance(operand, Symbol) for _, *given in calls for operand in given)
-    constants = sum(not isinstance(operand, Symbol) for _, *given in calls for operand in given)
-    return BYTES[precision] * constants + BYTES_OF_PLACE * places
+    index_count = sum(len(call.indices) for call, *_ in calls)
+    index_count += sum(isinstance(operand, Symbol) for _, *operands in calls for operand in operands)
+    constant_count = sum(not isinstance(operand, Symbol) for _, *operands in calls for operand in operands)
+    return BYTES[precision] * constant_count + INDEX_BYTES * index_count
 
 
-def _of_operation(symbol: Symbol) -> Cost:
+def _operation_cost(symbol: Symbol) -> Cost:
     nested = symbol.operands[0] if symbol.operands else None
     if isinstance(nested, Loop):
         body = worst_cost(nested.body)

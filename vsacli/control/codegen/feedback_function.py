@@ -72,8 +72,8 @@ def law_in_parts(robot: Robot, frame: WrenchFrame | None = None) -> Function:
     The two have fewer values at once than the law in one text; for arguments see there.
     """
     law = _Law(robot, frame, in_parts=True)
-    whole = feedback_linearization_function(robot, frame)
-    return dataclasses.replace(whole, name="feedback_of_links", arguments=law.arguments, compute=law)
+    whole_law = feedback_linearization_function(robot, frame)
+    return dataclasses.replace(whole_law, name="feedback_of_links", arguments=law.arguments, compute=law)
 
 
 def link_motion_function(robot: Robot, frame: WrenchFrame | None = None) -> Function:
@@ -89,7 +89,7 @@ def link_motion_function(robot: Robot, frame: WrenchFrame | None = None) -> Func
         arrays = arrays_by_argument(arguments, rows)
         wrench = None if frame is None else wrench_on_tools(robot, frame, arrays["wrench"])
         state = arrays["state"]
-        theta, dtheta = _of_springs(plant.drivetrain, state)
+        theta, dtheta = _sprung_motor_state(plant.drivetrain, state)
         law = Decoupling(plant, cast("Gains", None))
         link = law.link_motion(state["q"], state["dq"], theta, dtheta, wrench, arrays["reference"])
         return [*link.ddq, *link.d3q]
@@ -112,7 +112,7 @@ def _link_motion_structure(robot: Robot) -> Structure:
     return Structure("link_motion", "Motion of the links that follows from the state.", arrays)
 
 
-def _of_springs(drivetrain: Drivetrain, state: Arrays) -> Iterator[Any]:
+def _sprung_motor_state(drivetrain: Drivetrain, state: Arrays) -> Iterator[Any]:
     """Yield position and velocity of the motors with springs at a state, (springs,)."""
     return (drivetrain.of_motors(state[name])[..., drivetrain.sprung] for name in ("theta", "dtheta"))
 
@@ -172,31 +172,37 @@ class _Law:
 
     def __call__(self, rows: Rows) -> list[Any]:
         """Return the rows of the motor torques, then those of the flags."""
-        state, reference, gain_arrays, integral, *further = arrays_by_argument(self.arguments, rows).values()
+        state, reference, gain_arrays, integral, *further_arguments = arrays_by_argument(
+            self.arguments, rows
+        ).values()
         drivetrain = self._plant.drivetrain
         gains = cast("Gains", _GainInputs(**gain_arrays))
-        acting = None
+        wrench = None
         if self._frame is not None:
-            acting = wrench_on_tools(self._robot, self._frame, further.pop(0))
+            wrench = wrench_on_tools(self._robot, self._frame, further_arguments.pop(0))
         law: Any = (
-            _OnLinkMotion(self._plant, gains, **further[0]) if further else control_law(self._plant, gains)
+            _OnLinkMotion(self._plant, gains, **further_arguments[0])
+            if further_arguments
+            else control_law(self._plant, gains)
         )
-        theta, dtheta = _of_springs(drivetrain, state)
-        command = Motion.of(np.zeros(1), reference, acting)
+        theta, dtheta = _sprung_motor_state(drivetrain, state)
+        command = Motion.of(np.zeros(1), reference, wrench)
         torque = law.torque(state["q"], state["dq"], theta, dtheta, command, Integral(**integral))
         tau_motor = drivetrain.of_joints(torque)
         values = {**state, "phi": state["theta"] - state["q"][:, None], "tau_motor": tau_motor}
         if drivetrain.windings is not None:
             velocity = drivetrain.of_all_motors(state["dq"], dtheta)
             electrical = drivetrain.windings.variables(torque, velocity)
-            values |= {name: drivetrain.of_joints(each) for name, each in electrical.items()}
+            values |= {name: drivetrain.of_joints(array) for name, array in electrical.items()}
         singular = drivetrain.determinant(state["q"], theta) == 0
-        flags = [self._flags(joint, values, singular[joint]) for joint in range(len(self._robot.joints))]
+        flags = [
+            self._joint_flags(joint, values, singular[joint]) for joint in range(len(self._robot.joints))
+        ]
         return [*tau_motor.ravel(), *flags]
 
-    def _flags(self, index: int, values: Arrays, singular: Any) -> Any:
+    def _joint_flags(self, index: int, values: Arrays, singular: Any) -> Any:
         """Return the flags of a joint: torque undefined, or a limit exceeded by state or torque."""
-        joint, of_joint = self._robot.joints[index], {name: array[index] for name, array in values.items()}
-        there = finite(of_joint["tau_motor"][: joint.actuator.motor_count])
-        flags = marked(Flag.SINGULAR, singular) | not_finite_flags(~(there | singular))
-        return limit_flags(joint, of_joint, flags)
+        joint, variables = self._robot.joints[index], {name: array[index] for name, array in values.items()}
+        exists = finite(variables["tau_motor"][: joint.actuator.motor_count])
+        flags = marked(Flag.SINGULAR, singular) | not_finite_flags(~(exists | singular))
+        return limit_flags(joint, variables, flags)

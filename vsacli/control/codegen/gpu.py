@@ -80,7 +80,7 @@ def gpu_files(
     precision: str,
     about: str,
     frame: WrenchFrame | None,
-    chosen: Sequence[Parameter],
+    free_parameters: Sequence[Parameter],
 ) -> dict[str, str]:
     """Return the texts of the files for a GPU, by file name.
 
@@ -91,19 +91,19 @@ def gpu_files(
         precision: One of `vsacli.control.codegen.scalar.PRECISIONS`.
         about: Text of the comment at the beginning.
         frame: Frame of the wrench that the functions have as an argument; None without one.
-        chosen: Parameters that they have as an argument.
+        free_parameters: Parameters that they have as an argument.
     """
 
     def make_function(make: Maker) -> Function:
-        return with_parameters(make, robot, frame, chosen)
+        return with_parameters(make, robot, frame, free_parameters)
 
     code, by_name = DeviceCode(), {function.name: function for function in functions}
     for function in functions:
         if not isinstance(function, Step):
             code.kernels[function.name] = evaluation_kernel(prefix, function)
-    of_joints = actuation(robot, by_name["inverse_dynamics"], chosen)
-    if of_joints is not None:
-        _add_actuation(code, prefix, by_name, of_joints, scalar_dialect(precision))
+    joint_functions = actuation(robot, by_name["inverse_dynamics"], free_parameters)
+    if joint_functions is not None:
+        _add_actuation(code, prefix, by_name, joint_functions, scalar_dialect(precision))
     law, step = by_name.get("feedback_linearization"), by_name.get("step")
     if (
         law is not None
@@ -117,8 +117,8 @@ def gpu_files(
             code.functions.append(make_function(measured_stiffness_function))
             code.kernels["integrate"] = integration_kernel(prefix, law, code.functions[-1])
     return {
-        f"{prefix}_gpu.cu": _kernel_file(prefix, functions, code, precision, about),
-        f"{prefix}_gpu.py": _loader(prefix, by_name, code, precision, about),
+        f"{prefix}_gpu.cu": _kernel_file_text(prefix, functions, code, precision, about),
+        f"{prefix}_gpu.py": _loader_text(prefix, by_name, code, precision, about),
     }
 
 
@@ -131,14 +131,14 @@ def _add_actuation(
     code: DeviceCode,
     prefix: str,
     by_name: Mapping[str, Function],
-    of_joints: JointFunctions,
+    joint_functions: JointFunctions,
     dialect: Dialect,
 ) -> None:
     """Let the kernel of inverse dynamics run the recursion, then the joints in a loop."""
     inverse, links = by_name["inverse_dynamics"], by_name["link_torques"]
-    code.functions += of_joints.functions
-    code.kernels[inverse.name] = actuated_kernel(prefix, inverse, links, of_joints)
-    code.tables += actuation_tables(prefix, of_joints, dialect)
+    code.functions += joint_functions.functions
+    code.kernels[inverse.name] = actuated_kernel(prefix, inverse, links, joint_functions)
+    code.tables += actuation_tables(prefix, joint_functions, dialect)
 
 
 def _add_law_in_parts(
@@ -170,13 +170,13 @@ def measured_stiffness_function(robot: Robot, frame: WrenchFrame | None = None) 
     )
 
 
-def _kernel_file(
+def _kernel_file_text(
     prefix: str, functions: Sequence[Function], code: DeviceCode, precision: str, about: str
 ) -> str:
     """Return the text of the kernels, with functions and structures that the source file lacks."""
     declared, kernels = structures(functions), code.kernels.values()
-    new = [each for each in structures(code.functions) if each not in declared]
-    definitions = [structure_text(prefix, each, precision) for each in new]
+    new_structures = [structure for structure in structures(code.functions) if structure not in declared]
+    definitions = [structure_text(prefix, structure, precision) for structure in new_structures]
     definitions += further_definitions(prefix, functions, code.functions, precision)
     return filled(
         "robot_gpu.cu",
@@ -186,26 +186,37 @@ def _kernel_file(
         threads=THREADS,
         blocks=BLOCKS,
         definitions="\n\n".join([*definitions, *code.tables]),
-        kernels="\n\n".join(kernel_text(prefix, number, each) for number, each in enumerate(kernels)),
+        kernels="\n\n".join(
+            kernel_text(prefix, number, structure) for number, structure in enumerate(kernels)
+        ),
     )
 
 
-def _loader(
+def _loader_text(
     prefix: str, by_name: Mapping[str, Function], code: DeviceCode, precision: str, about: str
 ) -> str:
     """Return the text of the Python module."""
     kernels = code.kernels.values()
-    of_kernels = ((*dict(kernel.arguments).values(), kernel.result) for kernel in kernels)
-    used = dict.fromkeys(chain.from_iterable(of_kernels))
-    shapes = {each.name: each.layout.shapes for each in used if not each.nominal}
+    kernel_structures = ((*dict(kernel.arguments).values(), kernel.result) for kernel in kernels)
+    used_structures = dict.fromkeys(chain.from_iterable(kernel_structures))
+    shapes = {
+        structure.name: structure.layout.shapes for structure in used_structures if not structure.nominal
+    }
     nominal = {
-        entry: value for each in used for entry, value in zip(each.entries, each.nominal, strict=False)
+        entry: value
+        for structure in used_structures
+        for entry, value in zip(structure.entries, structure.nominal, strict=False)
     }
     tables = {
-        kernel.name: (tuple((name, each.name) for name, each in kernel.arguments), kernel.result.name)
+        kernel.name: (
+            tuple((name, structure.name) for name, structure in kernel.arguments),
+            kernel.result.name,
+        )
         for kernel in kernels
     }
-    public = [_evaluation(each) for each in by_name.values() if not isinstance(each, Step)]
+    evaluations = [
+        _evaluation_function(structure) for structure in by_name.values() if not isinstance(structure, Step)
+    ]
     loop = by_name["inverse_dynamics"]
     return filled(
         "robot_gpu.py",
@@ -219,8 +230,10 @@ def _loader(
         nominal=f"\n{_dictionary_lines(nominal)}\n" if nominal else "",
         kernels=_dictionary_lines(tables),
         before=f"\n{_dictionary_lines(code.before)}\n" if code.before else "",
-        functions="\n\n\n".join(public),
-        rollouts="".join(_rollout(prefix, kernel, by_name) for kernel in kernels if kernel.name in ROLLOUTS),
+        functions="\n\n\n".join(evaluations),
+        rollouts="".join(
+            _rollout_function(prefix, kernel, by_name) for kernel in kernels if kernel.name in ROLLOUTS
+        ),
     )
 
 
@@ -235,10 +248,10 @@ def _dictionary_lines(table: Mapping[str, Any]) -> str:
     return "\n".join(wrapped).replace(_GLUE, " ")
 
 
-def _evaluation(function: Function) -> str:
+def _evaluation_function(function: Function) -> str:
     """Return the Python function that evaluates a function for each sample."""
     names = [name if name != PARAMETERS else f"{name}=None" for name, _ in function.arguments]
-    arguments = "\n".join(_argument(name, structure) for name, structure in function.arguments)
+    arguments = "\n".join(_argument_entry(name, structure) for name, structure in function.arguments)
     meaning = textwrap.fill(
         f'"""{function.meaning}"""', WIDTH, initial_indent="    ", subsequent_indent="    "
     )
@@ -250,21 +263,25 @@ def _evaluation(function: Function) -> str:
     return _call("{function.name}", arguments, results, sample_axis)"""
 
 
-def _argument(name: str, structure: Structure, key: str = "") -> str:
+def _argument_entry(name: str, structure: Structure, key: str = "") -> str:
     """Return the entry of an argument among those of a call in Python."""
     return f'"{key or name}": ("{structure.name}", {key or name}),'
 
 
-def _rollout(prefix: str, kernel: DeviceKernel, by_name: Mapping[str, Function]) -> str:
+def _rollout_function(prefix: str, kernel: DeviceKernel, by_name: Mapping[str, Function]) -> str:
     """Return the Python function that launches a kernel of rollouts, with the further arguments it has."""
     plant, law = by_name["step"], by_name.get("feedback_linearization")
-    further = [(name, each, name) for name, each in plant.arguments if name in ("wrench", PARAMETERS)]
+    further_arguments = [
+        (name, structure, name) for name, structure in plant.arguments if name in ("wrench", PARAMETERS)
+    ]
     if kernel.name == "integrate" and law is not None:
-        further += [(name, each, f"law_{name}") for name, each in law.arguments if name == PARAMETERS]
-    keywords = [key if name == "wrench" else f"{key}=None" for name, _, key in further]
+        further_arguments += [
+            (name, structure, f"law_{name}") for name, structure in law.arguments if name == PARAMETERS
+        ]
+    keywords = [key if name == "wrench" else f"{key}=None" for name, _, key in further_arguments]
     return filled(
         ROLLOUTS[kernel.name],
         prefix,
         keywords="".join(f"{keyword}, " for keyword in keywords),
-        arguments="".join(f"\n            {_argument(*each)}" for each in further),
+        arguments="".join(f"\n            {_argument_entry(*structure)}" for structure in further_arguments),
     )

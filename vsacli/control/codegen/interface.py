@@ -42,7 +42,7 @@ class Array:
     def entries(self) -> Iterator[str]:
         """Yield the entries as written in C, e.g. `theta[0][1]`."""
         for index in product(*map(range, self.shape)):
-            yield self.name + "".join(f"[{number}]" for number in index)
+            yield self.name + "".join(f"[{axis_index}]" for axis_index in index)
 
 
 @dataclass(frozen=True)
@@ -89,15 +89,21 @@ def arrays_by_argument(arguments: Arguments, rows: Rows) -> dict[str, dict[str, 
     return {name: structure.layout.arrays(np.concatenate(entries[name])) for name, structure in arguments}
 
 
-def unpacked(arguments: Arguments, rows: Rows) -> dict[str, Rows]:
+def rows_by_array(arguments: Arguments, rows: Rows) -> dict[str, Rows]:
     """Return the rows of all arguments by array name; names must differ between arguments."""
-    return RowLayout({array.name: array.shape for _, each in arguments for array in each.arrays}).unpack(rows)
+    return RowLayout(
+        {array.name: array.shape for _, structure in arguments for array in structure.arrays}
+    ).unpack(rows)
 
 
 def structures(functions: Sequence[Function]) -> list[Structure]:
     """Return the structures that functions use in C, without duplicates."""
-    used = (each for function in functions for each in (*dict(function.arguments).values(), function.result))
-    return [each for each in dict.fromkeys(used) if not each.by_value]
+    used_structures = (
+        structure
+        for function in functions
+        for structure in (*dict(function.arguments).values(), function.result)
+    )
+    return [structure for structure in dict.fromkeys(used_structures) if not structure.by_value]
 
 
 @dataclass(frozen=True)

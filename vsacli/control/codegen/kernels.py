@@ -70,12 +70,12 @@ def actuated_kernel(
         actuation: Functions of the actuation.
     """
     motion = dict(links.arguments)["motion"]
-    (_, of_torques), (_, of_command), *_ = actuation.functions[0].arguments
-    names = [array.name for array in of_torques.arrays]
-    others = tuple(each for each in inverse.arguments if each[0] != "command")
+    (_, torque_structure), (_, command_structure), *_ = actuation.functions[0].arguments
+    names = [array.name for array in torque_structure.arrays]
+    other_arguments = tuple(argument for argument in inverse.arguments if argument[0] != "command")
     joints = f"{prefix.upper()}_JOINTS"
     lines = (
-        *load_arguments(prefix, others),
+        *load_arguments(prefix, other_arguments),
         f"__shared__ Real torque_of[{len(names)}][{joints}][{THREADS}];",
         "{",
         f"{prefix}_{motion.name} motion;",
@@ -84,26 +84,23 @@ def actuated_kernel(
         f"{call_text(prefix, links, links.output)};",
         f"for (int joint = 0; joint < {joints}; joint++) {{",
         *(
-            f"torque_of[{number}][joint][threadIdx.x] = {links.output}.{name}[joint];"
-            for number, name in enumerate(names)
+            f"torque_of[{index}][joint][threadIdx.x] = {links.output}.{name}[joint];"
+            for index, name in enumerate(names)
         ),
         "}",
         "}",
         "unsigned returned = 0;",
         "#pragma unroll 1",
         f"for (int joint = 0; joint < {joints}; joint++) {{",
-        f"{prefix}_{of_torques.name} torques;",
-        *(
-            f"torques.{name}[0] = torque_of[{number}][joint][threadIdx.x];"
-            for number, name in enumerate(names)
-        ),
-        f"{prefix}_{of_command.name} command;",
+        f"{prefix}_{torque_structure.name} torques;",
+        *(f"torques.{name}[0] = torque_of[{index}][joint][threadIdx.x];" for index, name in enumerate(names)),
+        f"{prefix}_{command_structure.name} command;",
         *(
             f"load(command.{array.name}, at_row(command_{array.name}, joint), n);"
-            for array in of_command.arrays
+            for array in command_structure.arrays
         ),
         f"{prefix}_{actuation.functions[0].result.name} {inverse.output};",
-        *_choose_function(prefix, actuation, inverse.output),
+        *_function_switch(prefix, actuation, inverse.output),
         *store_arrays(inverse.result, inverse.output, joint="joint"),
         "}",
         "entry(flags, n) |= returned;",
@@ -111,36 +108,42 @@ def actuated_kernel(
     return DeviceKernel(inverse.name, inverse.arguments, inverse.result, inverse.output, lines)
 
 
-def _choose_function(prefix: str, actuation: JointFunctions, result: str) -> Iterator[str]:
+def _function_switch(prefix: str, actuation: JointFunctions, result: str) -> Iterator[str]:
     """Yield the statements that call the function of a joint with its constants."""
     yield "switch (structure_of[joint]) {"
-    for number, function in enumerate(actuation.functions):
+    for index, function in enumerate(actuation.functions):
         call = call_text(prefix, function, result)
-        table = f"{CONSTANTS}_{number}_of[constants_of[joint]]"
-        yield f"case {number}: returned |= {call.replace(f'&{CONSTANTS}', f'&{table}')}; break;"
+        table = f"{CONSTANTS}_{index}_of[constants_of[joint]]"
+        yield f"case {index}: returned |= {call.replace(f'&{CONSTANTS}', f'&{table}')}; break;"
     yield "}"
 
 
 def actuation_tables(prefix: str, actuation: JointFunctions, dialect: Dialect) -> Iterator[str]:
     """Yield the tables of the structure of each joint, and of the constants of each structure."""
-    of_joint = actuation.of_joint
-    ranks = [of_joint[:joint].count(number) for joint, number in enumerate(of_joint)]
-    for name, numbers in (("structure_of", of_joint), ("constants_of", ranks)):
-        yield f"__constant__ const int {name}[] = {{{', '.join(map(str, numbers))}}};"
-    for number, function in enumerate(actuation.functions):
-        members = [actuation.constants[joint] for joint, own in enumerate(of_joint) if own == number]
+    function_of_joint = actuation.of_joint
+    constant_rows = [function_of_joint[:joint].count(index) for joint, index in enumerate(function_of_joint)]
+    for name, indices in (("structure_of", function_of_joint), ("constants_of", constant_rows)):
+        yield f"__constant__ const int {name}[] = {{{', '.join(map(str, indices))}}};"
+    for index, function in enumerate(actuation.functions):
+        members = [
+            actuation.constants[joint]
+            for joint, joint_function in enumerate(function_of_joint)
+            if joint_function == index
+        ]
         if members[0]:
             rows = (f"    {{{{{', '.join(map(dialect.real, row))}}}}}," for row in members)
             type_name = f"{prefix}_{function.arguments[-1][1].name}"
-            yield f"__constant__ const {type_name} {CONSTANTS}_{number}_of[] = {{\n{chr(10).join(rows)}\n}};"
+            yield f"__constant__ const {type_name} {CONSTANTS}_{index}_of[] = {{\n{chr(10).join(rows)}\n}};"
 
 
 def rollout_kernel(prefix: str, step: Step) -> DeviceKernel:
     """Return the kernel of many steps of the plant, during which its state stays in registers."""
     arguments = tuple((name, structure) for name, structure in step.arguments if not structure.by_value)
-    (state, of_state), *held = arguments
-    over_time = ((name, each.arrays) for name, each in held if not each.nominal)
-    timed = [(name, array.name) for name, arrays in over_time for array in arrays]
+    (state, state_structure), *held_arguments = arguments
+    timed_arrays = (
+        (name, held_structure.arrays) for name, held_structure in held_arguments if not held_structure.nominal
+    )
+    timed = [(name, array.name) for name, arrays in timed_arrays for array in arrays]
     lines = (
         *load_arguments(prefix, arguments),
         "unsigned returned = 0;",
@@ -148,9 +151,9 @@ def rollout_kernel(prefix: str, step: Step) -> DeviceKernel:
         *(f"load_if_timed({name}.{array}, {name}_{array}, n, step);" for name, array in timed),
         f"returned |= {call_text(prefix, step, state)};",
         "}",
-        *store_result(of_state, state, step.output),
+        *store_result(state_structure, state, step.output),
     )
-    return DeviceKernel("rollout", arguments, of_state, step.output, lines, ("Real dt", "Index steps"))
+    return DeviceKernel("rollout", arguments, state_structure, step.output, lines, ("Real dt", "Index steps"))
 
 
 def integration_kernel(prefix: str, law: Function, stiffness: Function) -> DeviceKernel:
@@ -180,8 +183,8 @@ def integration_kernel(prefix: str, law: Function, stiffness: Function) -> Devic
 
 def call_text(prefix: str, function: Function, result: str) -> str:
     """Return the call of a function with variables that are named as its arguments."""
-    passed = [name if structure.by_value else f"&{name}" for name, structure in function.arguments]
-    return f"{prefix}_{function.name}({', '.join([*passed, f'&{result}'])})"
+    arguments = [name if structure.by_value else f"&{name}" for name, structure in function.arguments]
+    return f"{prefix}_{function.name}({', '.join([*arguments, f'&{result}'])})"
 
 
 def load_arguments(prefix: str, arguments: Arguments) -> Iterator[str]:
@@ -211,24 +214,24 @@ def store_result(structure: Structure, name: str, output: str = "") -> Iterator[
 def store_arrays(structure: Structure, name: str, output: str = "", joint: str = "") -> Iterator[str]:
     """Yield the statements that store the arrays of a result that are wanted; of one joint if it is given."""
     for bit, array in enumerate(structure.arrays):
-        place = f"{output or name}_{array.name}"
+        target = f"{output or name}_{array.name}"
         yield f"if (STORED({bit}))"
-        yield f"    store({name}.{array.name}, {f'at_row({place}, {joint})' if joint else place}, n);"
+        yield f"    store({name}.{array.name}, {f'at_row({target}, {joint})' if joint else target}, n);"
 
 
 def kernel_text(prefix: str, number: int, kernel: DeviceKernel) -> str:
     """Return the definition of a kernel, which is compiled alone if KERNEL is its number."""
     parameters = ["Index samples", *kernel.scalars]
-    parameters += [f"Input {name}_{array}" for name, array in _array_names(kernel.arguments)]
+    parameters += [f"Input {name}_{array}" for name, array in _targets(kernel.arguments)]
     parameters += [
         f"{'FlagOutput' if array.bits else 'Output'} {kernel.output}_{array.name}"
         for array in kernel.result.arrays
     ]
-    declared = ",\n    ".join([*parameters, "FlagOutput flags"])
+    parameter_lines = ",\n    ".join([*parameters, "FlagOutput flags"])
     body = "\n".join(indented(kernel.lines, 1))
     return f"""#if !defined(KERNEL) || KERNEL == {number}
 extern "C" __global__ void BOUNDS {prefix}_gpu_{kernel.name}(
-    {declared})
+    {parameter_lines})
 {{
     const Index n = this_sample();
     if (n >= samples)
@@ -238,7 +241,7 @@ extern "C" __global__ void BOUNDS {prefix}_gpu_{kernel.name}(
 #endif"""
 
 
-def _array_names(arguments: Arguments) -> Iterator[tuple[str, str]]:
+def _targets(arguments: Arguments) -> Iterator[tuple[str, str]]:
     """Yield each argument with each of its arrays."""
     for name, structure in arguments:
         members = [VALUES] if structure.nominal else [array.name for array in structure.arrays]

@@ -63,12 +63,12 @@ def state_derivative_function(robot: Robot, frame: WrenchFrame | None = None) ->
 
     def compute(rows: Rows) -> Rows:
         arrays = arrays_by_argument(arguments, rows)
-        q, dq, theta, dtheta = _without_followers(drivetrain, arrays["state"])
+        q, dq, theta, dtheta = _sprung_motor_arrays(drivetrain, arrays["state"])
         torque = drivetrain.limited(drivetrain.of_motors(arrays["input"]["tau_motor"]))
         commanded = {**dict.fromkeys(DAMPING.names, np.zeros_like(q)), **arrays["input"]}
         wrench = None if frame is None else wrench_on_tools(robot, frame, arrays["wrench"])
         ddq, ddtheta, _ = plant.accelerations(q, dq, theta, dtheta, torque, wrench, commanded)
-        rates = _with_followers(drivetrain, dq, ddq, dtheta, ddtheta)
+        rates = _all_motor_arrays(drivetrain, dq, ddq, dtheta, ddtheta)
         flags = _acceleration_flags(drivetrain, ddq, ddtheta) | _range_flags(drivetrain, q, theta)
         return [entry for array in (*rates, flags) for entry in array.ravel()]
 
@@ -119,16 +119,16 @@ def _rates_structure(robot: Robot) -> Structure:
     )
 
 
-def _without_followers(drivetrain: Drivetrain, state: Mapping[str, Any]) -> list[Any]:
+def _sprung_motor_arrays(drivetrain: Drivetrain, state: Mapping[str, Any]) -> list[Any]:
     """Return q, dq, (joints,), and theta, dtheta of the motors with springs, (springs,).
 
     Other motors do not exist, or follow their joint.
     """
-    q, dq, *of_motors = state.values()
-    return [q, dq, *(drivetrain.of_motors(part)[drivetrain.sprung] for part in of_motors)]
+    q, dq, *motor_arrays = state.values()
+    return [q, dq, *(drivetrain.of_motors(array)[drivetrain.sprung] for array in motor_arrays)]
 
 
-def _with_followers(drivetrain: Drivetrain, q: Any, dq: Any, theta: Any, dtheta: Any) -> list[Any]:
+def _all_motor_arrays(drivetrain: Drivetrain, q: Any, dq: Any, theta: Any, dtheta: Any) -> list[Any]:
     """Return the four parts of a state, or their rates, with all motors, (joints, 2)."""
     return [q, dq, drivetrain.of_motors_by_joint(theta, q), drivetrain.of_motors_by_joint(dtheta, dq)]
 
@@ -146,17 +146,17 @@ def _acceleration_flags(drivetrain: Drivetrain, ddq: Any, ddtheta: Any) -> Any:
 def _range_flags(drivetrain: Drivetrain, q: Any, theta: Any) -> Any:
     """Return the flags of springs beyond the range of their law, where a simulation ends, (joints,)."""
     ends = cells_of(drivetrain.domain)
-    bounded = np.array([not math.isinf(end) if isinstance(end, float) else True for end in ends.flat])
-    if not bounded.any():
+    is_finite = np.array([not math.isinf(end) if isinstance(end, float) else True for end in ends.flat])
+    if not is_finite.any():
         return np.zeros(len(q), dtype=FLAG_TYPE)
-    (has_lowest, has_highest), (lowest, highest) = bounded.reshape(ends.shape), drivetrain.domain
+    (has_lowest, has_highest), (lowest, highest) = is_finite.reshape(ends.shape), drivetrain.domain
     position = drivetrain.ranged(q, theta)
     above = np.where(has_lowest, lowest <= position, True)
     inside = above & np.where(has_highest, position <= highest, True)
-    outside: list[Any] = [
+    outside_by_joint: list[Any] = [
         ~reduce(and_, inside[drivetrain.spring_joint == joint], np.True_) for joint in range(len(q))
     ]
-    return np.stack([marked(Flag.INFEASIBLE, each) for each in outside])
+    return np.stack([marked(Flag.INFEASIBLE, is_outside) for is_outside in outside_by_joint])
 
 
 def step_function(robot: Robot, derivative: Function) -> Step:
@@ -166,30 +166,30 @@ def step_function(robot: Robot, derivative: Function) -> Step:
         robot: robot.
         derivative: its `state_derivative_function`, with or without parameters as an argument.
     """
-    state, acting, *others = derivative.arguments
-    arguments = (state, acting, ("dt", DURATION), *others)
-    sources = _sources(Drivetrain(robot.actuators), state[1])
+    state, input_argument, *further = derivative.arguments
+    arguments = (state, input_argument, ("dt", DURATION), *further)
+    sources = _source_indices(Drivetrain(robot.actuators), state[1])
     moving = sorted({*sources} - {NO_MOTOR})
 
     def advance(evaluate: Evaluate, rows: Rows) -> Rows:
-        begin, held, (dt,), *rest = rows_by_argument(arguments, rows).values()
+        initial, held_inputs, (dt,), *further_inputs = rows_by_argument(arguments, rows).values()
 
-        def complete(by_place: Mapping[int, Any]) -> Rows:
-            return [by_place.get(place, np.full(1, np.nan)) for place in sources]
+        def complete(values: Mapping[int, Any]) -> Rows:
+            return [values.get(index, np.full(1, np.nan)) for index in sources]
 
-        def slopes(at: Rows) -> dict[int, Any]:
-            rates = evaluate([*at, *held, *(row for part in rest for row in part)])
-            return {place: rates[place] for place in moving}
+        def rates_at(state: Rows) -> dict[int, Any]:
+            rates = evaluate([*state, *held_inputs, *(row for inputs in further_inputs for row in inputs)])
+            return {index: rates[index] for index in moving}
 
-        def after(duration: Any, rates: Mapping[int, Any]) -> Rows:
-            return complete({place: begin[place] + duration * rate for place, rate in rates.items()})
+        def state_after(duration: Any, rates: Mapping[int, Any]) -> Rows:
+            return complete({index: initial[index] + duration * rate for index, rate in rates.items()})
 
-        first = slopes(complete({place: begin[place] for place in moving}))
-        second = slopes(after(dt / 2, first))
-        third = slopes(after(dt / 2, second))
-        fourth = slopes(after(dt, third))
-        total = {place: first[place] + 2 * (second[place] + third[place]) + fourth[place] for place in moving}
-        return after(dt / 6, total)
+        first = rates_at(complete({index: initial[index] for index in moving}))
+        second = rates_at(state_after(dt / 2, first))
+        third = rates_at(state_after(dt / 2, second))
+        fourth = rates_at(state_after(dt, third))
+        total = {index: first[index] + 2 * (second[index] + third[index]) + fourth[index] for index in moving}
+        return state_after(dt / 6, total)
 
     return Step(
         name="step",
@@ -212,9 +212,9 @@ NO_MOTOR = -1
 """Source of the entries of a state that belong to no motor."""
 
 
-def _sources(drivetrain: Drivetrain, state: Structure) -> list[int]:
+def _source_indices(drivetrain: Drivetrain, state: Structure) -> list[int]:
     """Return for each entry of a state the entry that it equals: itself, or that of the joint it follows."""
     entries = state.layout.arrays(np.arange(float(state.layout.size)))
-    followed = _with_followers(drivetrain, *_without_followers(drivetrain, entries))
-    places = np.concatenate([part.ravel() for part in followed])
-    return [int(place) for place in np.nan_to_num(places, nan=NO_MOTOR)]
+    followed_entries = _all_motor_arrays(drivetrain, *_sprung_motor_arrays(drivetrain, entries))
+    indices = np.concatenate([array.ravel() for array in followed_entries])
+    return [int(index) for index in np.nan_to_num(indices, nan=NO_MOTOR)]

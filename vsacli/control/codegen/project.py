@@ -76,14 +76,14 @@ def generate(
     joints = counted(len(robot.joints), "joint")
     title = f"{robot.name}, {joints}, {precision}. Written by vsacli {__version__}."
     about = " ".join([title, *(f"Warning: {sentence(warning)}" for warning in robot.warnings)])
-    chosen = parameters(robot, patterns) if patterns else ()
+    free_parameters = parameters(robot, patterns) if patterns else ()
     try:
         if wrench is not None:
             check_wrench_frame(wrench, robot.tool_names)
-        functions, omitted = _functions(robot, wrench, chosen)
+        functions, omitted = _generated_functions(robot, wrench, free_parameters)
         if not loops:
             _check_loops(robot, functions)
-        reference = ReferenceResults(robot, chosen, wrench)
+        reference = ReferenceResults(robot, free_parameters, wrench)
         if precision == "float":
             check_single_precision(robot, functions, reference)
         files = {
@@ -98,14 +98,14 @@ def generate(
     except NotImplementedError as error:
         raise InputError.one(f"no C code can be made of {robot.name}: {error}") from error
     digest = hashlib.sha256("".join(files.values()).encode()).hexdigest()
-    files |= gpu_files(robot, prefix, functions, precision, about, wrench, chosen)
+    files |= gpu_files(robot, prefix, functions, precision, about, wrench, free_parameters)
     files["README.md"] += filled("gpu.md", prefix)
-    sealed = {name: text.replace(DIGEST, f"0x{digest[:8]}u") for name, text in files.items()}
-    return Project(sealed, omitted, robot.warnings)
+    files_with_digest = {name: text.replace(DIGEST, f"0x{digest[:8]}u") for name, text in files.items()}
+    return Project(files_with_digest, omitted, robot.warnings)
 
 
-def _functions(
-    robot: Robot, wrench: WrenchFrame | None, chosen: Sequence[Parameter]
+def _generated_functions(
+    robot: Robot, wrench: WrenchFrame | None, free_parameters: Sequence[Parameter]
 ) -> tuple[list[Function], list[str]]:
     """Return the functions that can be generated, and the reasons for missing ones.
 
@@ -117,24 +117,24 @@ def _functions(
         NotImplementedError: link torques or inverse dynamics cannot be generated.
     """
 
-    def made(make: Maker) -> Function:
-        function = with_parameters(make, robot, wrench, chosen)
+    def make_function(make: Maker) -> Function:
+        function = with_parameters(make, robot, wrench, free_parameters)
         _ = function.program  # raises NotImplementedError if it cannot be generated
         return function
 
     try:
-        functions = [made(link_torques_function), made(inverse_dynamics_function)]
+        functions = [make_function(link_torques_function), make_function(inverse_dynamics_function)]
     except NotImplementedError:
-        if chosen:
-            check_parameters(robot, wrench, chosen)
+        if free_parameters:
+            check_parameters(robot, wrench, free_parameters)
         raise
     omitted = []
     try:
-        functions.append(made(feedback_linearization_function))
+        functions.append(make_function(feedback_linearization_function))
     except (InputError, NotImplementedError) as error:
         omitted.append(f"no feedback_linearization: {error.__cause__ or error}")
     try:
-        derivative = made(state_derivative_function)
+        derivative = make_function(state_derivative_function)
         functions += [derivative, step_function(robot, derivative)]
     except (InputError, NotImplementedError) as error:
         omitted.append(f"no state_derivative and no step: {error.__cause__ or error}")
@@ -149,14 +149,16 @@ def _check_loops(robot: Robot, functions: Sequence[Function]) -> None:
     """
     if not any(worst_cost(function.program).loops for function in functions):
         return
-    on_base = (dataclasses.replace(joint, parent=None, mount=None) for joint in robot.joints)
-    alone = (dataclasses.replace(robot, joints=(joint,), tools=()) for joint in on_base)
+    base_joints = (dataclasses.replace(joint, parent=None, mount=None) for joint in robot.joints)
+    single_joint_robots = (dataclasses.replace(robot, joints=(joint,), tools=()) for joint in base_joints)
     names = [
-        each.joints[0].name for each in alone if worst_cost(inverse_dynamics_function(each).program).loops
+        single_joint.joints[0].name
+        for single_joint in single_joint_robots
+        if worst_cost(inverse_dynamics_function(single_joint).program).loops
     ]
-    solved = f"{', '.join(names)} of {robot.name} {'is' if len(names) == 1 else 'are'} solved by iteration"
+    subject = f"{', '.join(names)} of {robot.name} {'is' if len(names) == 1 else 'are'} solved by iteration"
     raise InputError.one(
-        f"{solved}; only pairs of equal cubic, sinh, exponential or quadratic springs have a closed-form "
+        f"{subject}; only pairs of equal cubic, sinh, exponential or quadratic springs have a closed-form "
         "solution"
     )
 

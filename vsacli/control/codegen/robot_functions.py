@@ -15,7 +15,7 @@ from vsacli.base.signals import POSITION
 from vsacli.base.variables import VARIABLES
 from vsacli.base.wrench import WRENCH_AXES, WRENCH_NAMES, Wrench, WrenchFrame, frames_by_tool
 from vsacli.compute.vector import Scalar
-from vsacli.control.codegen.interface import Arguments, Array, Function, Rows, Structure, unpacked
+from vsacli.control.codegen.interface import Arguments, Array, Function, Rows, Structure, rows_by_array
 from vsacli.dynamics.deflection_rows import INTERNAL, InternalRows
 from vsacli.dynamics.elastic_torques import TORQUES, LinkTorques
 from vsacli.dynamics.inverse import InverseDynamics
@@ -37,14 +37,14 @@ DRIVE_NAMES = (
 def motion_structure(robot: Robot) -> Structure:
     """Return the structure of position and derivatives, with damping between the links if there is any."""
     names = tuple(LinkTorques(robot).arguments.shapes)
-    return Structure("motion", "Motion of the joints.", _arrays(robot, names))
+    return Structure("motion", "Motion of the joints.", _variable_arrays(robot, names))
 
 
 def command_structure(robot: Robot) -> Structure:
     """Return the structure of commanded motion and stiffness."""
     meaning = "Commanded motion and stiffness; only antagonistic and serial joints read a stiffness."
     names = (name for signal in (POSITION, *robot.signals) for name in signal.names)
-    return Structure("command", meaning, _arrays(robot, tuple(names)))
+    return Structure("command", meaning, _variable_arrays(robot, tuple(names)))
 
 
 def state_structure(robot: Robot) -> Structure:
@@ -69,29 +69,29 @@ def wrench_structure(robot: Robot, frame: WrenchFrame) -> Structure:
         InputError: two tools have the same name in C.
     """
     axes, units = ", ".join(WRENCH_AXES), ("N and N m", "N and N m per s", "N and N m per s^2")
-    exerted = "the environment exerts on the"
-    about = "force and moment about the origin of the tool frame"
+    verb = "the environment exerts on the"
+    quantities = "force and moment about the origin of the tool frame"
     if isinstance(frame, str):
-        along = frame.replace("_", " ")
-        meaning = f"Wrench that {exerted} end effector: {about}, along the axes of the {along} frame."
+        axes_name = frame.replace("_", " ")
+        meaning = f"Wrench that {verb} end effector: {quantities}, along the axes of the {axes_name} frame."
         names = {name: f"{axes}; {unit}" for name, unit in zip(WRENCH_NAMES, units, strict=True)}
     else:
-        meaning = f"Wrenches that {exerted} tools: {about}."
+        meaning = f"Wrenches that {verb} tools: {quantities}."
         frames = zip(robot.tool_names, frames_by_tool(frame), strict=True)
-        loaded = {tool: along for tool, along in frames if along is not None}
+        frame_of_tool = {tool: axes_name for tool, axes_name in frames if axes_name is not None}
         names = {
-            _name_in_c(name, tool): f"{axes} along the axes of the {along.replace('_', ' ')} frame; {unit}"
-            for tool, along in loaded.items()
+            _c_name(name, tool): f"{axes} along the axes of the {axes_name.replace('_', ' ')} frame; {unit}"
+            for tool, axes_name in frame_of_tool.items()
             for name, unit in zip(WRENCH_NAMES, units, strict=True)
         }
-        if len(names) < len(loaded) * len(units):
-            tools = ", ".join(loaded)
+        if len(names) < len(frame_of_tool) * len(units):
+            tools = ", ".join(frame_of_tool)
             raise InputError.one(f"two of the tools {tools} have the same name in C, where - becomes _")
-    arrays = (Array(name, (len(WRENCH_AXES),), each) for name, each in names.items())
+    arrays = (Array(name, (len(WRENCH_AXES),), meaning_of_array) for name, meaning_of_array in names.items())
     return Structure("wrench", meaning, tuple(arrays))
 
 
-def _name_in_c(name: str, tool: str) -> str:
+def _c_name(name: str, tool: str) -> str:
     return f"{name}_{tool.replace('-', '_')}"
 
 
@@ -101,7 +101,7 @@ def wrench_by_tool(robot: Robot, arrays: Mapping[str, Any]) -> dict[str, list[An
     if WRENCH_NAMES[0] in arrays:
         return {name: [arrays[name]] for name in WRENCH_NAMES}
     return {
-        name: [arrays.get(_name_in_c(name, tool), idle) for tool in robot.tool_names] for name in WRENCH_NAMES
+        name: [arrays.get(_c_name(name, tool), idle) for tool in robot.tool_names] for name in WRENCH_NAMES
     }
 
 
@@ -112,9 +112,9 @@ def wrench_on_tools(robot: Robot, frame: WrenchFrame, arrays: Mapping[str, Any])
 
 def _kernel_inputs(robot: Robot, arguments: Arguments, rows: Rows) -> dict[str, Any]:
     """Return the rows of all arguments by the names of the kernel's inputs."""
-    values = dict(unpacked(arguments, rows))
-    by_tool = wrench_by_tool(robot, values) if "wrench" in dict(arguments) else {}
-    return values | {name: [row for tool in tools for row in tool] for name, tools in by_tool.items()}
+    values = dict(rows_by_array(arguments, rows))
+    wrench_rows = wrench_by_tool(robot, values) if "wrench" in dict(arguments) else {}
+    return values | {name: [row for tool in tools for row in tool] for name, tools in wrench_rows.items()}
 
 
 def wrench_argument(robot: Robot, frame: WrenchFrame | None) -> tuple[tuple[str, Structure], ...]:
@@ -129,8 +129,11 @@ def link_torques_function(robot: Robot, frame: WrenchFrame | None = None) -> Fun
 
     def compute(rows: Rows) -> Rows:
         torques = kernel(kernel.arguments.pack(_kernel_inputs(robot, arguments, rows)))
-        of_joints = zip(*kernel.results.unpack(torques).values(), strict=True)
-        return [*torques, *(not_finite_flags(~finite(of_joint)) for of_joint in of_joints)]
+        joint_torques = zip(*kernel.results.unpack(torques).values(), strict=True)
+        return [
+            *torques,
+            *(not_finite_flags(~finite(torques_of_joint)) for torques_of_joint in joint_torques),
+        ]
 
     return Function(
         name="link_torques",
@@ -139,7 +142,7 @@ def link_torques_function(robot: Robot, frame: WrenchFrame | None = None) -> Fun
             "of all joints, 0 if all numbers are finite."
         ),
         arguments=arguments,
-        result=Structure("torques", "Torques of the joints.", _arrays(robot, (*TORQUES, "flags"))),
+        result=Structure("torques", "Torques of the joints.", _variable_arrays(robot, (*TORQUES, "flags"))),
         compute=compute,
     )
 
@@ -155,10 +158,10 @@ def inverse_dynamics_function(robot: Robot, frame: WrenchFrame | None = None) ->
     """
     damped = tuple(index for index, joint in enumerate(robot.joints) if joint.damper_at("transmission"))
     kernel = InverseDynamics(robot, frame, prescribed=(InternalRows(damped, INTERNAL[:1]),))
-    inside = internal_structure(robot) if damped else None
+    internal = internal_structure(robot) if damped else None
     arguments = (
         ("command", command_structure(robot)),
-        *([] if inside is None else [("internal", inside)]),
+        *([] if internal is None else [("internal", internal)]),
         *wrench_argument(robot, frame),
     )
 
@@ -168,29 +171,29 @@ def inverse_dynamics_function(robot: Robot, frame: WrenchFrame | None = None) ->
         values[INTERNAL[0]] = [deflections[SIDES * index + side] for index in damped for side in range(SIDES)]
         computed = kernel.results.unpack(kernel(kernel.arguments.pack(values)))
         drive = drive_rows(values, computed)
-        if inside is None:
+        if internal is None:
             return drive
-        return [*drive, *_inside(robot, computed, "phi"), *_inside(robot, computed, "dphi")]
+        return [*drive, *_internal_rows(robot, computed, "phi"), *_internal_rows(robot, computed, "dphi")]
 
     rates = _internal_array(robot, "dinternal_phi", "their rates")
-    further = () if inside is None else (*inside.arrays, rates)
+    further_arrays = () if internal is None else (*internal.arrays, rates)
     return Function(
         name="inverse_dynamics",
         meaning=(
             "Motor torques that execute a command; returns the flags of all joints, 0 if all is well."
-            + (" Between calls integrate internal_phi by dinternal_phi." if inside else "")
+            + (" Between calls integrate internal_phi by dinternal_phi." if internal else "")
         ),
         arguments=arguments,
-        result=drive_structure(robot, further),
+        result=drive_structure(robot, further_arrays),
         compute=compute,
     )
 
 
 def drive_rows(values: Mapping[str, Any], computed: Mapping[str, Sequence[Scalar]]) -> list[Scalar]:
     """Return the rows of a `drive_structure` without further arrays, from inputs and results of a kernel."""
-    corridor = (values["stiffness"], computed["stiffness_min"], computed["stiffness_max"])
+    stiffness_rows = (values["stiffness"], computed["stiffness_min"], computed["stiffness_max"])
     rows = [row for name in DRIVE_NAMES for row in computed[name]]
-    return [*rows, *map(margin, *corridor), *computed["flags"]]
+    return [*rows, *map(margin, *stiffness_rows), *computed["flags"]]
 
 
 def drive_structure(robot: Robot, further: tuple[Array, ...] = ()) -> Structure:
@@ -200,7 +203,7 @@ def drive_structure(robot: Robot, further: tuple[Array, ...] = ()) -> Structure:
         "drive",
         "What the motors have to do; NaN where a flag says it cannot be.",
         (
-            *_arrays(robot, DRIVE_NAMES),
+            *_variable_arrays(robot, DRIVE_NAMES),
             Array("margin", (len(robot.joints),), gap),
             variable_array(robot, "flags"),
             *further,
@@ -222,15 +225,15 @@ def _internal_array(robot: Robot, name: str, meaning: str) -> Array:
     return Array(name, (len(robot.joints), SIDES), meaning)
 
 
-def _inside(robot: Robot, computed: Mapping[str, Sequence[Scalar]], name: str) -> Iterator[Scalar]:
+def _internal_rows(robot: Robot, computed: Mapping[str, Sequence[Scalar]], name: str) -> Iterator[Scalar]:
     """Yield deflections or their rates; for a motor that sets the springs, its own position or velocity."""
-    of_motor = {"phi": "theta", "dphi": "dtheta"}[name]
+    motor_name = {"phi": "theta", "dphi": "dtheta"}[name]
     for index, joint in enumerate(robot.joints):
-        for side, there in enumerate(joint.actuator.has_columns(VARIABLES["phi"])):
-            yield computed[name if there else of_motor][SIDES * index + side]
+        for side, has_phi in enumerate(joint.actuator.has_columns(VARIABLES["phi"])):
+            yield computed[name if has_phi else motor_name][SIDES * index + side]
 
 
-def _arrays(robot: Robot, names: tuple[str, ...]) -> tuple[Array, ...]:
+def _variable_arrays(robot: Robot, names: tuple[str, ...]) -> tuple[Array, ...]:
     return tuple(variable_array(robot, name) for name in names)
 
 

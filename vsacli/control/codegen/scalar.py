@@ -8,13 +8,13 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from vsacli.compute.rounding import single
+from vsacli.compute.rounding import single_constant
 from vsacli.compute.tracing import Kind, Symbol, is_of_calls
 from vsacli.compute.tracing.c_code import (
     REAL_TYPES,
     Dialect,
     Names,
-    Place,
+    TableLocation,
     Tables,
     Writer,
     digits,
@@ -52,7 +52,7 @@ static inline int search(const {type} *nodes, int count, {type} x)
 
 def _holds_float(value: float) -> bool:
     """Return whether single precision represents a number exactly, and does not underflow."""
-    return math.isnan(value) or (single(value) == value and float(np.float32(value)) == value)
+    return math.isnan(value) or (single_constant(value) == value and float(np.float32(value)) == value)
 
 
 def _holds_integer(largest: int) -> Callable[[float], bool]:
@@ -82,12 +82,12 @@ def scalar_dialect(precision: str) -> Dialect:
 
     def array_type(values: tuple[float, ...], searched: bool) -> str:
         """Return the smallest type that represents all values exactly, else the precision's."""
-        smaller = () if searched else _SMALLER_TYPES.items()
-        return next((name for name, holds in smaller if all(map(holds, values))), precision)
+        smaller_types = () if searched else _SMALLER_TYPES.items()
+        return next((name for name, represents in smaller_types if all(map(represents, values))), precision)
 
-    def take(place: Place, index: str) -> str:
-        entry = f"{place.array.name}[{index}{f' + {place.offset}' if place.offset else ''}]"
-        return entry if place.array.type == precision else f"({precision}){entry}"
+    def take(location: TableLocation, index: str) -> str:
+        entry = f"{location.array.name}[{index}{f' + {location.offset}' if location.offset else ''}]"
+        return entry if location.array.type == precision else f"({precision}){entry}"
 
     def function(kind: Kind, name: str) -> str:
         if name == "search":
@@ -125,7 +125,7 @@ def _double_literal(number: float) -> str:
 
 
 def _single_literal(number: float) -> str:
-    text = digits(single(number))
+    text = digits(single_constant(number))
     if "N" in text:
         return text
     return text.replace(")", "f)") if text.endswith(")") else f"{text}f"
@@ -139,12 +139,16 @@ def definitions(prefix: str, functions: Sequence[Function], precision: str) -> I
     subroutines = Subroutines(programs)
     writer = Writer(dialect, tables, subroutines.name)
     bodies = ["\n".join(indented(text)) for text in subroutines.functions(writer)]
-    bodies += ["\n".join(_definition(prefix, function, writer)) for function in functions]
-    used = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
-    yield from (_constant(prefix, each, dialect) for each in structures(functions) if each.nominal)
+    bodies += ["\n".join(_function_lines(prefix, function, writer)) for function in functions]
+    called_names = {word for body in bodies for word in re.findall(r"\b[a-z_]+(?=\()", body)}
+    yield from (
+        _nominal_constant(prefix, structure, dialect)
+        for structure in structures(functions)
+        if structure.nominal
+    )
     if declarations := list(table_declarations(tables, dialect)):
         yield "\n".join(declarations)
-    yield from (helper_text(name, precision) for name in HELPERS if name in used)
+    yield from (helper_text(name, precision) for name in HELPERS if name in called_names)
     yield from bodies
 
 
@@ -152,12 +156,12 @@ def further_definitions(
     prefix: str, declared: Sequence[Function], functions: Sequence[Function], precision: str
 ) -> Iterator[str]:
     """Yield the definitions of functions for a file that includes the source file of others."""
-    earlier = set(definitions(prefix, declared, precision))
-    whole = definitions(prefix, [*declared, *functions], precision)
-    yield from (text for text in whole if text not in earlier)
+    declared_texts = set(definitions(prefix, declared, precision))
+    all_texts = definitions(prefix, [*declared, *functions], precision)
+    yield from (text for text in all_texts if text not in declared_texts)
 
 
-def _constant(prefix: str, structure: Structure, dialect: Dialect) -> str:
+def _nominal_constant(prefix: str, structure: Structure, dialect: Dialect) -> str:
     """Return the definition of the constant with the nominal values of a structure."""
     values = zip(structure.entries, structure.nominal, strict=True)
     members = (f"    .{entry} = {dialect.real(value)},\n" for entry, value in values)
@@ -192,7 +196,7 @@ def indented(lines: Iterable[str], depth: int = 0) -> Iterator[str]:
         depth += line.endswith("{")
 
 
-def _definition(prefix: str, function: Function, writer: Writer) -> Iterator[str]:
+def _function_lines(prefix: str, function: Function, writer: Writer) -> Iterator[str]:
     if isinstance(function, Step):
         yield from _step_definition(prefix, function, writer)
         return
@@ -202,7 +206,7 @@ def _definition(prefix: str, function: Function, writer: Writer) -> Iterator[str
         code = CallingCode(function.name, program, writer)
         yield from indented(code.declarations("static"))
         yield head
-        yield f"    {writer.dialect.types[Kind.REAL]} {VALUES}[{code.slots}];"
+        yield f"    {writer.dialect.types[Kind.REAL]} {VALUES}[{code.slot_count}];"
         yield from (f"    {VALUES}[{slot}] = {entry};" for slot, entry in enumerate(entries))
         yield from (f"    {line}" for line in code.statements())
         outputs = (output for output in program.outputs if isinstance(output, Symbol))
@@ -211,7 +215,7 @@ def _definition(prefix: str, function: Function, writer: Writer) -> Iterator[str
         names = {symbol.index: entry for symbol, entry in zip(program.inputs, entries, strict=True)}
         yield head
         yield from indented(writer.statements(program.operations, names), 1)
-    yield from _results(function, writer, names)
+    yield from _result_lines(function, writer, names)
 
 
 def _step_definition(prefix: str, step: Step, writer: Writer) -> Iterator[str]:
@@ -219,7 +223,7 @@ def _step_definition(prefix: str, step: Step, writer: Writer) -> Iterator[str]:
     program, derivative = step.program, step.derivative
     names = {symbol.index: entry for symbol, entry in zip(program.inputs, step.inputs, strict=True)}
     rates, flags = list(derivative.result.entries), list[str]()
-    (_, state), *held = derivative.arguments
+    (_, state), *held_arguments = derivative.arguments
     yield f"{signature(prefix, step, writer.dialect.types[Kind.REAL])}\n{{"
     for symbol in program.operations:
         if symbol.operation == "item":
@@ -231,14 +235,18 @@ def _step_definition(prefix: str, step: Step, writer: Writer) -> Iterator[str]:
             yield f"    {prefix}_{derivative.result.name} rates_{stage};"
             for entry, operand in zip(state.entries, symbol.operands[1:], strict=False):
                 yield f"    state_{stage}.{entry} = {writer.value(operand, Kind.REAL, names)};"
-            passed = ", ".join([f"&state_{stage}", *(name for name, _ in held), f"&rates_{stage}"])
-            yield f"    const unsigned flags_{stage} = {prefix}_{derivative.name}({passed});"
+            call_arguments = ", ".join(
+                [f"&state_{stage}", *(name for name, _ in held_arguments), f"&rates_{stage}"]
+            )
+            yield f"    const unsigned flags_{stage} = {prefix}_{derivative.name}({call_arguments});"
         else:
             yield from indented(writer.statements([symbol], names), 1)
-    yield from _results(step, writer, names, flags)
+    yield from _result_lines(step, writer, names, flags)
 
 
-def _results(function: Function, writer: Writer, names: Names, flags: Sequence[str] = ()) -> Iterator[str]:
+def _result_lines(
+    function: Function, writer: Writer, names: Names, flags: Sequence[str] = ()
+) -> Iterator[str]:
     """Yield the statements that store the results, and return their flags together with others."""
     program, flags = function.program, list(flags)
     outputs = iter(program.outputs)

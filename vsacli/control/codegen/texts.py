@@ -63,27 +63,32 @@ def header_text(prefix: str, robot: Robot, functions: Sequence[Function], precis
         head=comment(about),
         version=__version__,
         robot_file=robot_file,
-        about=comment(_conventions(robot, functions)),
+        about=comment(_conventions_text(robot, functions)),
         joints=len(robot.joints),
         flags="\n".join(f"    {upper}_{flag.name} = {flag.value}, /* {flag.meaning} */" for flag in Flag),
-        structures="\n\n".join(structure_text(prefix, each, precision) for each in structures(functions)),
+        structures="\n\n".join(
+            structure_text(prefix, declared, precision) for declared in structures(functions)
+        ),
         functions="\n\n".join(
-            f"{comment(each.meaning)}\n{signature(prefix, each, precision)};" for each in functions
+            f"{comment(declared.meaning)}\n{signature(prefix, declared, precision)};"
+            for declared in functions
         ),
     )
 
 
-def _conventions(robot: Robot, functions: Sequence[Function]) -> str:
-    acted_on = any(structure.name == "wrench" for structure in structures(functions))
-    acting = "the argument wrench acts" if acted_on else "nothing acts"
-    where = "end effector" if len(robot.tool_names) == 1 else "tools that it names" if acted_on else "tools"
+def _conventions_text(robot: Robot, functions: Sequence[Function]) -> str:
+    has_wrench = any(structure.name == "wrench" for structure in structures(functions))
+    wrench_text = "the argument wrench acts" if has_wrench else "nothing acts"
+    tool_text = (
+        "end effector" if len(robot.tool_names) == 1 else "tools that it names" if has_wrench else "tools"
+    )
     names = ", ".join(
         f"{index} {joint.name} ({joint.type}, {joint.actuator_type})"
         for index, joint in enumerate(robot.joints)
     )
     return (
         f"Joints: {names}. Motors 0 and 1 of a joint; what an actuator does not have is NaN. SI units; "
-        f"signs, frames and gravity as in the robot file; {acting} on the {where}. Functions keep "
+        f"signs, frames and gravity as in the robot file; {wrench_text} on the {tool_text}. Functions keep "
         "nothing between calls."
     )
 
@@ -93,9 +98,9 @@ def structure_text(prefix: str, structure: Structure, precision: str) -> str:
     name = f"{prefix}_{structure.name}"
     lines = [comment(structure.meaning), "typedef struct {"]
     for array in structure.arrays:
-        shape = "".join(f"[{size}]" for size in array.shape)
-        number = "unsigned" if array.bits else precision
-        lines.append(f"    {number} {array.name}{shape}; /* {array.meaning} */")
+        shape = "".join(f"[{length}]" for length in array.shape)
+        number_type = "unsigned" if array.bits else precision
+        lines.append(f"    {number_type} {array.name}{shape}; /* {array.meaning} */")
     lines.append(f"}} {name};")
     if structure.nominal:
         constant = f"extern const {name} {prefix}_nominal_{structure.name};"
@@ -120,22 +125,22 @@ def self_test_text(
     prefix: str, functions: Sequence[Function], reference: ReferenceResults, precision: str, about: str
 ) -> str:
     """Return the test program; for arguments see `source_text`."""
-    tests: list[str] = []
+    definitions: list[str] = []
     for function in functions:
         constants = (*function.arguments, ("expected", function.result))
         values = (*reference.inputs(function), reference.results(function))
-        tests += (
-            _vector(f"{_c_type(prefix, structure, precision)} {function.name}_{name}", structure, arrays)
+        definitions += (
+            _case_table(f"{_c_type(prefix, structure, precision)} {function.name}_{name}", structure, arrays)
             for (name, structure), arrays in zip(constants, values, strict=True)
         )
-        tests.append(_test(prefix, function, reference))
+        definitions.append(_test_function(prefix, function, reference))
     return filled(
         "robot_test.c",
         prefix,
         head=comment(about),
         cases=CASES,
         tolerance=TOLERANCE[precision],
-        tests="\n\n".join(tests),
+        tests="\n\n".join(definitions),
         calls=" + ".join(f"test_{function.name}()" for function in functions),
     )
 
@@ -144,52 +149,59 @@ def _c_type(prefix: str, structure: Structure, precision: str) -> str:
     return precision if structure.by_value else f"{prefix}_{structure.name}"
 
 
-def _vector(declared: str, structure: Structure, values: Arrays) -> str:
+def _case_table(declaration: str, structure: Structure, values: Arrays) -> str:
     cases = (
-        _case(structure, {name: of_cases[case] for name, of_cases in values.items()}) for case in range(CASES)
+        _case_initializer(structure, {name: array[case] for name, array in values.items()})
+        for case in range(CASES)
     )
-    return "\n".join([f"static const {declared}[CASES] = {{", *(f"    {case}," for case in cases), "};"])
+    return "\n".join([f"static const {declaration}[CASES] = {{", *(f"    {case}," for case in cases), "};"])
 
 
-def _case(structure: Structure, values: Arrays) -> str:
-    members = [(array, _initializer(values[array.name], array.bits)) for array in structure.arrays]
+def _case_initializer(structure: Structure, values: Arrays) -> str:
+    members = [(array, _array_initializer(values[array.name], array.bits)) for array in structure.arrays]
     if structure.by_value:
         return members[0][1]
     return "{" + ", ".join(f".{array.name} = {value}" for array, value in members) + "}"
 
 
-def _initializer(values: FloatArray, bits: bool) -> str:
+def _array_initializer(values: FloatArray, bits: bool) -> str:
     if values.ndim:
-        return "{" + ", ".join(_initializer(entry, bits) for entry in values) + "}"
+        return "{" + ", ".join(_array_initializer(entry, bits) for entry in values) + "}"
     return f"{int(values)}u" if bits else digits(float(values))
 
 
-def _test(prefix: str, function: Function, reference: ReferenceResults) -> str:
-    own, result = function.name, f"{prefix}_{function.result.name}"
-    given = ", ".join(f"{'' if each.by_value else '&'}{own}_{name}[n]" for name, each in function.arguments)
-    comparisons = "\n".join(_comparisons(function, reference))
-    return f"""static int test_{own}(void)
+def _test_function(prefix: str, function: Function, reference: ReferenceResults) -> str:
+    function_name, result = function.name, f"{prefix}_{function.result.name}"
+    arguments = ", ".join(
+        f"{'' if structure.by_value else '&'}{function_name}_{name}[n]"
+        for name, structure in function.arguments
+    )
+    comparisons = "\n".join(_comparison_lines(function, reference))
+    return f"""static int test_{function_name}(void)
 {{
     int failures = 0;
     for (int n = 0; n < CASES; n++) {{
-        const {result} *const expected = &{own}_expected[n];
+        const {result} *const expected = &{function_name}_expected[n];
         {result} found;
-        {prefix}_{own}({given}, &found);
+        {prefix}_{function_name}({arguments}, &found);
 {comparisons}
     }}
     return failures;
 }}"""
 
 
-def _comparisons(function: Function, reference: ReferenceResults) -> Iterator[str]:
+def _comparison_lines(function: Function, reference: ReferenceResults) -> Iterator[str]:
     for array in function.result.arrays:
         scale, bound = reference.comparison(function, array.name)
         for entry in array.entries:
-            both = f"found.{entry}", f"expected->{entry}"
+            operands = f"found.{entry}", f"expected->{entry}"
             if np.isfinite(bound):
-                both = f"at_most({both[0]}, {digits(bound)})", f"at_most({both[1]}, {digits(bound)})"
+                operands = (
+                    f"at_most({operands[0]}, {digits(bound)})",
+                    f"at_most({operands[1]}, {digits(bound)})",
+                )
             name = f"{function.name}: {entry}"
-            yield f'        failures += differs("{name}", n, {", ".join(both)}, {digits(scale)});'
+            yield f'        failures += differs("{name}", n, {", ".join(operands)}, {digits(scale)});'
 
 
 def python_head(about: str) -> str:
@@ -199,27 +211,27 @@ def python_head(about: str) -> str:
 
 def binding_text(prefix: str, functions: Sequence[Function], precision: str, about: str) -> str:
     """Return the Python module that calls the functions; for arguments see `source_text`."""
-    used = structures(functions)
-    loop = next((each for each in functions if each.name == "inverse_dynamics"), functions[0])
-    called = [_binding(prefix, each) for each in functions]
-    called += (_constant(prefix, each) for each in used if each.nominal)
+    used_structures = structures(functions)
+    loop = next((declared for declared in functions if declared.name == "inverse_dynamics"), functions[0])
+    definitions = [_binding_function(prefix, declared) for declared in functions]
+    definitions += (_nominal_binding(prefix, declared) for declared in used_structures if declared.nominal)
     return filled(
         "robot.py",
         prefix,
         head=python_head(about),
-        call=f"{loop.name}({_names(loop)})",
+        call=f"{loop.name}({_argument_list(loop)})",
         real=NUMPY_TYPES[precision],
         flags="\n".join(f"    {flag.name} = {flag.value}  # {flag.meaning}" for flag in Flag),
-        data_types="\n\n".join(_data_type(each, precision) for each in used),
-        functions="\n\n\n".join(called),
+        data_types="\n\n".join(_data_type(declared, precision) for declared in used_structures),
+        functions="\n\n\n".join(definitions),
     )
 
 
-def _names(function: Function) -> str:
+def _argument_list(function: Function) -> str:
     return ", ".join(name for name, _ in function.arguments)
 
 
-def _type(structure: Structure) -> str:
+def _data_type_name(structure: Structure) -> str:
     return structure.name.capitalize()
 
 
@@ -229,36 +241,36 @@ NUMPY_TYPES = {"double": "np.float64", "float": "np.float32"}
 
 def _data_type(structure: Structure, precision: str) -> str:
     """Return the NumPy data type of a structure, with the memory layout of C."""
-    number = NUMPY_TYPES[precision]
+    number_type = NUMPY_TYPES[precision]
     members = "".join(
-        f'        ("{array.name}", {"np.uintc" if array.bits else number}, {array.shape}),\n'
+        f'        ("{array.name}", {"np.uintc" if array.bits else number_type}, {array.shape}),\n'
         for array in structure.arrays
     )
-    return f"{_type(structure)} = np.dtype(\n    [\n{members}    ],\n    align=True,\n)"
+    return f"{_data_type_name(structure)} = np.dtype(\n    [\n{members}    ],\n    align=True,\n)"
 
 
-def _binding(prefix: str, function: Function) -> str:
+def _binding_function(prefix: str, function: Function) -> str:
     """Return the Python function that calls the C function with the same arguments."""
     meaning = f'"""{function.meaning}"""'
-    given = "".join(
-        f", _real({name})" if structure.by_value else f", ({name}, {_type(structure)})"
+    arguments = "".join(
+        f", _real({name})" if structure.by_value else f", ({name}, {_data_type_name(structure)})"
         for name, structure in function.arguments
     )
-    return f"""def {function.name}({_names(function)}):
+    return f"""def {function.name}({_argument_list(function)}):
 {textwrap.fill(meaning, WIDTH, initial_indent="    ", subsequent_indent="    ")}
-    return _call(_LIBRARY.{prefix}_{function.name}, {_type(function.result)}{given})"""
+    return _call(_LIBRARY.{prefix}_{function.name}, {_data_type_name(function.result)}{arguments})"""
 
 
-def _constant(prefix: str, structure: Structure) -> str:
+def _nominal_binding(prefix: str, structure: Structure) -> str:
     """Return the Python code of the nominal values of a structure."""
-    kind, name = _type(structure), f"{prefix}_nominal_{structure.name}"
-    return f"""_CONSTANT = (ctypes.c_char * {kind}.itemsize).in_dll(_LIBRARY, "{name}")
-NOMINAL_{structure.name.upper()} = np.frombuffer(_CONSTANT.raw, {kind})[0]"""
+    type_name, name = _data_type_name(structure), f"{prefix}_nominal_{structure.name}"
+    return f"""_CONSTANT = (ctypes.c_char * {type_name}.itemsize).in_dll(_LIBRARY, "{name}")
+NOMINAL_{structure.name.upper()} = np.frombuffer(_CONSTANT.raw, {type_name})[0]"""
 
 
-def _wrenches(robot: Robot, functions: Sequence[Function]) -> str:
+def _wrench_sentence(robot: Robot, functions: Sequence[Function]) -> str:
     """Return the sentence on the wrenches on several tools; empty otherwise."""
-    structure = next((each for each in structures(functions) if each.name == "wrench"), None)
+    structure = next((candidate for candidate in structures(functions) if candidate.name == "wrench"), None)
     if structure is None or len(robot.tool_names) == 1:
         return ""
     members = ", ".join(f"`{array.name}`" for array in structure.arrays)
@@ -278,20 +290,20 @@ def readme_text(
         prefix,
         name=for_markdown(robot.name),
         warnings="".join(f"\nWarning: {for_markdown(sentence(warning))}\n" for warning in robot.warnings),
-        call=_names(loop),
-        arguments=", ".join(f"const {prefix}_{each.name} *{name}" for name, each in loop.arguments),
+        call=_argument_list(loop),
+        arguments=", ".join(f"const {prefix}_{structure.name} *{name}" for name, structure in loop.arguments),
         tolerance=TOLERANCE[precision],
         functions="\n".join(
             f"- `{' '.join(head.split()).replace('( ', '(')}`: {function.meaning}"
             for function, head in zip(functions, heads, strict=True)
         ),
         joints=for_markdown(", ".join(f"{index} {name}" for index, name in enumerate(robot.joint_names))),
-        wrenches=_wrenches(robot, functions),
+        wrenches=_wrench_sentence(robot, functions),
         omitted="".join(f"There is {for_markdown(sentence(reason))}\n" for reason in omitted),
         numbers="".join(
-            filled("parameters.md", prefix, first=next(each.entries))
-            for each in structures(functions)
-            if each.nominal
+            filled("parameters.md", prefix, first=next(structure.entries))
+            for structure in structures(functions)
+            if structure.nominal
         ),
         costs="\n".join(
             f"| `{function.name}` | {cost.operations:,} | {cost.functions:,} | {cost.loops:,} |"

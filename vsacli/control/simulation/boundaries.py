@@ -36,8 +36,8 @@ class Boundary(ABC):
     def distance(self, vector: FloatArray) -> FloatArray:
         """Return the smallest distance, at most 1; an undefined one counts as beyond the boundary."""
         distances = self._distances(vector)
-        known = np.where(np.isnan(distances), -1.0, np.minimum(distances, 1.0))
-        return reduce(np.minimum, np.moveaxis(known, -1, 0))
+        clipped = np.where(np.isnan(distances), -1.0, np.minimum(distances, 1.0))
+        return reduce(np.minimum, np.moveaxis(clipped, -1, 0))
 
     def ending(self, time: float, vector: FloatArray) -> Ending:
         """Return the end of a run at this time and state."""
@@ -58,11 +58,11 @@ class Singularity(Boundary):
         super().__init__(loop)
         self.joints = loop.plant.drivetrain.chosen
         phase = loop.packing.unpack(start)
-        self._first_value = self._determinant(phase.q, phase.theta)
+        self._initial_determinant = self._determinant(phase.q, phase.theta)
 
     def distances(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         """Return det A as a share of its initial value, minus `NEARLY_SINGULAR`."""
-        return self._determinant(q, theta) / self._first_value - NEARLY_SINGULAR
+        return self._determinant(q, theta) / self._initial_determinant - NEARLY_SINGULAR
 
     def _determinant(self, q: FloatArray, theta: FloatArray) -> FloatArray:
         return self._plant.drivetrain.determinant(q, theta)[..., self.joints]

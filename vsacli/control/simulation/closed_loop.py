@@ -40,26 +40,28 @@ class Packing:
     """
 
     def __init__(self, drivetrain: Drivetrain) -> None:
-        joints, springs = len(drivetrain.present), int(drivetrain.sprung.sum())
-        ends = np.cumsum([joints, joints, springs, springs, joints, joints]).tolist()
-        self._parts = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
+        joint_count, spring_count = len(drivetrain.present), int(drivetrain.sprung.sum())
+        ends = np.cumsum(
+            [joint_count, joint_count, spring_count, spring_count, joint_count, joint_count]
+        ).tolist()
+        self._slices = [slice(start, end) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
         self.entries: int = ends[-1]
-        places: AnyArray = np.arange(self.entries)
-        dq, dtheta = places[self._parts[1]], places[self._parts[3]]
+        indices: AnyArray = np.arange(self.entries)
+        dq, dtheta = indices[self._slices[1]], indices[self._slices[3]]
         self.motor_velocities = drivetrain.of_all_motors(dq, dtheta)
 
     def pack(self, q: FloatArray, dq: FloatArray, theta: FloatArray, dtheta: FloatArray) -> FloatArray:
         """Return the vector of a state with zero integrals of the errors."""
-        nothing = np.zeros_like(q)
-        return self.joined(Phase(q, dq, theta, dtheta, Integral(nothing, nothing)))
+        zero = np.zeros_like(q)
+        return self.pack_phase(Phase(q, dq, theta, dtheta, Integral(zero, zero)))
 
-    def joined(self, phase: Phase) -> FloatArray:
+    def pack_phase(self, phase: Phase) -> FloatArray:
         """Return the vector of a state."""
         return np.concatenate((*phase[:4], *phase.integral))
 
     def unpack(self, vector: FloatArray) -> Phase:
         """Return the parts of vectors (..., entries), as views."""
-        q, dq, theta, dtheta, *integral = (vector[..., part] for part in self._parts)
+        q, dq, theta, dtheta, *integral = (vector[..., entries] for entries in self._slices)
         return Phase(q, dq, theta, dtheta, Integral(*integral))
 
 
@@ -107,8 +109,8 @@ class Feedforward:
         ends = np.union1d(trajectory.breakpoints, trajectory.start + internal.breakpoints)
         self._table = Table.of(columns, ends if internal.joints else trajectory.breakpoints)
         self.ending: Ending | None = None
-        if (found := self._table.first_undefined) is not None:
-            time, column = found
+        if (undefined := self._table.first_undefined) is not None:
+            time, column = undefined
             motor = column % len(drivetrain.joint)
             self.ending = Ending(time, _NO_TORQUES, Flag.INFEASIBLE, int(drivetrain.joint[motor]))
 
@@ -117,9 +119,9 @@ class Feedforward:
         values: FloatArray = self._table(time)
         if self._friction is None:
             return values
-        motors = values.shape[-1] // 2
-        smooth, velocity = values[..., :motors], values[..., motors:]
-        return smooth + self._friction.torque(velocity)
+        motor_count = values.shape[-1] // 2
+        torque_without_friction, velocity = values[..., :motor_count], values[..., motor_count:]
+        return torque_without_friction + self._friction.torque(velocity)
 
     def error_rates(self, _time: float, phase: Phase) -> Integral:
         """Return zeros, since nothing is integrated."""
@@ -145,10 +147,12 @@ class LinearizingFeedback:
         if not self._integrates:
             return Integral(np.zeros_like(phase.q), np.zeros_like(phase.q))
         reference, plant = self._reference(time), self._feedback.plant
-        error, chosen = np.zeros_like(phase.q), plant.drivetrain.chosen
+        stiffness_error, stiffness_joints = np.zeros_like(phase.q), plant.drivetrain.chosen
         stiffness = plant.drivetrain.stiffness(phase.q, phase.theta)
-        error[..., chosen] = (reference.commanded["stiffness"] - stiffness)[..., chosen]
-        return Integral(reference.q - phase.q, error)
+        stiffness_error[..., stiffness_joints] = (reference.commanded["stiffness"] - stiffness)[
+            ..., stiffness_joints
+        ]
+        return Integral(reference.q - phase.q, stiffness_error)
 
 
 class ClosedLoop:

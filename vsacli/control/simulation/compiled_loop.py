@@ -55,45 +55,54 @@ def dop853_with_stages() -> Any:
     globals.
     """
     dop853: Any = scipy.integrate.DOP853  # its type stubs lack the members that a derived method needs
-    weights, times = _tableau(dop853)
-    end = dop853.n_stages
-    step, dense = Stages(1, end, weights, times), Stages(end + 1, len(times) - 1, weights, times)
-    text = dop853._step_impl
-    one_by_one = text.__globals__.get("rk_step")
+    weights, times = _all_weights_and_times(dop853)
+    stage_count = dop853.n_stages
+    step_stages, dense_stages = (
+        Stages(1, stage_count, weights, times),
+        Stages(stage_count + 1, len(times) - 1, weights, times),
+    )
+    scipy_step = dop853._step_impl
+    scipy_rk_step = scipy_step.__globals__.get("rk_step")
 
     class WithStages(dop853):  # type: ignore[misc]
         def __init__(self, *arguments: Any, stages: Any, **options: Any) -> None:
             super().__init__(*arguments, **options)
             self._stages = stages
-            self._names = {**text.__globals__, "rk_step": self._rk_step}
-            self._scipy_step = MethodType(FunctionType(text.__code__, self._names), self)
+            self._names = {**scipy_step.__globals__, "rk_step": self._rk_step}
+            self._scipy_step = MethodType(FunctionType(scipy_step.__code__, self._names), self)
 
         def _step_impl(self) -> Any:
-            begin = self.t
+            start_time = self.t
             outcome = self._scipy_step()
-            if length := abs(self.t - begin):
+            if length := abs(self.t - start_time):
                 self._names["MAX_FACTOR"] = max(LARGEST_GROWTH, self.h_abs / length)
             return outcome
 
         def _rk_step(self, fun: Any, t: Any, y: Any, f: Any, h: Any, *tableau: Any) -> Any:
             """Return the state at the end of a trial step, and its rates; store those of the stages in K."""
             self.K[0] = f
-            state = self._stages(t, h, y, step, self.K_extended)
-            return one_by_one(fun, t, y, f, h, *tableau) if state is None else (state, self.K[-1].copy())
+            state = self._stages(t, h, y, step_stages, self.K_extended)
+            return scipy_rk_step(fun, t, y, f, h, *tableau) if state is None else (state, self.K[-1].copy())
 
         def _dense_output_impl(self) -> Any:
-            found = self._stages(self.t_old, self.h_previous, self.y_old, dense, self.K_extended)
-            self.A_EXTRA = dop853.A_EXTRA if found is None else dop853.A_EXTRA[:0]  # stages left to SciPy
+            last_state = self._stages(self.t_old, self.h_previous, self.y_old, dense_stages, self.K_extended)
+            self.A_EXTRA = (
+                dop853.A_EXTRA if last_state is None else dop853.A_EXTRA[:0]
+            )  # stages left to SciPy
             return super()._dense_output_impl()
 
     return WithStages
 
 
-def _tableau(method: Any) -> tuple[FloatArray, FloatArray]:
+def _all_weights_and_times(method: Any) -> tuple[FloatArray, FloatArray]:
     """Return weights and times of all stages: of the step, of its end, and of dense output."""
-    end = method.n_stages
-    weights = np.zeros((end + 1 + len(method.A_EXTRA),) * 2)
-    weights[:end, :end], weights[end, :end], weights[end + 1 :] = method.A, method.B, method.A_EXTRA
+    stage_count = method.n_stages
+    weights = np.zeros((stage_count + 1 + len(method.A_EXTRA),) * 2)
+    weights[:stage_count, :stage_count], weights[stage_count, :stage_count], weights[stage_count + 1 :] = (
+        method.A,
+        method.B,
+        method.A_EXTRA,
+    )
     return weights, np.array([*method.C, 1.0, *method.C_EXTRA])
 
 
@@ -133,8 +142,8 @@ class _CLoop(Structure):
 
     @classmethod
     def of(cls, numbers: FloatArray, tables: Sequence[Table]) -> _CLoop:
-        row = _CTable * len(tables)
-        return cls(numbers.ctypes.data, len(tables), row(*map(_CTable.of, tables)))
+        array_type = _CTable * len(tables)
+        return cls(numbers.ctypes.data, len(tables), array_type(*map(_CTable.of, tables)))
 
 
 def open_loop(path: Path) -> dict[str, Any]:
@@ -162,12 +171,12 @@ def loop_trial(
     In equilibrium rates are differences of large torques; those of drawn states nearby give their scale.
     """
     tables = [
-        word
+        argument
         for table in recording.rates.tables
-        for word in (*table.coefficients.shape, table.ends.tobytes(), table.coefficients.tobytes())
+        for argument in (*table.coefficients.shape, table.ends.tobytes(), table.coefficients.tobytes())
     ]
-    drawn = np.random.default_rng(0).uniform(-1e-3, 1e-3, (8, recording.entries))
-    states = vectors.reshape(-1, recording.entries)[0] * (1 + drawn[::-1]) + drawn
+    perturbation = np.random.default_rng(0).uniform(-1e-3, 1e-3, (8, recording.entries))
+    states = vectors.reshape(-1, recording.entries)[0] * (1 + perturbation[::-1]) + perturbation
     expected = np.ascontiguousarray(loop.derivative(time, states))
     arguments = [
         [numbers.tobytes(), len(recording.rates.tables), tables],
@@ -189,8 +198,8 @@ class CompiledLoop:
     """
 
     def __init__(self, functions: dict[str, Any], numbers: FloatArray, recording: LoopPrograms) -> None:
-        loops = [_CLoop.of(numbers, each.tables) for each in recording]
-        self._kept = (numbers, recording, loops)  # keeps alive the arrays to which the code has pointers
+        loops = [_CLoop.of(numbers, state_program.tables) for state_program in recording]
+        self._alive = (numbers, recording, loops)  # keeps alive the arrays to which the code has pointers
         rates, torques, distances = map(byref, loops)
         self._derivatives = partial(functions["derivatives"], rates)
         self._stages = partial(functions["stages"], rates)
@@ -201,21 +210,23 @@ class CompiledLoop:
 
     def derivatives(self, time: float, vectors: FloatArray) -> FloatArray:
         """Return the time derivatives of state vectors, (..., entries), at a time."""
-        given = np.ascontiguousarray(vectors)
-        rates = np.empty_like(given)
-        self._derivatives(time, given.size // given.shape[-1], given.ctypes.data, rates.ctypes.data)
+        contiguous = np.ascontiguousarray(vectors)
+        rates = np.empty_like(contiguous)
+        self._derivatives(
+            time, contiguous.size // contiguous.shape[-1], contiguous.ctypes.data, rates.ctypes.data
+        )
         return rates
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
         """Return the torques, (motors,), that a controller which holds them commands in a state."""
-        given, asked = np.ascontiguousarray(vector), np.empty(self._motors)
-        self._demand(time, given.ctypes.data, asked.ctypes.data)
-        return asked
+        contiguous, commanded = np.ascontiguousarray(vector), np.empty(self._motors)
+        self._demand(time, contiguous.ctypes.data, commanded.ctypes.data)
+        return commanded
 
     def distance(self, vector: FloatArray) -> float:
         """Return the distance to the nearest boundary, at most 1."""
-        given = np.ascontiguousarray(vector)
-        self._to_boundaries(given.ctypes.data, self._distances.ctypes.data)
+        contiguous = np.ascontiguousarray(vector)
+        self._to_boundaries(contiguous.ctypes.data, self._distances.ctypes.data)
         return float(self._distances.min(initial=1.0))  # there may be none
 
     def stages(
@@ -231,9 +242,9 @@ class CompiledLoop:
             rates: rates at the stages, (stages, entries), contiguous; those of earlier stages are read, the
                 computed ones are written.
         """
-        begin, state = np.ascontiguousarray(vector), np.empty_like(vector)
+        start_state, state = np.ascontiguousarray(vector), np.empty_like(vector)
         finite = self._stages(
-            time, step, begin.ctypes.data, which.first, which.last, len(which.weights),
+            time, step, start_state.ctypes.data, which.first, which.last, len(which.weights),
             which.weights.ctypes.data, which.times.ctypes.data, rates.ctypes.data, state.ctypes.data,
         )  # fmt: skip
         return state if finite else None

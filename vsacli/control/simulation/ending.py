@@ -34,11 +34,11 @@ class Ending:
     joint: int | None = None
     verdict: str = DIVERGED
 
-    def described(self, joint_names: Sequence[str], first: float) -> str:
-        """Return a sentence on the end; `first` is the stamp of time zero, s."""
-        place = "" if self.joint is None else f"{joint_names[self.joint]}: "
-        early = "" if self.time > 0 else ", before the first step"
-        return f"{place}{self.reason}; ended at t = {time_text(first + self.time)}{early}"
+    def as_sentence(self, joint_names: Sequence[str], start: float) -> str:
+        """Return a sentence on the end; `start` is the stamp of time zero, s."""
+        joint_prefix = "" if self.joint is None else f"{joint_names[self.joint]}: "
+        suffix = "" if self.time > 0 else ", before the first step"
+        return f"{joint_prefix}{self.reason}; ended at t = {time_text(start + self.time)}{suffix}"
 
 
 LEAST_DEFAULT = 200_000
@@ -106,7 +106,7 @@ class Budget:
         reason = f"the budget of {counted(self.limit, 'evaluation')} of the equations of motion is used up"
         return Ending(time, reason, verdict=INCOMPLETE)
 
-    def spent(self, _time: float) -> bool:
+    def is_spent(self, _time: float) -> bool:
         """Return whether the budget is used up."""
         return self.used >= self.limit
 

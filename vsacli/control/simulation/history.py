@@ -36,20 +36,20 @@ class RateFilter:
     def __init__(self, start: Phase) -> None:
         self.phase = start
 
-    def add(self, read: Phase, elapsed: float) -> None:
+    def add(self, measured: Phase, elapsed: float) -> None:
         """Add a sample of the positions, `elapsed` seconds after the previous one."""
-        keep = math.exp(-2 * math.pi * CUTOFF)
+        retention = math.exp(-2 * math.pi * CUTOFF)
         dq, dtheta = (
-            keep * rate + (1 - keep) * (new - old) / elapsed
-            for rate, new, old in (
-                (self.phase.dq, read.q, self.phase.q),
-                (self.phase.dtheta, read.theta, self.phase.theta),
+            retention * rate + (1 - retention) * (position - previous) / elapsed
+            for rate, position, previous in (
+                (self.phase.dq, measured.q, self.phase.q),
+                (self.phase.dtheta, measured.theta, self.phase.theta),
             )
         )
-        self.phase = read._replace(dq=dq, dtheta=dtheta)
+        self.phase = measured._replace(dq=dq, dtheta=dtheta)
 
 
-BLOCK = 2048
+BLOCK_SAMPLES = 2048
 """Samples whose variables are evaluated at a time: 15 MB of an arm of seven joints, in 30 ms."""
 
 
@@ -67,11 +67,11 @@ class StateBlock(NamedTuple):
     held: bool = False
 
 
-def continuous(
+def integrate_continuous(
     loop: ClosedLoop, integrator: Integrator, times: FloatArray, start: FloatArray
 ) -> Iterator[StateBlock]:
     """Integrate a run whose controller acts at every instant, on the true state; yield its blocks."""
-    for (time, states), ending in _gathered(integrator.over(times, start), loop.controller.ending):
+    for (time, states), ending in _collect_blocks(integrator.integrate(times, start), loop.controller.ending):
         yield StateBlock(time, states, loop.controller.torque(time, loop.packing.unpack(states)), ending)
 
 
@@ -89,7 +89,7 @@ def integrate_sampled(
     """
     demands: list[FloatArray] = []
     pieces = _integrate_intervals(loop, integrator, times, start, readings, demands)
-    for (time, states), ending in _gathered(pieces, loop.controller.ending):
+    for (time, states), ending in _collect_blocks(pieces, loop.controller.ending):
         demand = np.array(demands[: len(time)])
         del demands[: len(time)]
         yield StateBlock(time, states, demand, ending, held=True)
@@ -105,58 +105,60 @@ def _integrate_intervals(
 ) -> Pieces:
     """Integrate interval by interval; append the torques of each sample to `demands` before it is yielded."""
 
-    def read(state: FloatArray, sample: int) -> Phase:
+    def read_phase(state: FloatArray, sample: int) -> Phase:
         truth = loop.packing.unpack(state)
         return truth if readings is None else readings.phase(truth, sample)
 
-    measurement = RateFilter(read(start, 0))
-    demands.append(loop.controller.torque(float(times[0]), measurement.phase))
+    filtered = RateFilter(read_phase(start, 0))
+    demands.append(loop.controller.torque(float(times[0]), filtered.phase))
     loop.hold(demands[-1])
     yield StateSamples(times[:1], start[None])
     state, ending = start, None
     for sample, interval in enumerate(np.stack((times[:-1], times[1:]), axis=1), 1):
-        (time, after), ending = _whole(integrator.over(interval, state))
+        (time, states), ending = _collect_samples(integrator.integrate(interval, state))
         if time[-1] == time[0]:  # the budget was used up before the first step of the interval
             break
-        state = after[-1]
-        measurement.add(read(state, sample), time[-1] - time[0])
-        torques = integrator.equations.torques(float(time[-1]), loop.packing.joined(measurement.phase))
+        state = states[-1]
+        filtered.add(read_phase(state, sample), time[-1] - time[0])
+        torques = integrator.equations.torques(float(time[-1]), loop.packing.pack_phase(filtered.phase))
         demands += [torques] * (len(time) - 1)
         loop.hold(torques)
-        yield StateSamples(time[1:], after[1:])
+        yield StateSamples(time[1:], states[1:])
         if ending is not None:
             break
     return ending
 
 
-def _gathered(pieces: Pieces, last: Ending | None) -> Iterator[tuple[StateSamples, Ending | None]]:
-    """Yield a run in blocks of at least `BLOCK` samples, but for the last one, which has the early end.
+def _collect_blocks(
+    pieces: Pieces, controller_end: Ending | None
+) -> Iterator[tuple[StateSamples, Ending | None]]:
+    """Yield a run in blocks of at least `BLOCK_SAMPLES` samples, except the last one, which has the end.
 
-    Without one, it has the end of the controller's torques, `last`.
+    Without one, it has the end of the controller's torques, `controller_end`.
     """
-    gathered: list[StateSamples] = []
+    collected: list[StateSamples] = []
     count = 0
     while True:
         try:
             piece = next(pieces)
         except StopIteration as finished:
-            yield _concatenate_pieces(gathered), last if finished.value is None else finished.value
+            yield _concatenate_pieces(collected), controller_end if finished.value is None else finished.value
             return
-        if count >= BLOCK:
-            yield _concatenate_pieces(gathered), None
-            gathered, count = [], 0
-        gathered.append(piece)
+        if count >= BLOCK_SAMPLES:
+            yield _concatenate_pieces(collected), None
+            collected, count = [], 0
+        collected.append(piece)
         count += len(piece.time)
 
 
-def _whole(pieces: Pieces) -> tuple[StateSamples, Ending | None]:
+def _collect_samples(pieces: Pieces) -> tuple[StateSamples, Ending | None]:
     """Return all samples of a short run, and its early end."""
-    gathered: list[StateSamples] = []
+    collected: list[StateSamples] = []
     while True:
         try:
-            gathered.append(next(pieces))
+            collected.append(next(pieces))
         except StopIteration as finished:
-            return _concatenate_pieces(gathered), finished.value
+            return _concatenate_pieces(collected), finished.value
 
 
 def _concatenate_pieces(pieces: Sequence[StateSamples]) -> StateSamples:
@@ -176,7 +178,9 @@ def concatenate_histories(blocks: Sequence[History]) -> History:
     """Return the variables of consecutive blocks of a run."""
     arrays = [block.arrays() for block in blocks]
     names = list(arrays[0])
-    return History(**{name: np.concatenate([each.pop(name) for each in arrays]) for name in names})
+    return History(
+        **{name: np.concatenate([block_arrays.pop(name) for block_arrays in arrays]) for name in names}
+    )
 
 
 def histories(
@@ -187,58 +191,64 @@ def histories(
     readings: Readings | None = None,
 ) -> Iterator[History]:
     """Evaluate every variable along a run, block by block; `first` is the stamp of its time zero, s."""
-    work = _Work()
+    work = _MotorWork()
     for integrated in blocks:
-        yield _history(robot, loop, integrated, first, readings, work)
+        yield _history_block(robot, loop, integrated, first, readings, work)
 
 
-def _history(
+def _history_block(
     robot: Robot,
     loop: ClosedLoop,
-    integrated: StateBlock,
+    state_block: StateBlock,
     first: float,
     readings: Readings | None,
-    work: _Work,
+    work: _MotorWork,
 ) -> History:
-    reference = loop.reference(integrated.time).of_joints
-    commanded = {name: reference[name] for name in TRACKED}
-    found = _simulated(loop, integrated, work)
+    reference = loop.reference(state_block.time).of_joints
+    references = {name: reference[name] for name in TRACKED}
+    variables = _simulated_variables(loop, state_block, work)
     if robot.has_variable(VARIABLES["dissipated_power"]):
-        of_joints = (JointVariables.of(of_joint(found, index)) for index in range(len(robot.joints)))
-        found["dissipated_power"] = np.stack(list(map(dissipated_power, robot.joints, of_joints)), axis=1)
-    chosen = np.isin(np.arange(len(robot.joints)), loop.plant.drivetrain.chosen)
+        variables_of_joints = (
+            JointVariables.of(of_joint(variables, index)) for index in range(len(robot.joints))
+        )
+        variables["dissipated_power"] = np.stack(
+            list(map(dissipated_power, robot.joints, variables_of_joints)), axis=1
+        )
+    has_commanded_stiffness = np.isin(np.arange(len(robot.joints)), loop.plant.drivetrain.chosen)
     for name in ("stiffness", "dstiffness"):  # without a command, the reference is the actual value
-        commanded[name] = np.where(chosen, commanded[name], found[name])
-    demand = loop.plant.drivetrain.of_joints(integrated.demand)
-    read: dict[str, FloatArray] = {}
+        references[name] = np.where(has_commanded_stiffness, references[name], variables[name])
+    demand = loop.plant.drivetrain.of_joints(state_block.demand)
+    measured: dict[str, FloatArray] = {}
     if readings is not None:
-        states = loop.packing.unpack(integrated.states)
-        read = readings.variables(states, loop.plant.drivetrain.limited(integrated.demand))
+        states = loop.packing.unpack(state_block.states)
+        measured = readings.variables(states, loop.plant.drivetrain.limited(state_block.demand))
     return History(
-        time=first + integrated.time,
-        **found,
-        **{COMMANDS[name]: values for name, values in {**commanded, "tau_motor": demand}.items()},
-        **{error(name): found[name] - commanded[name] for name in ERRORS},
-        **read,
-        flags=_history_flags(robot, {**found, "tau_motor": demand}, integrated.ending),
+        time=first + state_block.time,
+        **variables,
+        **{COMMANDS[name]: values for name, values in {**references, "tau_motor": demand}.items()},
+        **{error(name): variables[name] - references[name] for name in ERRORS},
+        **measured,
+        flags=_history_flags(robot, {**variables, "tau_motor": demand}, state_block.ending),
     )
 
 
-def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[str, FloatArray]:
+def _simulated_variables(
+    loop: ClosedLoop, state_block: StateBlock, work: _MotorWork
+) -> dict[str, FloatArray]:
     plant, drivetrain = loop.plant, loop.plant.drivetrain
-    phase, torque = loop.packing.unpack(integrated.states), loop.plant.drivetrain.limited(integrated.demand)
-    ddq, _, friction = loop.response(integrated.time, phase, integrated.demand)
+    phase, torque = loop.packing.unpack(state_block.states), loop.plant.drivetrain.limited(state_block.demand)
+    ddq, _, friction = loop.response(state_block.time, phase, state_block.demand)
     springs = drivetrain.state(phase.q, phase.theta, phase.dq, phase.dtheta)
-    passed_on = torque if friction is None else torque - friction
-    dampers = plant.dampers.parallel(loop.reference.damping(integrated.time), phase.dq, phase.dtheta)
-    tau_e = plant.link_torque(phase.dq, ddq, add(springs.tau_e, dampers.links), passed_on)
+    transmitted_torque = torque if friction is None else torque - friction
+    dampers = plant.dampers.parallel_torques(loop.reference.damping(state_block.time), phase.dq, phase.dtheta)
+    tau_e = plant.link_torque(phase.dq, ddq, add(springs.tau_e, dampers.links), transmitted_torque)
     deflected = drivetrain.deflected
     theta, dtheta = (
         drivetrain.of_motors_by_joint(phase.theta, phase.q),
         drivetrain.of_motors_by_joint(phase.dtheta, phase.dq),
     )
     tau_motor = drivetrain.of_joints(torque)
-    found = {
+    variables = {
         "q": phase.q,
         "dq": phase.dq,
         "ddq": ddq,
@@ -253,36 +263,36 @@ def _simulated(loop: ClosedLoop, integrated: StateBlock, work: _Work) -> dict[st
         "tau_motor": tau_motor,
         "elastic_energy": drivetrain.energy(phase.q, phase.theta),
         "motor_power": tau_motor * dtheta,
-        "motor_energy": work.until(theta, tau_motor, held=integrated.held),
+        "motor_energy": work.add_samples(theta, tau_motor, held=state_block.held),
         "det_A": drivetrain.determinant(phase.q, phase.theta),
-        **plant.dampers.variables(loop.reference.damping(integrated.time), phase.dq, phase.dtheta),
+        **plant.dampers.variables(loop.reference.damping(state_block.time), phase.dq, phase.dtheta),
     }
     if drivetrain.windings is not None:
         electrical = drivetrain.windings.variables(torque, drivetrain.of_all_motors(phase.dq, phase.dtheta))
-        found |= {name: drivetrain.of_joints(values) for name, values in electrical.items()}
-    return found
+        variables |= {name: drivetrain.of_joints(values) for name, values in electrical.items()}
+    return variables
 
 
-class _Work:
+class _MotorWork:
     """Work of motors along a run; rounding does not depend on its blocks."""
 
     def __init__(self) -> None:
-        self._last: tuple[FloatArray, ...] = ()
+        self._last_sample: tuple[FloatArray, ...] = ()
 
-    def until(self, theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
+    def add_samples(self, theta: FloatArray, torque: FloatArray, *, held: bool) -> FloatArray:
         """Return the work up to each sample of the next block, (samples, ...), J.
 
         Torques are held from sample to sample, or linear in between.
         """
-        begun = 0 * torque[:1]
-        if self._last:
-            *before, begun = self._last
-            theta, torque = map(np.concatenate, zip(before, (theta, torque), strict=True))
-        given = torque[:-1] if held else (torque[:-1] + torque[1:]) / 2
-        done = np.cumsum(np.concatenate((begun, given * np.diff(theta, axis=0))), axis=0)
-        found = done[1:] if self._last else done
-        self._last = (theta[-1:].copy(), torque[-1:].copy(), done[-1:].copy())
-        return found
+        initial_work = 0 * torque[:1]
+        if self._last_sample:
+            *last_values, initial_work = self._last_sample
+            theta, torque = map(np.concatenate, zip(last_values, (theta, torque), strict=True))
+        mean_torque = torque[:-1] if held else (torque[:-1] + torque[1:]) / 2
+        work = np.cumsum(np.concatenate((initial_work, mean_torque * np.diff(theta, axis=0))), axis=0)
+        new_work = work[1:] if self._last_sample else work
+        self._last_sample = (theta[-1:].copy(), torque[-1:].copy(), work[-1:].copy())
+        return new_work
 
 
 def _history_flags(robot: Robot, values: dict[str, FloatArray], ending: Ending | None) -> FlagArray:

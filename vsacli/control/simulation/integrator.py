@@ -79,7 +79,7 @@ class Effort(NamedTuple):
     provenance: Mapping[str, str]
 
 
-class _End(NamedTuple):
+class _MethodEnd(NamedTuple):
     """The end of an integration with one method.
 
     Attributes:
@@ -122,10 +122,10 @@ class Integrator:
     @property
     def effort(self) -> Effort:
         """Effort of the run so far."""
-        budget, by = self._budget, self.equations.provenance
-        return Effort(tuple(self._methods), budget.used, budget.limit, by)
+        budget, provenance = self._budget, self.equations.provenance
+        return Effort(tuple(self._methods), budget.used, budget.limit, provenance)
 
-    def over(self, times: FloatArray, start: FloatArray) -> Pieces:
+    def integrate(self, times: FloatArray, start: FloatArray) -> Pieces:
         """Integrate over times, (samples,); yield those reached with the states there, in pieces.
 
         If the run ends early, the last time and state are those of its end.
@@ -133,101 +133,109 @@ class Integrator:
         if not self._methods:
             self._methods.append(Method(EXPLICIT, float(times[0])))
         explicit = self._methods[-1].name == EXPLICIT
-        end = yield from (self._explicit if explicit else self._implicit)(times, start)
-        early, sample = end.early, end.sample
-        if explicit and sample is not None and early is not None and early.verdict == INCOMPLETE:
-            return (yield from self._changed(times, sample))
+        end = yield from (self._integrate_explicitly if explicit else self._integrate_implicitly)(
+            times, start
+        )
+        ending, sample = end.early, end.sample
+        if explicit and sample is not None and ending is not None and ending.verdict == INCOMPLETE:
+            return (yield from self._continue_implicitly(times, sample))
         if sample is not None:
             yield sample
-        return early
+        return ending
 
-    def _changed(self, times: FloatArray, change: StateSamples) -> Pieces:
+    def _continue_implicitly(self, times: FloatArray, change: StateSamples) -> Pieces:
         """Continue with the implicit method at the end of the explicit one, which is not a sample of its own.
 
         Only if the budget is too small for the implicit method, the run ends there.
         """
-        at = float(change.time[0])
-        rest = np.concatenate((change.time, times[times > at]))
-        pieces = self._implicit(rest, change.states[0])
-        first = next(pieces)
-        if len(first.time) > 1:
-            yield StateSamples(first.time[1:], first.states[1:])
+        change_time = float(change.time[0])
+        remaining_times = np.concatenate((change.time, times[times > change_time]))
+        pieces = self._integrate_implicitly(remaining_times, change.states[0])
+        first_samples = next(pieces)
+        if len(first_samples.time) > 1:
+            yield StateSamples(first_samples.time[1:], first_samples.states[1:])
         end = yield from pieces
-        if end.sample is None and end.last == at:
+        if end.sample is None and end.last == change_time:
             yield change
             return end.early
-        self._methods.append(Method(IMPLICIT, at))
+        self._methods.append(Method(IMPLICIT, change_time))
         if end.sample is not None:
             yield end.sample
         return end.early
 
-    def _explicit(self, times: FloatArray, start: FloatArray) -> Generator[StateSamples, None, _End]:
+    def _integrate_explicitly(
+        self, times: FloatArray, start: FloatArray
+    ) -> Generator[StateSamples, None, _MethodEnd]:
         method = dop853_with_stages()
         solver = partial(method, self.equations, stages=self.equations.stages, atol=self._tolerances.atol)
-        return self._solve(times, start, self._budget.too_slow, solver, reserve=len(method.C_EXTRA))
+        return self._integrate_spans(times, start, self._budget.too_slow, solver, reserve=len(method.C_EXTRA))
 
-    def _implicit(self, times: FloatArray, start: FloatArray) -> Generator[StateSamples, None, _End]:
-        slope = partial(difference_jacobian, self.equations)
+    def _integrate_implicitly(
+        self, times: FloatArray, start: FloatArray
+    ) -> Generator[StateSamples, None, _MethodEnd]:
+        jacobian = partial(difference_jacobian, self.equations)
         try:
-            floor = resolved_tolerances(slope(float(times[0]), start), start, self._tolerances.rtol)
+            smallest_atol = resolved_tolerances(
+                jacobian(float(times[0]), start), start, self._tolerances.rtol
+            )
         except SpentError:
             yield StateSamples(times[:1], start[None])
-            return _End(float(times[0]), self._budget.ending(float(times[0])))
-        atol = np.maximum(self._tolerances.atol, floor)
-        options: dict[str, Any] = {"jac": slope, "atol": atol}  # SciPy's stubs know only scalar tolerances
+            return _MethodEnd(float(times[0]), self._budget.ending(float(times[0])))
+        atol = np.maximum(self._tolerances.atol, smallest_atol)
+        options: dict[str, Any] = {"jac": jacobian, "atol": atol}  # SciPy's stubs know only scalar tolerances
         solver = partial(scipy.integrate.Radau, self.equations, **options)
-        return (yield from self._solve(times, start, self._budget.spent, solver, reserve=0))
+        return (yield from self._integrate_spans(times, start, self._budget.is_spent, solver, reserve=0))
 
-    def _solve(
+    def _integrate_spans(
         self,
         times: FloatArray,
         start: FloatArray,
         is_due: Callable[[float], bool],
         solver: Callable[..., Any],
         reserve: int,
-    ) -> Generator[StateSamples, None, _End]:
+    ) -> Generator[StateSamples, None, _MethodEnd]:
         """Integrate with a method of SciPy from switch to switch; yield at least one sample."""
         deadline = Deadline(self._budget, is_due, float(times[-1]), self._progress)
         events = [deadline, Edge(self.equations), *(self._sliding.switches if self._sliding else ())]
         if self._sliding:  # torques may have changed since the last call
-            self._sliding.settle(float(times[0]), start)
-        first, last, stop = times[0], math.nan, Stop(float(times[0]), start)
+            self._sliding.release_motors(float(times[0]), start)
+        first_time, last_time, stop = times[0], math.nan, Stop(float(times[0]), start)
         while True:
-            stop = yield from self._until_event(stop, times, events, solver, reserve)
+            stop = yield from self._integrate_to_event(stop, times, events, solver, reserve)
             if stop.reached:
-                last = float(times[stop.reached - 1])
+                last_time = float(times[stop.reached - 1])
             if not isinstance(stop.event, Switch):
                 break
             times = times[times.searchsorted(stop.time, "right") :]
-            stop = stop._replace(state=stop.event.passed(stop.time, stop.state), event=None)
+            stop = stop._replace(state=stop.event.state_after_switch(stop.time, stop.state), event=None)
             if not times.size:
                 break
-        if math.isnan(last):  # a span of zero length, or a failure of the first step
-            last = float(first)
-            yield StateSamples(first[None], start[None])
+        if math.isnan(last_time):  # a span of zero length, or a failure of the first step
+            last_time = float(first_time)
+            yield StateSamples(first_time[None], start[None])
         if self._budget.exhausted:
-            return _End(last, self._budget.ending(last))
+            return _MethodEnd(last_time, self._budget.ending(last_time))
         if stop.failed:
-            return _End(last, Ending(last, "the motion became too fast to integrate"))
+            return _MethodEnd(last_time, Ending(last_time, "the motion became too fast to integrate"))
         if stop.event is None:
-            return _End(last)
+            return _MethodEnd(last_time)
         sample = StateSamples(np.array([stop.time]), stop.state[None])
-        return _End(last, stop.event.ending(stop.time, stop.state), sample)
+        return _MethodEnd(last_time, stop.event.ending(stop.time, stop.state), sample)
 
-    def _until_event(
+    def _integrate_to_event(
         self,
-        begin: Stop,
+        start: Stop,
         times: FloatArray,
         events: Sequence[Event],
         solver: Callable[..., Any],
         reserve: int,
     ) -> Generator[StateSamples, None, Stop]:
         """Integrate from a time and state on to the first event or the last time."""
-        longest = self._sliding.longest_step if self._sliding else math.inf
-        tolerance = {"rtol": self._tolerances.rtol, "max_step": longest}
+        max_step = self._sliding.longest_step if self._sliding else math.inf
+        tolerance = {"rtol": self._tolerances.rtol, "max_step": max_step}
         try:
             with np.errstate(all="ignore"):
-                begun = solver(t0=begin.time, y0=begin.state, t_bound=float(times[-1]), **tolerance)
+                solver_instance = solver(t0=start.time, y0=start.state, t_bound=float(times[-1]), **tolerance)
         except SpentError:  # the budget is too small even for a first step
-            return Stop(begin.time, begin.state, failed=True)
-        return (yield from step_samples(begun, times, events, self._budget, reserve))
+            return Stop(start.time, start.state, failed=True)
+        return (yield from step_samples(solver_instance, times, events, self._budget, reserve))

@@ -18,7 +18,7 @@ from vsacli.base.units import POSITION, STIFFNESS, TORQUE, units_of
 from vsacli.dynamics.energy import JointEnergy
 from vsacli.dynamics.limits import OFF_TARGET, Finding
 
-_GRAMMAR = "expected a number in rad (m) such as 0.01, or a share of each joint's range such as 2%"
+_EXPECTED_TOLERANCE = "expected a number in rad (m) such as 0.01, or a share of each joint's range such as 2%"
 
 
 @dataclass(frozen=True)
@@ -44,17 +44,17 @@ class GoalTolerance:
             )
 
     @classmethod
-    def from_text(cls, written: str) -> GoalTolerance:
+    def from_text(cls, user_text: str) -> GoalTolerance:
         """Parse a tolerance: `2%` of each joint's range plus the default absolute part, or rad (m).
 
         Raises:
             InputError: the text is neither, or out of range.
         """
-        text = written.strip()
+        text = user_text.strip()
         try:
             number = float(text.removesuffix("%"))
         except ValueError:
-            raise InputError.one(f"{_GRAMMAR}, found {written!r}") from None
+            raise InputError.one(f"{_EXPECTED_TOLERANCE}, found {user_text!r}") from None
         share = text.endswith("%")
         try:
             return cls(share=number / 100) if share else cls(0.0, number)
@@ -155,19 +155,19 @@ def tracking_rows(joints: Sequence[JointTracking], ideal: Sequence[Deviation] = 
     )
     if not ideal:
         return [header, *map(_tracking_row, joints)]
-    compared = zip(joints, ideal, strict=True)
+    pairs = zip(joints, ideal, strict=True)
     return [
         (*header, f"q error with full state\n{position}"),
-        *((*_tracking_row(a), _pair(b)) for a, b in compared),
+        *((*_tracking_row(a), _peak_and_final(b)) for a, b in pairs),
     ]
 
 
 def _tracking_row(joint: JointTracking) -> tuple[str, ...]:
     motors = " / ".join(error_text(peak) for peak in joint.peak_tau_motor if not math.isnan(peak))
-    return (joint.name, *map(_pair, (joint.q, joint.stiffness)), motors)
+    return (joint.name, *map(_peak_and_final, (joint.q, joint.stiffness)), motors)
 
 
-def _pair(deviation: Deviation) -> str:
+def _peak_and_final(deviation: Deviation) -> str:
     if math.isnan(deviation.peak):
         return "-"
     return f"{error_text(deviation.peak)} / {error_text(deviation.final)}"

@@ -62,13 +62,16 @@ def record_loop(loop: ClosedLoop, boundaries: Sequence[Boundary]) -> LoopProgram
         return vector[:0] if loop.held is None else loop.controller_torque(time, vector)
 
     def distances(_time: Any, vector: FloatArray) -> FloatArray:
-        return np.concatenate([vector[:0], *(each.distance(vector).reshape(1) for each in boundaries)])
+        return np.concatenate(
+            [vector[:0], *(boundary.distance(vector).reshape(1) for boundary in boundaries)]
+        )
 
     try:
-        parts = (
-            _record_program(each, loop.packing.entries) for each in (loop.derivative, torques, distances)
+        programs = (
+            _record_program(function, loop.packing.entries)
+            for function in (loop.derivative, torques, distances)
         )
-        return LoopPrograms(*parts)
+        return LoopPrograms(*programs)
     except (AttributeError, IndexError, TypeError, ValueError) as error:  # e.g. from a user's own spring law
         raise NotImplementedError(f"it takes more than NumPy's functions of arrays: {error}") from error
 
@@ -97,27 +100,26 @@ def loop_code(recording: LoopPrograms) -> tuple[Code, FloatArray]:
         return f"p[{len(constants) - 1}]"
 
     dialect = scalar_dialect("double")._replace(real=real, literal=digits)
-    tables = Tables((each.program for each in recording), dialect.array_type)
+    tables = Tables((state_program.program for state_program in recording), dialect.array_type)
     writer = Writer(dialect, tables)
     lines = [
         f"#define ENTRIES {recording.entries}",
-        f"#define COLUMNS {max(sum(table.columns for table in each.tables) for each in recording)}",
+        f"#define COLUMNS {max(sum(table.columns for table in program.tables) for program in recording)}",
         files("vsacli.control.simulation").joinpath("loop.c").read_text(encoding="utf-8"),
         *(helper_text(name, "double") for name in HELPERS),
         *table_declarations(tables, dialect),
     ]
-    for name, each in recording._asdict().items():
-        lines += _c_function(name, each.program, recording.entries, writer)
-    functions = tuple(compiling_size(each.program) for each in recording)
+    for name, state_program in recording._asdict().items():
+        lines += _c_function(name, state_program.program, recording.entries, writer)
+    functions = tuple(compiling_size(state_program.program) for state_program in recording)
     return Code("\n".join([*lines, ""]), sum(functions), functions), np.array(constants)
 
 
 def _c_function(name: str, program: Program, entries: int, writer: Writer) -> Iterator[str]:
     """Return the C function of a program, whose inputs are the entries of a state, then columns of tables."""
-    places = (
-        f"y[{number}]" if number < entries else f"s[{number - entries}]"
-        for number in range(len(program.inputs))
+    input_texts = (
+        f"y[{index}]" if index < entries else f"s[{index - entries}]" for index in range(len(program.inputs))
     )
-    names = {symbol.index: place for symbol, place in zip(program.inputs, places, strict=True)}
+    names = {symbol.index: text for symbol, text in zip(program.inputs, input_texts, strict=True)}
     head = f"static void {name}(const double *p, const double *y, const double *s, double *result)"
     return writer.definition(head, program, names, "result")

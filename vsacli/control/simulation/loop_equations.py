@@ -70,7 +70,7 @@ class LoopEquations:
 
     def distance(self, vector: FloatArray) -> float:
         """Return the distance of a state from the nearest boundary, at most 1."""
-        return min((float(each.distance(vector)) for each in self.boundaries), default=1.0)
+        return min((float(boundary.distance(vector)) for boundary in self.boundaries), default=1.0)
 
 
 class Edge:
@@ -89,7 +89,7 @@ class Edge:
 
     def ending(self, time: float, vector: FloatArray) -> Ending:
         """Return the end of a run at this time and state."""
-        reached = min(self._equations.boundaries, key=lambda each: float(each.distance(vector)))
+        reached = min(self._equations.boundaries, key=lambda boundary: float(boundary.distance(vector)))
         return reached.ending(time, vector)
 
 
@@ -102,8 +102,8 @@ class NumberProgram:
         NotImplementedError: the program has loops or conditionals.
     """
 
-    def __init__(self, recorded: StateProgram) -> None:
-        self._function, self._tables = number_function(recorded.program), recorded.tables
+    def __init__(self, recording: StateProgram) -> None:
+        self._function, self._tables = number_function(recording.program), recording.tables
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
         """Return results, (..., results), for state vectors, (..., entries), at a time.
@@ -111,7 +111,7 @@ class NumberProgram:
         Raises:
             ArithmeticError, ValueError: NumPy would return NaN or infinity.
         """
-        columns = [number for table in self._tables for number in table(time).tolist()]
+        columns = [column for table in self._tables for column in table(time).tolist()]
         states = vectors.reshape(-1, vectors.shape[-1]).tolist()
         results = [self._function([*state, *columns]) for state in states]
         return np.array(results).reshape(*vectors.shape[:-1], -1)
@@ -124,10 +124,10 @@ joints, 30 to 130 ms with seven, while an evaluation with NumPy takes 0.1 to 0.3
 NUMBER_SECONDS = 4e-8
 """Time of a Python operation on plain numbers, s."""
 
-TEXT_SECONDS = 2e-4
+NUMPY_SECONDS = 2e-4
 """Time of an evaluation with NumPy, s."""
 
-LOOK_SECONDS = 0.02
+CACHE_SECONDS = 0.02
 """Time to look for compiled code in the cache, s."""
 
 
@@ -170,26 +170,28 @@ class RecordedEquations(LoopEquations):
         super().__init__(loop, boundaries, budget)
         check_engine(computing.engine)
         self._computing = computing
-        self._program: NumberProgram | None = None
-        self._law: NumberProgram | None = None
-        self._compiled: CompiledLoop | None = None
+        self._rate_program: NumberProgram | None = None
+        self._torque_program: NumberProgram | None = None
+        self._compiled_loop: CompiledLoop | None = None
         self._compiler = ""
-        self._last = 0.0, np.zeros(0)
-        self._later = self._compiling() if computing.engine == "c" else self._improving()
-        self._due = next(self._later)
+        self._last_state = 0.0, np.zeros(0)
+        self._backends = self._compiled_backend() if computing.engine == "c" else self._faster_backends()
+        self._next_change = next(self._backends)
 
     @property
     def provenance(self) -> dict[str, str]:
         """See `Equations.provenance`; that of the last evaluation."""
-        if self._compiled is None:
+        if self._compiled_loop is None:
             return super().provenance
         return {"engine": "c", "compiler": self._compiler, "threads": "1"}
 
     def __call__(self, time: float, vectors: FloatArray) -> FloatArray:
         """See `Equations.__call__`; NumPy evaluates again where a result is not finite."""
-        self._improve(time, vectors)
+        self._change_backend(time, vectors)
         self.budget.check(evaluations := vectors.size // vectors.shape[-1])
-        rates = _finite_values(self._compiled.derivatives if self._compiled else self._program, time, vectors)
+        rates = _finite_values(
+            self._compiled_loop.derivatives if self._compiled_loop else self._rate_program, time, vectors
+        )
         if rates is None:
             return super().__call__(time, vectors)
         self.budget.used += evaluations
@@ -197,33 +199,37 @@ class RecordedEquations(LoopEquations):
 
     def torques(self, time: float, vector: FloatArray) -> FloatArray:
         """See `Equations.torques`; by NumPy, feedback of the positions of the 3R takes 2.3 times as long."""
-        asked = _finite_values(self._compiled.torques if self._compiled else self._law, time, vector)
+        asked = _finite_values(
+            self._compiled_loop.torques if self._compiled_loop else self._torque_program, time, vector
+        )
         return super().torques(time, vector) if asked is None else asked
 
     def stages(
         self, time: float, step: float, vector: FloatArray, which: Stages, rates: FloatArray
     ) -> FloatArray | None:
         """See `Equations.stages`; one by one, a simulation of the 3R takes 1.23 times as long."""
-        self._improve(time, vector)
-        if self._compiled is None:
+        self._change_backend(time, vector)
+        if self._compiled_loop is None:
             return None
         self.budget.check(evaluations := which.last - which.first + 1)
-        state = self._compiled.stages(time, step, vector, which, rates)
+        state = self._compiled_loop.stages(time, step, vector, which, rates)
         if state is not None:
             self.budget.used += evaluations
         return state
 
     def distance(self, vector: FloatArray) -> float:
         """See `Equations.distance`; by NumPy, a simulation of the 3R takes 1.2 times as long."""
-        return super().distance(vector) if self._compiled is None else self._compiled.distance(vector)
+        return (
+            super().distance(vector) if self._compiled_loop is None else self._compiled_loop.distance(vector)
+        )
 
-    def _improve(self, time: float, vectors: FloatArray) -> None:
+    def _change_backend(self, time: float, vectors: FloatArray) -> None:
         """Change to the next backend if it is due; compiled code is tried near these states."""
-        if self.budget.used >= self._due:
-            self._last = time, vectors
-            self._due = next(self._later, math.inf)
+        if self.budget.used >= self._next_change:
+            self._last_state = time, vectors
+            self._next_change = next(self._backends, math.inf)
 
-    def _improving(self) -> Iterator[float]:
+    def _faster_backends(self) -> Iterator[float]:
         """Make one faster backend after the other; yield the number of evaluations at which to continue.
 
         One of several runs looks for the code of an earlier one at once, which saves 40 % of its time.
@@ -233,52 +239,60 @@ class RecordedEquations(LoopEquations):
         with suppress(NotImplementedError, CompilerError):
             recording = record_loop(self.loop, self.boundaries)
             if shared:
-                self._load(recording, *loop_code(recording), lambda _code: False)
-            if self._compiled is None:
-                yield from self._improving_on(recording, looked=shared)
+                self._load_compiled(recording, *loop_code(recording), lambda _code: False)
+            if self._compiled_loop is None:
+                yield from self._recorded_backends(recording, cache_checked=shared)
 
-    def _improving_on(self, recording: LoopPrograms, *, looked: bool) -> Iterator[float]:
-        """Use a program on plain numbers, then compiled code; yield like `_improving`.
+    def _recorded_backends(self, recording: LoopPrograms, *, cache_checked: bool) -> Iterator[float]:
+        """Use a program on plain numbers, then compiled code; yield like `_faster_backends`.
 
-        With `looked`, compiled code is not in the cache.
+        With `cache_checked`, compiled code is not in the cache.
         """
         with suppress(NotImplementedError):  # raised for programs with loops
-            self._program = NumberProgram(recording.rates)
-            self._law = NumberProgram(recording.torques)
-        begin, seconds = self.budget.used, self._seconds(recording) * self._computing.runs
+            self._rate_program = NumberProgram(recording.rates)
+            self._torque_program = NumberProgram(recording.torques)
+        evaluations, evaluation_seconds = (
+            self.budget.used,
+            self._evaluation_seconds(recording) * self._computing.runs,
+        )
         if self._computing.engine == "auto":
-            if not looked:
-                yield begin + LOOK_SECONDS / seconds
+            if not cache_checked:
+                yield evaluations + CACHE_SECONDS / evaluation_seconds
             code, numbers = loop_code(recording)
-            if not looked:
-                self._load(recording, code, numbers, lambda _code: False)
-            if self._compiled is None:
-                yield begin + code.compiling_seconds / seconds
-                self._load(recording, code, numbers, lambda _code: True)
+            if not cache_checked:
+                self._load_compiled(recording, code, numbers, lambda _code: False)
+            if self._compiled_loop is None:
+                yield evaluations + code.compiling_seconds / evaluation_seconds
+                self._load_compiled(recording, code, numbers, lambda _code: True)
 
-    def _seconds(self, recording: LoopPrograms) -> float:
+    def _evaluation_seconds(self, recording: LoopPrograms) -> float:
         """Return the time of an evaluation without compiled code, s."""
         operations = len(recording.rates.program.operations)
-        return TEXT_SECONDS if self._program is None else NUMBER_SECONDS * operations
+        return NUMPY_SECONDS if self._rate_program is None else NUMBER_SECONDS * operations
 
-    def _compiling(self) -> Iterator[float]:
-        """Compile at once, for the engine "c"; yield like `_improving`. Failure raises an InputError."""
+    def _compiled_backend(self) -> Iterator[float]:
+        """Compile at once, for the engine "c"; yield as `_faster_backends`. Failure is an InputError."""
         yield 0.0
         with compiled_as_asked():
             recording = record_loop(self.loop, self.boundaries)
-            self._load(recording, *loop_code(recording), lambda _code: True)
+            self._load_compiled(recording, *loop_code(recording), lambda _code: True)
 
-    def _load(self, recording: LoopPrograms, code: Code, numbers: FloatArray, worthwhile: Worthwhile) -> None:
+    def _load_compiled(
+        self, recording: LoopPrograms, code: Code, numbers: FloatArray, worthwhile: Worthwhile
+    ) -> None:
         """Load compiled code; compile it if `worthwhile`.
 
         Raises:
             CompilerError: the code cannot be compiled or loaded.
         """
         compiler = system_compiler()
-        trying = partial(loop_trial, self.loop, *self._last, numbers, recording)
-        loaded = load(code, open_loop, compiler, self._computing.tell, trying, worthwhile)
+        make_trial = partial(loop_trial, self.loop, *self._last_state, numbers, recording)
+        loaded = load(code, open_loop, compiler, self._computing.tell, make_trial, worthwhile)
         if loaded is not None:
-            self._compiled, self._compiler = CompiledLoop(loaded.library, numbers, recording), compiler.name
+            self._compiled_loop, self._compiler = (
+                CompiledLoop(loaded.library, numbers, recording),
+                compiler.name,
+            )
 
 
 def _finite_values(
@@ -287,7 +301,7 @@ def _finite_values(
     """Return the values of a function at states; None without a function, or if a value is not finite."""
     if function is not None:
         with suppress(ArithmeticError, ValueError):  # Python raises these where NumPy returns NaN or infinity
-            found = function(time, vectors)
-            if math.isfinite(found.sum()):
-                return found
+            values = function(time, vectors)
+            if math.isfinite(values.sum()):
+                return values
     return None

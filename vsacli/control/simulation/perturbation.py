@@ -54,87 +54,92 @@ def perturbed(robot: Robot, relative: float, seed: int) -> Robot:
         raise InputError.one(f"the seed must be zero or positive, not {seed}")
     if relative == 0:
         return robot
-    wrong = _Wrong(relative, np.random.default_rng(seed))
-    return replace(robot, joints=tuple(wrong.joint(joint) for joint in robot.joints))
+    generator = _PerturbedRobots(relative, np.random.default_rng(seed))
+    return replace(robot, joints=tuple(generator.joint(joint) for joint in robot.joints))
 
 
-class _Wrong:
+class _PerturbedRobots:
     """A generator of robots with random errors, drawn in the order of the joints."""
 
     def __init__(self, relative: float, random: np.random.Generator) -> None:
         self._relative = relative
-        self._random = random
+        self._rng = random
 
     def joint(self, joint: Joint) -> Joint:
         try:
-            actuator = self._record(joint.actuator)
+            actuator = self._perturb_record(joint.actuator)
         except InvalidRecordError as error:
             reason = f"an error of up to {self._relative:g} makes an actuator that cannot be"
             raise InputError.one(f"joint {joint.name}: {reason}: {error}; choose a smaller one") from error
         return replace(
             joint,
-            link=self._link(joint.link),
-            damping=self._number(joint.damping),
-            friction=self._friction(joint.friction),
+            link=self._perturb_link(joint.link),
+            damping=self._perturb_number(joint.damping),
+            friction=self._perturb_friction(joint.friction),
             actuator=actuator,
         )
 
-    def _number(self, value: float) -> float:
-        return value * (1 + self._relative * float(self._random.uniform(-1, 1)))
+    def _perturb_number(self, value: float) -> float:
+        return value * (1 + self._relative * float(self._rng.uniform(-1, 1)))
 
-    def _link(self, link: Link) -> Link:
-        x, y, z = map(self._number, link.com)
-        return replace(link, mass=self._number(link.mass), com=(x, y, z), inertia=self._inertia(link.inertia))
+    def _perturb_link(self, link: Link) -> Link:
+        x, y, z = map(self._perturb_number, link.com)
+        return replace(
+            link,
+            mass=self._perturb_number(link.mass),
+            com=(x, y, z),
+            inertia=self._perturb_inertia(link.inertia),
+        )
 
-    def _inertia(self, inertia: Inertia) -> Inertia:
-        factor = self._number(1.0)
+    def _perturb_inertia(self, inertia: Inertia) -> Inertia:
+        factor = self._perturb_number(1.0)
         return replace(
             inertia, **{name: factor * getattr(inertia, name) for name in declared_fields(Inertia)}
         )
 
-    def _record(self, record: Any) -> Any:
+    def _perturb_record(self, record: Any) -> Any:
         """Return a record with errors in its motors, springs, mechanisms and numbers, except limits.
 
         Errors are drawn in the order in which fields are declared.
         """
-        wrong = {
-            name: self._value(field.kind, getattr(record, name))
+        perturbed_fields = {
+            name: self._perturb_value(field.kind, getattr(record, name))
             for name, (field, _) in declared_fields(type(record)).items()
             if name != "max_deflection"
         }
-        return replace(record, **wrong)
+        return replace(record, **perturbed_fields)
 
-    def _value(self, kind: ValueKind, value: Any) -> Any:
+    def _perturb_value(self, kind: ValueKind, value: Any) -> Any:
         if value is None:
             return None
         match kind:
             case PairOf(item):
-                return tuple(self._value(item, side) for side in value)
+                return tuple(self._perturb_value(item, side) for side in value)
             case RecordOf(cls) if cls is Motor:
-                return self._motor(value)
+                return self._perturb_motor(value)
             case OneOf():
-                return self._record(value)
+                return self._perturb_record(value)
             case NumberWithUnit():
-                return self._number(value)
+                return self._perturb_number(value)
             case NamedNumbers():
-                return tuple((name, self._number(each)) for name, each in value)
+                return tuple((name, self._perturb_number(number)) for name, number in value)
         return value
 
-    def _motor(self, motor: Motor) -> Motor:
+    def _perturb_motor(self, motor: Motor) -> Motor:
         return replace(
             motor,
-            inertia=self._number(motor.inertia),
-            damping=self._number(motor.damping),
-            friction=self._friction(motor.friction),
+            inertia=self._perturb_number(motor.inertia),
+            damping=self._perturb_number(motor.damping),
+            friction=self._perturb_friction(motor.friction),
         )
 
-    def _friction(self, friction: Friction | None) -> Friction | None:
+    def _perturb_friction(self, friction: Friction | None) -> Friction | None:
         """Return friction with one factor for both directions, which must stay equal between links."""
         if friction is None:
             return None
-        factor = self._number(1.0)
+        factor = self._perturb_number(1.0)
         backward, forward = friction.coulomb
-        offset = self._number(friction.offset)
+        offset = self._perturb_number(friction.offset)
         return replace(friction, coulomb=(factor * backward, factor * forward), offset=offset)
 
 
@@ -165,7 +170,7 @@ def simulate_perturbed(
     """
     if processes < 1:
         raise InputError.one(f"there must be at least 1 process, not {processes}")
-    report = partial(_report, robot, trajectory, relative, {"runs": len(seeds), **conditions})
+    report = partial(_report_of_seed, robot, trajectory, relative, {"runs": len(seeds), **conditions})
     yield from map(report, seeds[:1])  # alone, since it may have to compile the code that the others use
     if processes == 1:
         yield from map(report, seeds[1:])
@@ -180,7 +185,7 @@ def simulate_perturbed(
         pool.shutdown(cancel_futures=True)
 
 
-def _report(
+def _report_of_seed(
     robot: Robot, trajectory: Trajectory, relative: float, conditions: dict[str, Any], seed: int
 ) -> SimulationReport:
     run = SimulationRun(robot, trajectory, model=perturbed(robot, relative, seed), **conditions)

@@ -52,12 +52,12 @@ class Sensors:
             raise InputError.one(f"the seed must be zero or positive, not {self.seed}")
 
 
-DRAWN = 2048
+NOISE_BLOCK = 2048
 """Samples whose noise is drawn at a time."""
 
 
 class _NoiseRows:
-    """Rows of normally distributed noise, drawn when they are needed, and kept until `dropped`.
+    """Rows of normally distributed noise, drawn when they are needed, and kept until `drop_rows`.
 
     Args:
         random: generator whose next `samples` * `columns` numbers are the noise; it is advanced beyond them.
@@ -68,24 +68,24 @@ class _NoiseRows:
 
     def __init__(self, random: np.random.Generator, samples: int, columns: int, deviation: float) -> None:
         self._random, self._deviation = deepcopy(random), deviation
-        self._first, self._left, self._kept = 0, samples, np.empty((0, columns))
-        for start in range(0, samples, DRAWN):
-            random.standard_normal((min(DRAWN, samples - start), columns))
+        self._first_row, self._remaining, self._rows = 0, samples, np.empty((0, columns))
+        for start in range(0, samples, NOISE_BLOCK):
+            random.standard_normal((min(NOISE_BLOCK, samples - start), columns))
 
     def __getitem__(self, rows: int | slice) -> FloatArray:
         """Return a row by its index, or rows of a slice with both ends, none of them dropped before."""
         start, stop = (rows.start, rows.stop) if isinstance(rows, slice) else (rows, rows + 1)
-        while self._left and stop > self._first + len(self._kept):
-            drawn = self._random.standard_normal((min(DRAWN, self._left), self._kept.shape[1]))
-            self._left -= len(drawn)
-            self._kept = np.concatenate((self._kept, self._deviation * drawn))
-        found: FloatArray = self._kept[start - self._first : stop - self._first]
-        return found if isinstance(rows, slice) else found[0]
+        while self._remaining and stop > self._first_row + len(self._rows):
+            noise = self._random.standard_normal((min(NOISE_BLOCK, self._remaining), self._rows.shape[1]))
+            self._remaining -= len(noise)
+            self._rows = np.concatenate((self._rows, self._deviation * noise))
+        selected: FloatArray = self._rows[start - self._first_row : stop - self._first_row]
+        return selected if isinstance(rows, slice) else selected[0]
 
-    def dropped(self, stop: int) -> None:
+    def drop_rows(self, stop: int) -> None:
         """Forget all rows before one."""
-        self._kept = self._kept[stop - self._first :]
-        self._first = stop
+        self._rows = self._rows[stop - self._first_row :]
+        self._first_row = stop
 
 
 class Readings:
@@ -105,19 +105,19 @@ class Readings:
     """
 
     def __init__(self, sensors: Sensors, robot: Robot, drivetrain: Drivetrain, samples: int) -> None:
-        joints, motors = len(robot.joints), len(drivetrain.joint)
+        joint_count, motor_count = len(robot.joints), len(drivetrain.joint)
         random = np.random.default_rng(sensors.seed)
         self._drivetrain = drivetrain
-        self._q = _NoiseRows(random, samples, joints, sensors.position)
-        self._theta = _NoiseRows(random, samples, motors, sensors.position)
-        self._torque = _NoiseRows(random, samples, motors, sensors.torque)
-        self._recorded = 0
-        self._q_step, self._theta_step = np.zeros(joints), np.zeros(motors)
+        self._q = _NoiseRows(random, samples, joint_count, sensors.position)
+        self._theta = _NoiseRows(random, samples, motor_count, sensors.position)
+        self._torque = _NoiseRows(random, samples, motor_count, sensors.torque)
+        self._recorded_samples = 0
+        self._q_step, self._theta_step = np.zeros(joint_count), np.zeros(motor_count)
         if sensors.encoder_bits is not None:
-            share = 0.5**sensors.encoder_bits
-            self._q_step += [_turn(joint) * share for joint in robot.joints]
+            turns_per_step = 0.5**sensors.encoder_bits
+            self._q_step += [_encoder_range(joint) * turns_per_step for joint in robot.joints]
             self._theta_step += [
-                _turn(joint, motor.gear_ratio) * share
+                _encoder_range(joint, motor.gear_ratio) * turns_per_step
                 for joint in robot.joints
                 for motor in joint.actuator.motors
             ]
@@ -126,8 +126,8 @@ class Readings:
         """Return readings of joints, (..., joints), and of all motors, (..., motors), at samples `rows`."""
         theta = self._drivetrain.of_all_motors(truth.q, truth.theta)
         return (
-            _quantized(truth.q + self._q[rows], self._q_step),
-            _quantized(theta + self._theta[rows], self._theta_step),
+            _quantize(truth.q + self._q[rows], self._q_step),
+            _quantize(theta + self._theta[rows], self._theta_step),
         )
 
     def phase(self, truth: Phase, sample: int) -> Phase:
@@ -137,17 +137,17 @@ class Readings:
 
     def variables(self, truth: Phase, torque: FloatArray) -> dict[str, FloatArray]:
         """Return the readings of the next block by name, from its states and torques, (samples, motors)."""
-        first, self._recorded = self._recorded, self._recorded + len(torque)
-        rows = slice(first, self._recorded)
+        start, self._recorded_samples = self._recorded_samples, self._recorded_samples + len(torque)
+        rows = slice(start, self._recorded_samples)
         q, theta = self.positions(truth, rows)
         of_joints = self._drivetrain.of_joints
-        read = {"q": q, "theta": of_joints(theta), "tau_motor": of_joints(torque + self._torque[rows])}
+        readings = {"q": q, "theta": of_joints(theta), "tau_motor": of_joints(torque + self._torque[rows])}
         for noise in (self._q, self._theta, self._torque):
-            noise.dropped(self._recorded)
-        return {measured(name): values for name, values in read.items()}
+            noise.drop_rows(self._recorded_samples)
+        return {measured(name): values for name, values in readings.items()}
 
 
-def _turn(joint: Joint, gear_ratio: float | None = None) -> float:
+def _encoder_range(joint: Joint, gear_ratio: float | None = None) -> float:
     """Return the range that an encoder divides into steps, joint side of the gear, rad (m).
 
     It is a turn of a revolute joint, or of the shaft of a motor whose gear ratio is known, or the position
@@ -166,7 +166,7 @@ def _turn(joint: Joint, gear_ratio: float | None = None) -> float:
     return upper - lower
 
 
-def _quantized(values: FloatArray, step: FloatArray) -> FloatArray:
+def _quantize(values: FloatArray, step: FloatArray) -> FloatArray:
     """Return values rounded to multiples of a step, unless that is zero."""
-    whole = np.where(step > 0, step, 1.0)
-    return np.where(step > 0, whole * np.round(values / whole), values)
+    multiple = np.where(step > 0, step, 1.0)
+    return np.where(step > 0, multiple * np.round(values / multiple), values)

@@ -29,8 +29,8 @@ from vsacli.control.simulation.history import (
     History,
     StateBlock,
     concatenate_histories,
-    continuous,
     histories,
+    integrate_continuous,
     integrate_sampled,
 )
 from vsacli.control.simulation.integrator import Integrator, Tolerances
@@ -66,7 +66,7 @@ class Simulation:
 PEAK_SAMPLES = 100
 """Samples that estimate the largest torque of a motion; an order of magnitude is enough."""
 
-_AMPLIFIED = (
+_AMPLIFICATION_WARNING = (
     "model and start are exact, so the run ends off target by errors of the integration, which this motion "
     "amplifies and nothing feeds back: with another --rtol it ends elsewhere"
 )
@@ -107,8 +107,8 @@ class SimulationRun:
         self.robot, self.trajectory = robot, adapt_trajectory(robot, trajectory)
         check_feedback(feedback, gains)
         self._gains, self._initial_error, self._feedback = gains, initial_error, feedback
-        self._exact = gains is None and (model is None or model is robot) and initial_error.is_zero
-        self._compared: Any = {
+        self._is_exact = gains is None and (model is None or model is robot) and initial_error.is_zero
+        self._full_state_options: Any = {
             "gains": gains,
             "model": model,
             "initial_error": initial_error,
@@ -117,22 +117,33 @@ class SimulationRun:
             "engine": engine,
             "runs": runs,
         }
-        first, elapsed = self.trajectory.start, self.trajectory.from_zero()
-        loop = _closed_loop(robot, elapsed, model or robot, gains)
-        start = start_state(robot, elapsed, initial_error)
+        start_time, elapsed_trajectory = self.trajectory.start, self.trajectory.from_zero()
+        loop = _closed_loop(robot, elapsed_trajectory, model or robot, gains)
+        start = start_state(robot, elapsed_trajectory, initial_error)
         drivetrain = loop.plant.drivetrain
-        readings = None if sensors is None else Readings(sensors, robot, drivetrain, elapsed.samples)
+        readings = (
+            None if sensors is None else Readings(sensors, robot, drivetrain, elapsed_trajectory.samples)
+        )
 
-        def passed(time: float) -> None:
-            self.progress(first + time)
+        def report_time(time: float) -> None:
+            self.progress(start_time + time)
 
         self.progress = progress
         computing = Computing(engine, tell, runs)
-        self._integrator, blocks = _integration(
-            robot, loop, elapsed, start, feedback, readings, tolerances, budget, passed, computing
+        self._integrator, blocks = _start_integration(
+            robot,
+            loop,
+            elapsed_trajectory,
+            start,
+            feedback,
+            readings,
+            tolerances,
+            budget,
+            report_time,
+            computing,
         )
         self._ending: Ending | None = None
-        self._blocks = histories(robot, loop, self._until_end(blocks), first, readings)
+        self._blocks = histories(robot, loop, self._keep_ending(blocks), start_time, readings)
         self._summary = Summary(robot, goal_tolerance, self.trajectory.times.span)
         frame = None if trajectory.wrench is None else trajectory.wrench.frame
         self._tools = ToolStiffness(robot, frame, stored=False) if robot.limited_tools else None
@@ -142,17 +153,17 @@ class SimulationRun:
         for block in self._blocks:
             self._summary.add(block)
             if self._tools is not None:
-                self._tools.add(self._at_tools(block))
+                self._tools.add(self._tool_variables(block))
             yield block
             del block
 
-    def _at_tools(self, block: History) -> Block:
+    def _tool_variables(self, block: History) -> Block:
         """Return the simulated variables that determine the stiffness of tools, and the wrench."""
         wrench = self.trajectory.at(block.time).wrench
         acting = {} if wrench is None else {WRENCH.key: wrench.wrench}
         return Block(time=block.time, q=block.q, stiffness=block.stiffness, flags=block.flags, **acting)
 
-    def _until_end(self, blocks: Iterable[StateBlock]) -> Iterator[StateBlock]:
+    def _keep_ending(self, blocks: Iterable[StateBlock]) -> Iterator[StateBlock]:
         for block in blocks:
             self._ending = block.ending
             yield block
@@ -167,7 +178,7 @@ class SimulationRun:
 
         If positions are measured, the same run with the full state is simulated for comparison.
         """
-        full = self._with_full_state() if self._feedback == "positions" else None
+        full = self._full_state_report() if self._feedback == "positions" else None
         joints = self._summary.joints()
         effort, ending = self._integrator.effort, self._ending
         tools = () if self._tools is None else self._tools.reports()
@@ -180,15 +191,17 @@ class SimulationRun:
             samples=self._summary.samples,
             duration=trajectory.duration,
             verdict=verdict,
-            ending=None if ending is None else ending.described(robot.joint_names, trajectory.start),
+            ending=None if ending is None else ending.as_sentence(robot.joint_names, trajectory.start),
             evaluations=effort.evaluations,
             budget=effort.budget,
-            methods=tuple(replace(each, start=trajectory.start + each.start) for each in effort.methods),
+            methods=tuple(
+                replace(method, start=trajectory.start + method.start) for method in effort.methods
+            ),
             warnings=(
                 *(*robot.warnings, *trajectory.warnings),
                 *strange_errors(robot, self._initial_error),
-                *_undetermined(robot, trajectory),
-                *([_AMPLIFIED] if self._exact and verdict == "off_target" else []),
+                *_undetermined_warnings(robot, trajectory),
+                *([_AMPLIFICATION_WARNING] if self._is_exact and verdict == "off_target" else []),
                 *(self._summary.unsettled_warnings(joints) if ending is None else []),
                 *(self._summary.stiffness_warnings() if ending is None else []),
                 *([f"the same run with the full state: {full.ending}"] if full and full.ending else []),
@@ -199,8 +212,8 @@ class SimulationRun:
             tools=tools,
         )
 
-    def _with_full_state(self) -> SimulationReport:
-        run = SimulationRun(self.robot, self.trajectory, **self._compared)
+    def _full_state_report(self) -> SimulationReport:
+        run = SimulationRun(self.robot, self.trajectory, **self._full_state_options)
         deque(run, maxlen=0)
         return run.report()
 
@@ -279,8 +292,8 @@ def check_feedback(feedback: Feedback, gains: Gains | None) -> None:
     Raises:
         InputError: the measurement is unknown, or positions are measured without feedback.
     """
-    if feedback not in (words := get_args(Feedback)):
-        raise InputError.one(f"unknown feedback {feedback!r}{did_you_mean(feedback, words)}")
+    if feedback not in (choices := get_args(Feedback)):
+        raise InputError.one(f"unknown feedback {feedback!r}{did_you_mean(feedback, choices)}")
     if gains is None and feedback == "positions":
         raise InputError.one(
             "positions as feedback need the controller feedback-linearization; feedforward uses no "
@@ -288,7 +301,7 @@ def check_feedback(feedback: Feedback, gains: Gains | None) -> None:
         )
 
 
-def _undetermined(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
+def _undetermined_warnings(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
     """Yield warnings about joints whose command a recorded motion leaves undetermined: unreliable runs."""
     if trajectory.estimates:
         run = Run(robot, trajectory)
@@ -296,7 +309,8 @@ def _undetermined(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
         for joint in run.findings().joints:
             if joint.uncertainty is not None:
                 yield from (
-                    f"{joint.name}: {undetermined_text(each)}" for each in joint.uncertainty.undetermined
+                    f"{joint.name}: {undetermined_text(quantity)}"
+                    for quantity in joint.uncertainty.undetermined
                 )
 
 
@@ -320,7 +334,7 @@ def _peak_torque(robot: Robot, trajectory: Trajectory) -> float:
     return float(np.nanmax(np.abs(compute_block(robot, motion).tau_motor)))
 
 
-def _integration(
+def _start_integration(
     robot: Robot,
     loop: ClosedLoop,
     trajectory: Trajectory,
@@ -333,22 +347,22 @@ def _integration(
     computing: Computing,
 ) -> tuple[Integrator, Iterator[StateBlock]]:
     """Return an integrator, and the blocks of its run, until torques or springs are undefined."""
-    last = loop.controller.ending
+    controller_end = loop.controller.ending
     times = trajectory.times.block(0, trajectory.samples)
-    if last is not None and last.time <= times[0]:
+    if controller_end is not None and controller_end.time <= times[0]:
         raise InputError.one(
             "the controller's model cannot execute the start of the trajectory; choose smaller model errors"
         )
-    vector = loop.packing.pack(*loop.plant.unpacked(start))
-    slides = sliding(loop)
-    if slides is not None:
-        vector = slides.start(float(times[0]), vector)
+    vector = loop.packing.pack(*loop.plant.unpack_state(start))
+    stick_slip = sliding(loop)
+    if stick_slip is not None:
+        vector = stick_slip.start(float(times[0]), vector)
     check_rounding(robot, loop, vector, float(times[0]), _peak_torque(robot, trajectory))
-    reached = times if last is None else times[times <= last.time]
-    budget = Budget(limit, reached)
-    ends = list(boundaries(loop, vector))
-    equations = RecordedEquations(loop, ends, budget, computing)
-    integrator = Integrator(equations, tolerances, progress, slides)
+    times_to_end = times if controller_end is None else times[times <= controller_end.time]
+    budget = Budget(limit, times_to_end)
+    run_boundaries = list(boundaries(loop, vector))
+    equations = RecordedEquations(loop, run_boundaries, budget, computing)
+    integrator = Integrator(equations, tolerances, progress, stick_slip)
     if feedback == "state":
-        return integrator, continuous(loop, integrator, reached, vector)
-    return integrator, integrate_sampled(loop, integrator, reached, vector, readings)
+        return integrator, integrate_continuous(loop, integrator, times_to_end, vector)
+    return integrator, integrate_sampled(loop, integrator, times_to_end, vector, readings)

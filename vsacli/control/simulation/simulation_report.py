@@ -30,7 +30,7 @@ from vsacli.dynamics.limits import Finding
 VERDICTS = ("ok", "over_limit", "off_target", "singular", "infeasible", INCOMPLETE, DIVERGED)
 """Verdicts from best to worst; the worst that applies wins."""
 
-_VERDICT_OF = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
+_VERDICT_FLAGS = {"over_limit": LIMITS, "singular": Flag.SINGULAR, "infeasible": Flag.INFEASIBLE | Flag.SLACK}
 
 
 def verdict_on(
@@ -41,13 +41,13 @@ def verdict_on(
     A flag at any sample implies its own verdict. A complete run with joints off target is "off_target". An
     early end without a flag has its own verdict.
     """
-    applies = {verdict for verdict, bits in _VERDICT_OF.items() if flags & bits}
-    applies |= {verdict for verdict in VERDICTS if any(tool.shows(verdict) for tool in tools)}
+    verdicts = {verdict for verdict, bits in _VERDICT_FLAGS.items() if flags & bits}
+    verdicts |= {verdict for verdict in VERDICTS if any(tool.shows(verdict) for tool in tools)}
     if ending is None and any(joint.off_course for joint in joints):
-        applies.add("off_target")
+        verdicts.add("off_target")
     if ending is not None and ending.flag is None:
-        applies.add(ending.verdict)
-    return next((verdict for verdict in reversed(VERDICTS) if verdict in applies), "ok")
+        verdicts.add(ending.verdict)
+    return next((verdict for verdict in reversed(VERDICTS) if verdict in verdicts), "ok")
 
 
 @dataclass(frozen=True)
@@ -131,10 +131,10 @@ class SimulationReport(Stored, TextReport):
 
     def as_text(self) -> ReportText:
         """Return the report in its parts, as people read it."""
-        found = [
+        findings = [
             *([] if self.ending is None else [self.ending]),
             *group_findings(
-                [*tracking_findings(self.joints, self.complete), *self._findings_at_tools()],
+                [*tracking_findings(self.joints, self.complete), *self._tool_findings()],
                 [*(joint.name for joint in self.joints), *(tool.name for tool in self.tools)],
             ),
             *warnings_and_notes(self.warnings, self.notes),
@@ -142,37 +142,41 @@ class SimulationReport(Stored, TextReport):
         lines = [
             *energy_lines([(joint.name, joint.type, joint.energy) for joint in self.joints]),
             *tool_stiffness_lines(self.tools),
-            *self._effort(),
+            *self._effort_line(),
         ]
         return ReportText(
-            headline(self.verdict, self._title()),
-            found,
+            headline(self.verdict, self._headline_text()),
+            findings,
             [tracking_rows(self.joints, self.with_full_state)],
             lines,
         )
 
-    def _title(self) -> str:
+    def _headline_text(self) -> str:
         """Return names, controller, the largest error, and how many joints fail which requirement."""
         parts = [f"{self.robot}, {self.trajectory}: {self.controller}, {self.duration:g} s"]
         if self.samples > 1 and (error := self.largest_error) is not None:
-            larger = any(each.q.peak > error.value for each in self.joints if each.unit == error.unit)
-            relative = " relative to its tolerance" if larger else ""
-            where = f"{error.joint}, t = {time_text(error.time)}"
-            parts.append(f"largest q error{relative} {error_text(error.value)} {error.unit} ({where})")
-        failing = {
+            has_larger = any(joint.q.peak > error.value for joint in self.joints if joint.unit == error.unit)
+            relative = " relative to its tolerance" if has_larger else ""
+            place_and_time = f"{error.joint}, t = {time_text(error.time)}"
+            parts.append(
+                f"largest q error{relative} {error_text(error.value)} {error.unit} ({place_and_time})"
+            )
+        failing_joints = {
             "off target": sum(self.complete and joint.off_course for joint in self.joints),
             "over a limit": sum(bool(joint.worst) for joint in self.joints),
         }
-        failures = [of_all_joints(failing, len(self.joints)), failing_joints_line((), self.tools)]
+        failures = [of_all_joints(failing_joints, len(self.joints)), failing_joints_line((), self.tools)]
         return "; ".join([*parts, *filter(None, [", ".join(filter(None, failures))])])
 
-    def _findings_at_tools(self) -> Iterator[tuple[int, Finding]]:
+    def _tool_findings(self) -> Iterator[tuple[int, Finding]]:
         for index, tool in enumerate(self.tools, len(self.joints)):
             yield from ((index, worst) for worst in tool.worst.values())
 
-    def _effort(self) -> Iterator[str]:
+    def _effort_line(self) -> Iterator[str]:
         if self.methods:
-            first, *others = self.methods
-            changes = "".join(f", from t = {time_text(method.start)} on {method.name}" for method in others)
+            first, *later_methods = self.methods
+            changes = "".join(
+                f", from t = {time_text(method.start)} on {method.name}" for method in later_methods
+            )
             effort = f"{self.evaluations} of at most {counted(self.budget, 'evaluation')}"
             yield f"integration: {first.name}{changes}; {effort}"

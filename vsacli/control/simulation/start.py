@@ -53,23 +53,23 @@ def start_state(robot: Robot, trajectory: Trajectory, error: InitialError) -> St
         InputError: the error has a wrong length, or the state is infeasible or singular.
     """
     motion = trajectory.at(np.array(trajectory.times.span[:1]))
-    offsets = {name: _per_joint(name, getattr(error, name), robot) for name in ("q", "stiffness")}
+    offsets = {name: _values_by_joint(name, getattr(error, name), robot) for name in ("q", "stiffness")}
     arrays = motion.of_joints
     shifted = {**arrays, **{name: arrays[name] + offset for name, offset in offsets.items()}}
     block = compute_block(robot, Motion.of(motion.time, shifted, motion.wrench))
-    failing, singular = (has_flag(block.flags[0], flags) for flags in (UNUSABLE, Flag.SINGULAR))
-    if failing.any():
+    unusable, singular = (has_flag(block.flags[0], flags) for flags in (UNUSABLE, Flag.SINGULAR))
+    if unusable.any():
         file = trajectory.sources[0].path if trajectory.sources and error.is_zero else ""
         advice = "" if error.is_zero else ", or choose smaller initial errors"
         raise InputError(
-            Problem(file, 0, _no_start(joint, block.of_joint(index), singular[index]) + advice)
+            Problem(file, 0, _unusable_start_text(joint, block.of_joint(index), singular[index]) + advice)
             for index, joint in enumerate(robot.joints)
-            if failing[index]
+            if unusable[index]
         )
     return State(q=block.q[0], dq=block.dq[0], theta=block.theta[0], dtheta=block.dtheta[0])
 
 
-def _no_start(joint: Joint, values: Mapping[str, FloatArray], singular: bool) -> str:
+def _unusable_start_text(joint: Joint, values: Mapping[str, FloatArray], singular: bool) -> str:
     """Return why a joint cannot start, from its values at the first sample, and what to change."""
     if singular:
         return f"{joint.name}: its springs are singular at the start; change the stiffness there"
@@ -89,11 +89,11 @@ ERRORS = {"q": "position", "stiffness": "stiffness"}
 """Words for the initial errors."""
 
 
-def _per_joint(name: str, values: npt.ArrayLike, robot: Robot) -> FloatArray:
+def _values_by_joint(name: str, values: npt.ArrayLike, robot: Robot) -> FloatArray:
     array, joints = np.asarray(values, dtype=np.float64), len(robot.joints)
     if array.shape not in ((), (1,), (joints,)):
-        several = f", or {joints} ({', '.join(robot.joint_names)})" if joints > 1 else ""
-        expected = f"expected 1 value{several}, found {array.size}"
+        array_form = f", or {joints} ({', '.join(robot.joint_names)})" if joints > 1 else ""
+        expected = f"expected 1 value{array_form}, found {array.size}"
         raise InputError.one(f"initial {ERRORS[name]} error: {expected}")
     if not np.isfinite(array).all():
         raise InputError.one(f"initial {ERRORS[name]} error: expected finite values")
@@ -102,8 +102,8 @@ def _per_joint(name: str, values: npt.ArrayLike, robot: Robot) -> FloatArray:
 
 def strange_errors(robot: Robot, error: InitialError) -> Iterator[str]:
     """Yield a warning for initial position errors of more than a turn: degrees, in all likelihood."""
-    offsets = _per_joint("q", error.q, robot)
+    offsets = _values_by_joint("q", error.q, robot)
     for offset in dict.fromkeys(offsets[[joint.is_revolute for joint in robot.joints]].tolist()):
         if (size := turns(offset)) > 1 + ROUNDED:
-            meant = f"{offset:g} deg ({math.radians(offset):.4g} rad)"
-            yield f"the initial position error of {offset:g} rad is {size:.2g} turns; did you mean {meant}?"
+            degrees = f"{offset:g} deg ({math.radians(offset):.4g} rad)"
+            yield f"the initial position error of {offset:g} rad is {size:.2g} turns; did you mean {degrees}?"

@@ -67,27 +67,34 @@ def step_samples(
         budget: budget of evaluations.
         reserve: evaluations for the interpolant of a step, which the step must leave over.
     """
-    done, ahead = 0, [event(solver.t, solver.y) for event in events]
+    sampled, distances_after = 0, [event(solver.t, solver.y) for event in events]
     while solver.status == "running":
         with np.errstate(all="ignore"):  # a trial step may leave the range of a law
-            if not _stepped(solver, budget, reserve):
-                return Stop(solver.t, solver.y, done, failed=True)
-            before, ahead = ahead, [event(solver.t, solver.y) for event in events]
-            inside, stop = None, Stop(solver.t, solver.y)
-            distances = zip(events, before, ahead, strict=True)
-            if crossed := [event for event, was, now in distances if was >= 0 >= now]:
-                inside = solver.dense_output()
-                stop = _first(crossed, inside, solver)
-            first, done = done, int(times.searchsorted(stop.time, "right"))
-            states = None if first == done else (inside or solver.dense_output())(times[first:done]).T
+            if not _take_step(solver, budget, reserve):
+                return Stop(solver.t, solver.y, sampled, failed=True)
+            distances_before, distances_after = (
+                distances_after,
+                [event(solver.t, solver.y) for event in events],
+            )
+            interpolant, stop = None, Stop(solver.t, solver.y)
+            distances = zip(events, distances_before, distances_after, strict=True)
+            if occurred := [event for event, before, after in distances if before >= 0 >= after]:
+                interpolant = solver.dense_output()
+                stop = _first_stop(occurred, interpolant, solver)
+            first_sample, sampled = sampled, int(times.searchsorted(stop.time, "right"))
+            states = (
+                None
+                if first_sample == sampled
+                else (interpolant or solver.dense_output())(times[first_sample:sampled]).T
+            )
         if states is not None:  # outside of errstate, which the receiver of the samples must not inherit
-            yield StateSamples(times[first:done], states)
+            yield StateSamples(times[first_sample:sampled], states)
         if stop.event is not None:
-            return stop._replace(reached=done)
-    return Stop(solver.t, solver.y, done)
+            return stop._replace(reached=sampled)
+    return Stop(solver.t, solver.y, sampled)
 
 
-def _stepped(solver: Any, budget: Budget, reserve: int) -> bool:
+def _take_step(solver: Any, budget: Budget, reserve: int) -> bool:
     """Take a step; return whether it succeeded within the budget."""
     budget.reserved = reserve
     try:
@@ -99,18 +106,18 @@ def _stepped(solver: Any, budget: Budget, reserve: int) -> bool:
     return bool(solver.status != "failed")
 
 
-def _first(crossed: Sequence[Event], inside: Any, solver: Any) -> Stop:
+def _first_stop(occurred: Sequence[Event], interpolant: Any, solver: Any) -> Stop:
     """Return the stop at the first of the events that occur within the last step of a solver."""
 
     def time_of(event: Event) -> float:
         return scipy.optimize.brentq(
-            lambda time: event(time, inside(time)),
+            lambda time: event(time, interpolant(time)),
             solver.t_old,
             solver.t,
             xtol=_ROOT_TOLERANCE,
             rtol=_ROOT_TOLERANCE,
         )
 
-    times = [time_of(event) for event in crossed]
+    times = [time_of(event) for event in occurred]
     first = times.index(min(times))
-    return Stop(times[first], inside(times[first]), event=crossed[first])
+    return Stop(times[first], interpolant(times[first]), event=occurred[first])

@@ -25,9 +25,9 @@ class Switch:
         """Return the sliding velocity, or the reserve of friction that holds the motor; zero at the event."""
         return float(self._sliding.distances(time, vector)[self._motor])
 
-    def passed(self, time: float, vector: FloatArray) -> FloatArray:
+    def state_after_switch(self, time: float, vector: FloatArray) -> FloatArray:
         """Return the state after the event."""
-        return self._sliding.switched(time, vector, self._motor)
+        return self._sliding.switch_motor(time, vector, self._motor)
 
 
 class StickSlip:
@@ -47,9 +47,9 @@ class StickSlip:
 
     def __init__(self, loop: ClosedLoop, laws: FrictionLaws) -> None:
         self._loop, self._laws = loop, laws
-        self._velocity = loop.packing.motor_velocities
+        self._velocity_indices = loop.packing.motor_velocities
         self.switches = [Switch(self, motor) for motor in np.flatnonzero(laws.sharp).tolist()]
-        self._known: tuple[float, FloatArray, FloatArray, FloatArray] | None = None
+        self._cached: tuple[float, FloatArray, FloatArray, FloatArray] | None = None
 
     @property
     def longest_step(self) -> float:
@@ -58,19 +58,19 @@ class StickSlip:
 
     def start(self, time: float, vector: FloatArray) -> FloatArray:
         """Initialize the directions in a state; return it with exactly zero velocity of motors at rest."""
-        direction = sign_of_motion(vector[self._velocity])
+        direction = sign_of_motion(vector[self._velocity_indices])
         self._loop.slip = np.where(self._laws.sharp, direction, np.nan)
-        self.settle(time, vector)
-        return self._stopped(vector, self._laws.sharp & (direction == 0))
+        self.release_motors(time, vector)
+        return self._with_zero_velocity(vector, self._laws.sharp & (direction == 0))
 
-    def switched(self, time: float, vector: FloatArray, motor: int) -> FloatArray:
+    def switch_motor(self, time: float, vector: FloatArray, motor: int) -> FloatArray:
         """Return the state after a motor stopped, or broke loose, with the new directions of friction."""
-        slip, chosen = self._slip, np.arange(len(self._slip)) == motor
+        slip, is_motor = self._slip, np.arange(len(self._slip)) == motor
         stops = slip[motor] != 0
         holding = self._friction(time, vector) - self._laws.offset
-        self._loop.slip = np.where(chosen, 0.0 if stops else np.sign(holding), slip)
-        state = self._stopped(vector, chosen) if stops else vector
-        self.settle(time, state)
+        self._loop.slip = np.where(is_motor, 0.0 if stops else np.sign(holding), slip)
+        state = self._with_zero_velocity(vector, is_motor) if stops else vector
+        self.release_motors(time, state)
         return state
 
     def distances(self, time: float, vector: FloatArray) -> FloatArray:
@@ -79,38 +79,38 @@ class StickSlip:
         The last result is kept, since all switches need it in the same state, one after the other.
         """
         slip = self._slip
-        if self._known is not None:
-            known_time, known_vector, known_slip, distances = self._known
-            if known_time == time and known_vector is vector and known_slip is slip:
+        if self._cached is not None:
+            cached_time, cached_vector, cached_slip, distances = self._cached
+            if cached_time == time and cached_vector is vector and cached_slip is slip:
                 return distances
         distances = self._distances(time, vector, slip)
-        self._known = time, vector, slip, distances
+        self._cached = time, vector, slip, distances
         return distances
 
     def _distances(self, time: float, vector: FloatArray, slip: FloatArray) -> FloatArray:
         friction = self._friction(time, vector) - self._laws.offset
-        left = np.fmin(self._laws.forward - friction, self._laws.backward + friction)
-        return np.where(slip == 0, left, slip * vector[self._velocity])
+        reserve = np.fmin(self._laws.forward - friction, self._laws.backward + friction)
+        return np.where(slip == 0, reserve, slip * vector[self._velocity_indices])
 
     @property
     def _slip(self) -> FloatArray:
         assert self._loop.slip is not None
         return self._loop.slip
 
-    def _stopped(self, vector: FloatArray, motors: BoolArray) -> FloatArray:
-        stopped = vector.copy()
-        stopped[self._velocity[motors]] = 0.0
-        return stopped
+    def _with_zero_velocity(self, vector: FloatArray, motors: BoolArray) -> FloatArray:
+        state = vector.copy()
+        state[self._velocity_indices[motors]] = 0.0
+        return state
 
-    def settle(self, time: float, vector: FloatArray) -> None:
+    def release_motors(self, time: float, vector: FloatArray) -> None:
         """Release held motors, one after the other, that friction cannot hold under the present torques."""
         while True:
-            beyond = self._laws.direction_beyond(self._friction(time, vector)) * (self._slip == 0)
-            if not beyond.any():
+            breakaway = self._laws.direction_beyond(self._friction(time, vector)) * (self._slip == 0)
+            if not breakaway.any():
                 return
-            motor = int(np.argmin(np.where(beyond != 0, self.distances(time, vector), np.inf)))
+            motor = int(np.argmin(np.where(breakaway != 0, self.distances(time, vector), np.inf)))
             slip = self._slip.copy()
-            slip[motor] = beyond[motor]
+            slip[motor] = breakaway[motor]
             self._loop.slip = slip
 
     def _friction(self, time: float, vector: FloatArray) -> FloatArray:

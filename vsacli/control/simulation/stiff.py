@@ -30,19 +30,19 @@ def difference_jacobian(function: Derivative, time: float, vector: FloatArray) -
     return np.where(np.isfinite(columns), columns, 0.0).T
 
 
-def rounding(matrix: FloatArray, vector: FloatArray) -> FloatArray:
+def rounding_effect(jacobian: FloatArray, vector: FloatArray) -> FloatArray:
     """Return the effect of a rounded state on a function, (values,), by its Jacobian, (values, entries)."""
-    return _EPSILON * (np.abs(matrix) @ np.maximum(np.abs(vector), 1.0))
+    return _EPSILON * (np.abs(jacobian) @ np.maximum(np.abs(vector), 1.0))
 
 
-def resolved_tolerances(matrix: FloatArray, vector: FloatArray, rtol: float) -> FloatArray:
+def resolved_tolerances(jacobian: FloatArray, vector: FloatArray, rtol: float) -> FloatArray:
     """Return the smallest absolute tolerances, (entries,), that rounding allows with an implicit method.
 
     Rounding makes the rates of the fastest mode uncertain, and this mode decays within 1/|lambda|. Newton's
     iteration in SciPy's `Radau` stops at a share of sqrt(rtol) of the tolerance, which must exceed rounding.
     """
-    fastest = float(np.abs(np.linalg.eigvals(matrix)).max(initial=1.0))
-    return rounding(matrix, vector) / (fastest * math.sqrt(rtol))
+    spectral_radius = float(np.abs(np.linalg.eigvals(jacobian)).max(initial=1.0))
+    return rounding_effect(jacobian, vector) / (spectral_radius * math.sqrt(rtol))
 
 
 LARGEST_SHARE = 1e-4
@@ -67,21 +67,21 @@ def check_rounding(robot: Robot, loop: ClosedLoop, start: FloatArray, time: floa
         InputError: torques follow the rounding; names the worst joint, and a fix.
     """
 
-    def of_springs(_time: float, vectors: FloatArray) -> FloatArray:
+    def spring_torques(_time: float, vectors: FloatArray) -> FloatArray:
         phase = loop.packing.unpack(vectors)
         return drivetrain.torques(phase.q, phase.theta).tau_transmission
 
     drivetrain, bound = loop.plant.drivetrain, max(LARGEST_SHARE * peak, SMALLEST_TORQUE)
     for torques, joints, fault, advice in (
         (
-            of_springs,
+            spring_torques,
             drivetrain.spring_joint,
             "springs are too stiff",
             "soften them or make the joint rigid",
         ),
         (loop.demand, drivetrain.joint, "poles are too fast", "choose slower ones"),
     ):
-        changes = rounding(difference_jacobian(torques, time, start), start)
+        changes = rounding_effect(difference_jacobian(torques, time, start), start)
         if changes.max(initial=0.0) > bound:
             worst = int(np.argmax(changes))
             joint = robot.joints[joints[worst]]

@@ -48,9 +48,9 @@ class Table:
 
     def __call__(self, time: Any) -> FloatArray:
         """Return the columns at a time, (columns,), or at times, (samples, columns)."""
-        return time.columns_of(self) if isinstance(time, Instant) else self._at(time)
+        return time.columns_of(self) if isinstance(time, Instant) else self._columns_at(time)
 
-    def _at(self, time: float | FloatArray) -> FloatArray:
+    def _columns_at(self, time: float | FloatArray) -> FloatArray:
         if np.ndim(time):
             cells = np.searchsorted(self.ends[1:-1], time, "right")
             elapsed = (time - self.ends[cells])[:, None]
@@ -74,7 +74,7 @@ class ConstantTable(Table):
         """Set the values from now on."""
         self.coefficients[0, 0] = values
 
-    def _at(self, _time: float | FloatArray) -> FloatArray:
+    def _columns_at(self, _time: float | FloatArray) -> FloatArray:
         values: FloatArray = self.coefficients[0, 0]
         return values
 
@@ -141,22 +141,24 @@ def tabulate(
     """
     ends = np.union1d(breakpoints, np.linspace(breakpoints[0], breakpoints[-1], FIRST_CELLS + 1))
     starts, lengths = ends[:-1], np.diff(ends)
-    before = np.full(len(starts), np.inf)
+    previous_error = np.full(len(starts), np.inf)
     peak: FloatArray | None = None
     cells: list[tuple[FloatArray, FloatArray]] = []
     for halving in range(HALVINGS + 1):
         nodes, probes = _sample_cells(function, starts, lengths)
         peak = np.fmax.reduce(np.abs(nodes), axis=(0, 1)) if peak is None else peak
         error = _polynomial_error(nodes, probes, peak)
-        halve = (error > TOLERANCE) & ((error < before / GAIN) | np.isinf(error)) & (halving < HALVINGS)
-        cells.append((starts[~halve], _power_coefficients(nodes[~halve], lengths[~halve])))
-        if not halve.any():
+        is_halved = (
+            (error > TOLERANCE) & ((error < previous_error / GAIN) | np.isinf(error)) & (halving < HALVINGS)
+        )
+        cells.append((starts[~is_halved], _power_coefficients(nodes[~is_halved], lengths[~is_halved])))
+        if not is_halved.any():
             break
-        starts, lengths = _halved(starts[halve], lengths[halve])
-        before = np.tile(error[halve], 2)
-    first, coefficients = (np.concatenate(parts) for parts in zip(*cells, strict=True))
-    order = np.argsort(first)
-    return np.append(first[order], ends[-1]), coefficients[order]
+        starts, lengths = _halve_cells(starts[is_halved], lengths[is_halved])
+        previous_error = np.tile(error[is_halved], 2)
+    cell_starts, coefficients = (np.concatenate(parts) for parts in zip(*cells, strict=True))
+    order = np.argsort(cell_starts)
+    return np.append(cell_starts[order], ends[-1]), coefficients[order]
 
 
 def _sample_cells(
@@ -174,11 +176,11 @@ def _polynomial_error(nodes: FloatArray, probes: FloatArray, peak: FloatArray) -
     It is infinite if a column is NaN in only a part of the cell; a column that is NaN throughout is ignored.
     """
     values = np.concatenate((nodes, probes), axis=1)
-    missing = np.isnan(values)
-    ends_here = np.any(np.any(missing, axis=1) & ~np.all(missing, axis=1), axis=1)
+    is_nan = np.isnan(values)
+    ends_in_cell = np.any(np.any(is_nan, axis=1) & ~np.all(is_nan, axis=1), axis=1)
     error = np.abs(np.einsum("pn,cnk->cpk", _TO_PROBES, nodes) - probes)
-    share = np.divide(error, peak, out=np.zeros_like(error), where=peak > 0)
-    return np.where(ends_here, np.inf, np.nan_to_num(share).max(axis=(1, 2)))
+    relative_error = np.divide(error, peak, out=np.zeros_like(error), where=peak > 0)
+    return np.where(ends_in_cell, np.inf, np.nan_to_num(relative_error).max(axis=(1, 2)))
 
 
 def _power_coefficients(nodes: FloatArray, lengths: FloatArray) -> FloatArray:
@@ -187,7 +189,7 @@ def _power_coefficients(nodes: FloatArray, lengths: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("pn,cnk->cpk", _TO_POWERS, nodes) * scale, dtype=np.float64)
 
 
-def _halved(starts: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _halve_cells(starts: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.concatenate((starts, starts + lengths / 2)), np.tile(lengths / 2, 2)
 
 
@@ -203,10 +205,12 @@ class TabulatedReference:
     def __init__(self, trajectory: Trajectory) -> None:
         self.frame = None if trajectory.wrench is None else trajectory.wrench.frame
         signals = (POSITION, *(COMMANDED[key] for key in trajectory.commanded))
-        self._commands = _tabulated(trajectory, [name for signal in signals for name in signal.names])
-        self._wrench = _tabulated(trajectory, WRENCH_NAMES) if self.frame else None
-        damped = DAMPING.key in trajectory.commanded
-        self._damping = _tabulated(trajectory, DAMPING.names) if damped else None
+        self._commands = _tabulate_variables(
+            trajectory, [name for signal in signals for name in signal.names]
+        )
+        self._wrench = _tabulate_variables(trajectory, WRENCH_NAMES) if self.frame else None
+        has_damping = DAMPING.key in trajectory.commanded
+        self._damping = _tabulate_variables(trajectory, DAMPING.names) if has_damping else None
 
     def __call__(self, time: float | FloatArray) -> Motion:
         """Return motion, commanded signals and wrench."""
@@ -221,7 +225,7 @@ class TabulatedReference:
         return None if self._wrench is None else Wrench(**self._wrench(time), frame=self.frame or "")
 
 
-def _tabulated(
+def _tabulate_variables(
     trajectory: Trajectory, names: Sequence[str]
 ) -> Callable[[float | FloatArray], dict[str, FloatArray]]:
     """Return a function of time that gives variables of the motion by name."""
@@ -236,6 +240,8 @@ def _tabulated(
 
     def arrays(time: float | FloatArray) -> dict[str, FloatArray]:
         values = table(time)
-        return {name: values[..., part] for name, part in zip(names, parts, strict=True)}
+        return {
+            name: values[..., columns_of_name] for name, columns_of_name in zip(names, parts, strict=True)
+        }
 
     return arrays

@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from vsacli.actuators.actuator import Actuator
-from vsacli.actuators.reach import OfJoint, margin
+from vsacli.actuators.reach import VariablesOfJoint, margin
 from vsacli.actuators.transmission import Command
 from vsacli.analysis.batch import Batch
 from vsacli.analysis.joint_report import JointReport
@@ -173,11 +173,11 @@ class Acceptance:
         """Return a mask of the samples that exceed a limit of position or velocity, (samples,)."""
         return np.asarray(self._limit_flags(joint, _path(load), load.instants) != 0)
 
-    def _driven(self, joint: Joint, load: Load) -> OfJoint:
+    def _driven(self, joint: Joint, load: Load) -> VariablesOfJoint:
         """Return all variables of one joint, by name."""
         return drive(joint, load.command, self.min_margin).by_name()
 
-    def _refused(self, joint: Joint, values: OfJoint, instants: Instants) -> BoolArray:
+    def _refused(self, joint: Joint, values: VariablesOfJoint, instants: Instants) -> BoolArray:
         short = margin(values["stiffness"], values["stiffness_min"], values["stiffness_max"])
         flags = values["flags"]
         refused: BoolArray = (short < self.min_margin) | has_flag(flags, Flag.INFEASIBLE)
@@ -186,7 +186,7 @@ class Acceptance:
             flags = self.recorded.flags(self.robot, joint, values, instants)
         return refused | has_flag(flags, LIMITS)
 
-    def _near_limits(self, joint: Joint, values: OfJoint) -> BoolArray:
+    def _near_limits(self, joint: Joint, values: VariablesOfJoint) -> BoolArray:
         """Return a mask of the samples closer to a limit than the reserve, (samples,)."""
         near = np.zeros(len(values["flags"]), dtype=np.bool_)
         for check in limit_checks(joint) if self.reserve else ():
@@ -194,7 +194,7 @@ class Acceptance:
                 near |= check.clearance(values) < self.reserve
         return near
 
-    def _short_of_margin(self, joint: Joint, load: Load, values: OfJoint) -> Finding | None:
+    def _short_of_margin(self, joint: Joint, load: Load, values: VariablesOfJoint) -> Finding | None:
         """Return the sample that is furthest from the required margin, if it is short of it."""
         asked = load.command.commanded["stiffness"]
         lower, upper = values["stiffness_min"], values["stiffness_max"]
@@ -219,7 +219,7 @@ class Acceptance:
         )
 
     def _beyond_limit(
-        self, joint: Joint, values: OfJoint, time: FloatArray, instants: Instants
+        self, joint: Joint, values: VariablesOfJoint, time: FloatArray, instants: Instants
     ) -> Finding | None:
         """Return the worst violation of the first limit that the given variables exceed, if there is one."""
         flags = self._limit_flags(joint, values, instants)
@@ -227,7 +227,7 @@ class Acceptance:
         worst = (worst_excess(joint, check, values, time, has_flag(flags, check.flag)) for check in checks)
         return next(filter(None, worst), None)
 
-    def _limit_flags(self, joint: Joint, values: OfJoint, instants: Instants) -> FlagArray:
+    def _limit_flags(self, joint: Joint, values: VariablesOfJoint, instants: Instants) -> FlagArray:
         """Return the flags of the limits that the given variables exceed, (samples,)."""
         flags = limit_flags(joint, values, np.zeros(len(instants.time), dtype=FLAG_TYPE))
         if self.recorded is None:
@@ -235,7 +235,7 @@ class Acceptance:
         return self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
 
 
-def _path(load: Load) -> OfJoint:
+def _path(load: Load) -> VariablesOfJoint:
     """Return the variables of a load on which neither stiffness nor branch has an effect."""
     return {"q": load.command.q, "dq": load.command.dq}
 

@@ -21,7 +21,7 @@ from vsacli.base.units import ENERGY, TORQUE, Quantity
 from vsacli.base.variables import VARIABLES
 from vsacli.compute.duals import Dual
 from vsacli.dynamics.drive import drive
-from vsacli.dynamics.losses import trapezoidal
+from vsacli.dynamics.losses import trapezoidal_weights
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import with_copied_actuator
@@ -136,7 +136,7 @@ class Criterion:
 
     def weights(self, time: FloatArray) -> FloatArray:
         """Return the weights of each integrand at each instant, (integrands, instants)."""
-        return trapezoidal(time)[None]
+        return trapezoidal_weights(time)[None]
 
     def bound_count(self, joint: Joint) -> int:  # noqa: ARG002
         """Return the number of `bounds`."""
@@ -201,7 +201,7 @@ class Torque(Criterion):
 
     def weights(self, time: FloatArray) -> FloatArray:
         """Return the weights of a mean over time."""
-        return np.asarray(trapezoidal(time)[None] / (time[-1] - time[0]))
+        return np.asarray(trapezoidal_weights(time)[None] / (time[-1] - time[0]))
 
     def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the rms torque, N m (N)."""
@@ -241,7 +241,7 @@ class CopperLoss(Criterion):
     def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the heat, J."""
         (power,) = self.integrands(joint, driven, None, UNSCALED)
-        return float(trapezoidal(time) @ power)
+        return float(trapezoidal_weights(time) @ power)
 
     def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the heat in the report of the run, J."""
@@ -273,7 +273,7 @@ class Energy(Criterion):
         """Return the weights of an integral over time, and of the value at the start."""
         loaded = np.zeros_like(time)
         loaded[0] = 0.0 if self.repeating else 1.0
-        return np.stack([trapezoidal(time), loaded])
+        return np.stack([trapezoidal_weights(time), loaded])
 
     def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the energy, J."""
@@ -288,7 +288,7 @@ class Energy(Criterion):
     def size(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the absolute work of the motors, since their positive work may be zero."""
         passed = sum(map(np.abs, _motor_rows(joint, driven.motor_power)))
-        return float(trapezoidal(time) @ passed) or 1.0
+        return float(trapezoidal_weights(time) @ passed) or 1.0
 
 
 class Peak(Criterion):

@@ -17,9 +17,9 @@ from vsacli.base.arrays import FloatArray, IndexArray
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.base.signals import STIFFNESS
 from vsacli.compute.duals import Dual
-from vsacli.dynamics.drive import driven_by
+from vsacli.dynamics.drive import drive_without_limits
 from vsacli.dynamics.limits import limit_checks
-from vsacli.dynamics.losses import trapezoidal
+from vsacli.dynamics.losses import trapezoidal_weights
 from vsacli.robot.joint import Joint
 from vsacli.studies.search.acceptance import Range
 from vsacli.studies.search.criteria import (
@@ -101,7 +101,7 @@ class FixedMotion:
         if isinstance(rows[0], Dual):
             joint = made_to_carry(joint, STIFFNESS.orders, moving_corridor=False)
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
-            return driven_by(joint, load._replace(commanded=commanded), MIN_MARGIN)
+            return drive_without_limits(joint, load._replace(commanded=commanded), MIN_MARGIN)
 
     def costs_of_constants(self, constants: FloatArray, instants: IndexArray) -> FloatArray:
         """Return the cost of each constant, (constants,); infinite if a motor exceeds a limit."""
@@ -224,7 +224,7 @@ def nearest_profile(
         instants=np.arange(len(time)),
         basis=basis[None],
         unknowns=np.arange(basis.shape[1]),
-        weights=trapezoidal(time)[None] / (time[-1] - time[0]),
+        weights=trapezoidal_weights(time)[None] / (time[-1] - time[0]),
         there=np.isfinite(np.stack(within)),
         scales=np.array([size]),
     )

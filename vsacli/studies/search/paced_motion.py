@@ -15,7 +15,7 @@ from vsacli.actuators.transmission import Command, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray, by_joint
 from vsacli.base.signals import COMMANDED, POSITION, STIFFNESS, Signal
 from vsacli.compute.duals import Dual, value_of
-from vsacli.dynamics.drive import driven_by
+from vsacli.dynamics.drive import drive_without_limits
 from vsacli.dynamics.limits import limit_checks
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import with_copied_actuator
@@ -223,7 +223,7 @@ class PacedJoint:
                 asked = dict(zip(STIFFNESS.names, rates, strict=True))
                 command = command._replace(commanded={**command.commanded, **asked})
             joint = self._carrying if isinstance(pace[0], Dual) else self._joint
-            driven = driven_by(joint, command, self._min_margin)
+            driven = drive_without_limits(joint, command, self._min_margin)
             excess = limit_bounds(self._checks, driven.by_name(), self._clearance)
             bounds = [*self._corridor(driven), *excess]
             costed = (self._joint, driven, level[0] if len(level) else None, self.scale)

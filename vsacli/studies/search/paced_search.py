@@ -14,7 +14,7 @@ import numpy as np
 
 from vsacli.base.arrays import FloatArray, IndexArray, evenly
 from vsacli.base.signals import STIFFNESS
-from vsacli.dynamics.losses import trapezoidal
+from vsacli.dynamics.losses import trapezoidal_weights
 from vsacli.studies.search.acceptance import ImpossibleError
 from vsacli.studies.search.criteria import rough_minima, smoothed_minimum
 from vsacli.studies.search.interior_point import FIRST_GAP, WARM_GAP, Minimum
@@ -206,7 +206,7 @@ class PacedSearch(ABC):
         s = self._s[instants]
         pace = spaces.rows(None, s, PACE_ORDERS)
         of_pace = Pace(self._motion.resting, self._scale)
-        groups = [of_rows(of_pace, instants, pace.first(), trapezoidal(s)[None] * self.timed, 1)]
+        groups = [of_rows(of_pace, instants, pace.first(), trapezoidal_weights(s)[None] * self.timed, 1)]
         for index, joint in enumerate(self._joints):
             rows = pace
             if index in spaces.stiffness:
@@ -230,7 +230,7 @@ class PacedSearch(ABC):
     def _bounding(self, spaces: PacedSpaces, unknowns: FloatArray) -> dict[str, dict[str, float]]:
         """Return the share of the path on which each bound is active, by joint and name of the bound."""
         _, *groups = self._groups(spaces, np.arange(len(self._s)))
-        shares_of_path = trapezoidal(self._s) / self._span[1]
+        shares_of_path = trapezoidal_weights(self._s) / self._span[1]
         found: dict[str, dict[str, float]] = {}
         for joint, group in zip(self._joints, groups, strict=True):
             along = (group.bounds(group.rows(unknowns)) > -ACTIVE) @ shares_of_path

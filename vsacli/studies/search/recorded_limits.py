@@ -8,13 +8,13 @@ from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
-from vsacli.actuators.reach import OfJoint
+from vsacli.actuators.reach import VariablesOfJoint
 from vsacli.base.arrays import FLAG_TYPE, AnyArray, FlagArray, FloatArray
 from vsacli.base.flags import LIMITS
 from vsacli.base.signals import STIFFNESS, Signal
 from vsacli.base.variables import deviation
-from vsacli.dynamics.limits import limit_flags, open_steps
-from vsacli.dynamics.uncertainty import Deviations, deviations_of_joint, probed_times, times_at_once
+from vsacli.dynamics.limits import limit_flags, undecided_samples
+from vsacli.dynamics.uncertainty import Deviations, deviations_of_joint, probe_times, times_per_block
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.loads import Instants
@@ -46,7 +46,7 @@ class RecordedLimits:
         self,
         robot: Robot,
         joint: Joint,
-        values: OfJoint,
+        values: VariablesOfJoint,
         instants: Instants,
     ) -> FlagArray:
         """Return the flags of one joint, (samples,), with only the limits that are certainly exceeded.
@@ -60,7 +60,7 @@ class RecordedLimits:
         flags: FlagArray = np.array(values["flags"])
         if not self.estimates:
             return flags
-        steps = np.flatnonzero(open_steps(joint, values))
+        steps = np.flatnonzero(undecided_samples(joint, values))
         if steps.size:
             rows = {name: np.asarray(array)[..., steps] for name, array in values.items()}
             uncertain = self._deviations(robot, joint, rows.get(STIFFNESS.key), instants.at(steps))
@@ -75,7 +75,7 @@ class RecordedLimits:
 
     @cached_property
     def _probed(self) -> FloatArray:
-        return probed_times(self.trajectory)
+        return probe_times(self.trajectory)
 
     @cached_property
     def _known(self) -> Callable[[Robot, int, Joint, bytes], Mapping[str, AnyArray]]:
@@ -126,7 +126,7 @@ def _known_at(
     """
     joints = (*robot.joints[:index], joint, *robot.joints[index + 1 :])
     changed, rows = replace(robot, joints=joints), np.frombuffer(probes).reshape(3, -1)
-    several = times_at_once(robot, limits.estimates)
+    several = times_per_block(robot, limits.estimates)
     parts = [
         _probe(limits, changed, index, *rows[:, start : start + several])
         for start in range(0, rows.shape[1], several)

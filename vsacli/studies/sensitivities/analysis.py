@@ -15,7 +15,7 @@ from vsacli.analysis.tool_report import unjudged_tools_text
 from vsacli.base.arrays import FLAG_TYPE, FloatArray
 from vsacli.base.flags import LIMITS, Flag, has_flag
 from vsacli.base.units import TORQUE
-from vsacli.dynamics.losses import trapezoidal
+from vsacli.dynamics.losses import trapezoidal_weights
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter
 from vsacli.studies.sensitivities.band import Band, share_of_peak
@@ -71,7 +71,7 @@ class Effects:
         """
         shape = (len(steps), joints)
         self._steps = steps
-        self._weights = trapezoidal(times)
+        self._weights = trapezoidal_weights(times)
         self._done = 0
         self.peak = np.zeros(joints)
         self.largest, self.time, self.spent = np.zeros((3, *shape))

@@ -21,7 +21,7 @@ from vsacli.actuators.transmission import Command
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.base.flags import MIN_MARGIN
 from vsacli.compute.duals import Dual, seeds, tangent_of, value_of
-from vsacli.dynamics.drive import driven_by
+from vsacli.dynamics.drive import drive_without_limits
 from vsacli.dynamics.elastic_torques import TORQUES
 from vsacli.robot.model import Robot
 from vsacli.robot.parameters import Parameter, seeded, with_copied_actuator
@@ -191,7 +191,7 @@ def drive_derivatives(
     implicit = ImplicitSolution(robot.joints[index].actuator, carrying.actuator, directions)
     object.__setattr__(carrying.actuator, "solve", implicit.solve)  # a search would lose the derivatives
     with np.errstate(invalid="ignore", divide="ignore"):
-        driven = driven_by(carrying, command._replace(**torques), MIN_MARGIN)
+        driven = drive_without_limits(carrying, command._replace(**torques), MIN_MARGIN)
         gap = margin(driven.stiffness, driven.stiffness_min, driven.stiffness_max)
     found = {name: getattr(driven, name) for name in (*OF_MOTORS, SPEED)} | {MARGIN: gap}
     tangents = {

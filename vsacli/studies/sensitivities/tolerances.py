@@ -21,7 +21,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.flags import Flag, has_flag
 from vsacli.base.json_records import Published
 from vsacli.base.variables import Block
-from vsacli.compute.engine import choose
+from vsacli.compute.engine import choose_engine
 from vsacli.documents.expression import ExpressionError
 from vsacli.documents.fields import LARGEST
 from vsacli.documents.number import PER_CENT, evaluate
@@ -276,7 +276,7 @@ def _torques_of_robots(
             torques[members[0]] = _run_torques(variants.robots[0], trajectory)
             continue
         dynamics = RunDynamics(variants, [trajectory] * len(members))
-        dynamics.engine = choose("numpy", dynamics.kernel, kernel_samples).engine
+        dynamics.engine = choose_engine("numpy", dynamics.kernel, kernel_samples).engine
         block = dynamics.compute(dynamics.motion(0, trajectory.samples))
         for index, part in zip(members, block.divided(len(members)), strict=True):
             torques[index] = part.tau_motor, _failed_joints(part)

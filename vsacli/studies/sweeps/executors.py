@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeAlias
 from vsacli.base.errors import InputError
 from vsacli.base.interrupts import leave_interrupts_to_others, starting_worker
 from vsacli.base.version import __version__
-from vsacli.compute.engine import processors
+from vsacli.compute.engine import processor_count
 from vsacli.studies.sweeps.rows import Answer, Computer, Job, Row, answer, lost
 from vsacli.studies.sweeps.study import Study
 
@@ -75,7 +75,7 @@ def executor(
     short = dask is None and study.file.optimize is None
     fewest = BATCHED_RUNS_A_PROCESS if study.runs_of_batch > 1 else SINGLE_RUNS_A_PROCESS
     paying = 1 + runs // fewest if short else runs
-    count = min(processors(), paying) if processes is None else min(processes, runs)
+    count = min(processor_count(), paying) if processes is None else min(processes, runs)
     if dask is not None:
         with Cluster(study, dask, count, tell) as cluster:
             yield cluster.rows

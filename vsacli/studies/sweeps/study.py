@@ -22,7 +22,7 @@ from vsacli.base.errors import InputError
 from vsacli.base.texts import MOST_LETTERS
 from vsacli.base.variables import VARIABLES
 from vsacli.base.version import __version__
-from vsacli.compute.engine import settle
+from vsacli.compute.engine import settle_engine
 from vsacli.compute.engine.choice import check_engine
 from vsacli.documents.reading import Changes, read_document
 from vsacli.documents.source import Problems, Source
@@ -178,7 +178,7 @@ class Study:
         return dimension.numeric and bool(leads) and paths.issuperset(leads)
 
     def with_engine(self, name: str) -> Study:
-        """Return the study with the engine of a name, see `settle`.
+        """Return the study with the engine of a name, see `settle_engine`.
 
         Raises:
             InputError: the engine is unknown, or its C compiler is missing.
@@ -187,7 +187,7 @@ class Study:
         if name == "numpy":
             return self
         kernel = Variants((self.robot,), self.robot, self.varied).kernel(InverseDynamics(self.robot))
-        settled = settle(name, kernel, self.samples_of_kernel if name == "auto" else 0)
+        settled = settle_engine(name, kernel, self.samples_of_kernel if name == "auto" else 0)
         return replace(self, engine=settled.name, compiler=settled.compiler)
 
     @cached_property

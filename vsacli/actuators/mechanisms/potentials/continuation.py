@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution
-from vsacli.actuators.mechanisms.potentials.potential_energy import ROWS, PotentialEnergy
+from vsacli.actuators.mechanisms.potentials.potential_energy import STIFFNESS_DERIVATIVES, PotentialEnergy
 from vsacli.base.arrays import BoolArray, FloatArray
 from vsacli.compute.control_flow import Values, repeat
 from vsacli.compute.rounding import OfRounding
@@ -32,7 +32,7 @@ LEAST_COSINE = 0.95
 LEAST_SHARE = 0.25
 """Smallest ratio of stiffness, and of the sine, after and before a step, so that a step passes no zero."""
 
-SHORT = 1e-3
+SHORT_STEP = 1e-3
 """Step, as a share of the ranges, below which the change of stiffness is not checked. The steps from the
 start to another torque have no length along the level curve."""
 
@@ -93,11 +93,11 @@ class LevelPoint(NamedTuple):
 
     def newton_step(self, tau_e: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the Newton step to a torque and a stiffness, as a share of the ranges."""
-        missing = tau_e - self.tau_e, stiffness - self.stiffness
+        errors = tau_e - self.tau_e, stiffness - self.stiffness
         determinant = self.torque_1 * self.stiffness_2 - self.torque_2 * self.stiffness_1
         return (
-            (self.stiffness_2 * missing[0] - self.torque_2 * missing[1]) / determinant,
-            (self.torque_1 * missing[1] - self.stiffness_1 * missing[0]) / determinant,
+            (self.stiffness_2 * errors[0] - self.torque_2 * errors[1]) / determinant,
+            (self.torque_1 * errors[1] - self.stiffness_1 * errors[0]) / determinant,
         )
 
     def where(self, mask: BoolArray, other: LevelPoint) -> LevelPoint:
@@ -128,17 +128,17 @@ class LevelCurves:
 
     def point_at(self, phi: FloatArray, s: FloatArray, q: FloatArray) -> LevelPoint:
         """Return the point at a deflection, a position of motor 2 and one of the joint."""
-        u = self._potential.derivatives((phi, s, q), ROWS)
-        rows, (by_phi, by_s) = u.matrix, self._width
+        derivatives = self._potential.derivatives((phi, s, q), STIFFNESS_DERIVATIVES)
+        matrix, (phi_width, s_width) = derivatives.matrix, self._width
         return LevelPoint(
             phi,
             s,
-            -u(0),
-            u(0, 0),
-            rows.torque_1 * by_phi,
-            rows.torque_2 * by_s,
-            rows.stiffness_1 * by_phi,
-            rows.stiffness_2 * by_s,
+            -derivatives(0),
+            derivatives(0, 0),
+            matrix.torque_1 * phi_width,
+            matrix.torque_2 * s_width,
+            matrix.stiffness_1 * phi_width,
+            matrix.stiffness_2 * s_width,
         )
 
     def move(self, point: LevelPoint, step: tuple[FloatArray, FloatArray], q: FloatArray) -> LevelPoint:
@@ -148,11 +148,11 @@ class LevelCurves:
     def project_onto(self, point: LevelPoint, tau_e: FloatArray) -> LevelPoint:
         """Return the nearest point on the level curve of a torque, with its stiffness, to first order."""
         share = (tau_e - point.tau_e) / (point.steepness * point.steepness)
-        by_torque = point.stiffness_1 * point.torque_1 + point.stiffness_2 * point.torque_2
+        stiffness_change = point.stiffness_1 * point.torque_1 + point.stiffness_2 * point.torque_2
         return point._replace(
             phi=point.phi + self._width[0] * point.torque_1 * share,
             s=point.s + self._width[1] * point.torque_2 * share,
-            stiffness=point.stiffness + by_torque * share,
+            stiffness=point.stiffness + stiffness_change * share,
         )
 
     def distance_to_range_end(self, point: LevelPoint) -> FloatArray:
@@ -166,8 +166,8 @@ class LevelCurves:
         """Return a measure of the distance from all ends of the piece, zero at each of them."""
         room: FloatArray = np.abs(point.sine) * point.stiffness
         for value, low, width in zip(point[:2], self._low, self._width, strict=True):
-            part = (value - low) / width
-            room = room * part * (1 - part)
+            share_of_range = (value - low) / width
+            room = room * share_of_range * (1 - share_of_range)
         return room
 
     def step(
@@ -182,23 +182,33 @@ class LevelCurves:
             q: Position of the joint.
             dq: Distance of q from the joint position at `point`.
         """
-        first, second = point.along
-        by_q = point.torque_1 / self._width[0] - point.stiffness  # of the torque, at constant phi and theta_2
-        onto = (tau_e - point.tau_e - by_q * dq) / (point.steepness * point.steepness)
-        step = h * first + onto * point.torque_1, h * second + onto * point.torque_2
+        along_phi, along_s = point.along
+        torque_slope_q = (
+            point.torque_1 / self._width[0] - point.stiffness
+        )  # of the torque, at constant phi and theta_2
+        normal_step = (tau_e - point.tau_e - torque_slope_q * dq) / (point.steepness * point.steepness)
+        step = h * along_phi + normal_step * point.torque_1, h * along_s + normal_step * point.torque_2
         predicted = self.move(point, step, q)
-        onto = (tau_e - predicted.tau_e) / (predicted.steepness * predicted.steepness)
-        correction = onto * predicted.torque_1, onto * predicted.torque_2
+        normal_step = (tau_e - predicted.tau_e) / (predicted.steepness * predicted.steepness)
+        correction = normal_step * predicted.torque_1, normal_step * predicted.torque_2
         reached = self.move(point, (step[0] + correction[0], step[1] + correction[1]), q)
-        size, left = vector_length(*correction), np.abs(tau_e - reached.tau_e) / reached.steepness
-        explained = h * (point.slope + reached.slope) / 2
-        change = self.project_onto(reached, tau_e).stiffness - self.project_onto(point, tau_e).stiffness
-        turned = first * reached.along[0] + second * reached.along[1]
+        correction_length, remaining_error = (
+            vector_length(*correction),
+            np.abs(tau_e - reached.tau_e) / reached.steepness,
+        )
+        expected_change = h * (point.slope + reached.slope) / 2
+        stiffness_change = (
+            self.project_onto(reached, tau_e).stiffness - self.project_onto(point, tau_e).stiffness
+        )
+        cosine = along_phi * reached.along[0] + along_s * reached.along[1]
         stays = (
-            (vector_length(step[0], step[1]) + size <= 2 * MAX_STEP)
-            & (left <= np.minimum(CONTRACTION * size + LEAST_STEP, LEVEL_ERROR))
-            & (turned >= LEAST_COSINE)
-            & ((np.abs(h) < SHORT) | (np.abs(change - explained) <= MOST_UNEXPLAINED * np.abs(explained)))
+            (vector_length(step[0], step[1]) + correction_length <= 2 * MAX_STEP)
+            & (remaining_error <= np.minimum(CONTRACTION * correction_length + LEAST_STEP, LEVEL_ERROR))
+            & (cosine >= LEAST_COSINE)
+            & (
+                (np.abs(h) < SHORT_STEP)
+                | (np.abs(stiffness_change - expected_change) <= MOST_UNEXPLAINED * np.abs(expected_change))
+            )
             & (reached.stiffness >= LEAST_SHARE * point.stiffness)
             & (reached.sine / point.sine >= LEAST_SHARE)
         )
@@ -240,7 +250,7 @@ class ContinuedBranch:
 
     def __init__(self, curves: LevelCurves, phi: float, theta_2: float) -> None:
         self._curves = curves
-        self._last: tuple[tuple[FloatArray, FloatArray], StiffnessPiece] | None = None
+        self._cached_piece: tuple[tuple[FloatArray, FloatArray], StiffnessPiece] | None = None
         with np.errstate(all="ignore"):
             self.start = curves.point_at(np.array([phi]), np.array([theta_2]), np.zeros(1))
             self.orientation = float(np.sign(self.start.sine[0]))
@@ -254,46 +264,50 @@ class ContinuedBranch:
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """See `Mechanism.solve`."""
         with np.errstate(all="ignore"):  # trial steps may leave the range; they are rejected
-            seed, low, high = self._piece(tau_e, q)
-            none = low.stiffness <= LEAST_STIFFNESS * self.start.stiffness
-            lower = np.where(none, 0.0, low.stiffness)
-            inside = (stiffness > lower) & (stiffness < high.stiffness)
-            solution = self._point_of_stiffness(seed, np.where(inside, stiffness, seed.stiffness), tau_e, q)
-            failed = inside & ~self._is_solved(solution, stiffness, tau_e)
+            seed, low, high = self._pieces_at(tau_e, q)
+            is_zero = low.stiffness <= LEAST_STIFFNESS * self.start.stiffness
+            lower = np.where(is_zero, 0.0, low.stiffness)
+            is_attainable = (stiffness > lower) & (stiffness < high.stiffness)
+            solution = self._point_of_stiffness(
+                seed, np.where(is_attainable, stiffness, seed.stiffness), tau_e, q
+            )
+            is_failed = is_attainable & ~self._is_solved(solution, stiffness, tau_e)
             end = high.where(stiffness >= high.stiffness, low)
         return PairSolution(
-            lower=np.where(failed, np.nan, lower),
-            upper=np.where(failed, np.nan, high.stiffness),
-            lower_critical=~none & self._is_critical(low),
+            lower=np.where(is_failed, np.nan, lower),
+            upper=np.where(is_failed, np.nan, high.stiffness),
+            lower_critical=~is_zero & self._is_critical(low),
             upper_critical=self._is_critical(high),
-            slack_below=np.zeros_like(failed),
-            phi_1=np.where(inside, solution.phi, end.phi),
-            phi_2=np.where(inside, solution.s, end.s),
+            slack_below=np.zeros_like(is_failed),
+            phi_1=np.where(is_attainable, solution.phi, end.phi),
+            phi_2=np.where(is_attainable, solution.s, end.s),
         )
 
-    def _piece(self, tau_e: FloatArray, q: FloatArray) -> StiffnessPiece:
+    def _pieces_at(self, tau_e: FloatArray, q: FloatArray) -> StiffnessPiece:
         """Return the pieces at torques and positions.
 
         The last pieces are kept, since searches solve for the same torques repeatedly.
         """
         if not isinstance(tau_e, np.ndarray):
             return self._piece_by_walks(tau_e, q)
-        last = self._last
+        last = self._cached_piece
         if last is None or not all(map(np.array_equal, last[0], (tau_e, q))):
-            self._last = last = (tau_e.copy(), q.copy()), self._piece_by_walks(tau_e, q)
+            self._cached_piece = last = (tau_e.copy(), q.copy()), self._piece_by_walks(tau_e, q)
         return last[1]
 
     def _piece_by_walks(self, tau_e: FloatArray, q: FloatArray) -> StiffnessPiece:
         """Return the pieces, by walks to both ends, computed as one array."""
-        seed, count = self._seed(tau_e, q), len(tau_e)
-        both = [np.concatenate((each, each)) for each in (tau_e, q, *seed)]
+        seed, count = self._seed_point(tau_e, q), len(tau_e)
+        doubled = [np.concatenate((values, values)) for values in (tau_e, q, *seed)]
         side = np.concatenate((np.full_like(tau_e, -1.0), np.ones_like(tau_e)))
-        ends = self._walk(LevelPoint(*both[2:]), side, side * np.inf, both[0], both[1])
+        ends = self._walk_to_goal(LevelPoint(*doubled[2:]), side, side * np.inf, doubled[0], doubled[1])
         return StiffnessPiece(
-            seed, LevelPoint(*(each[:count] for each in ends)), LevelPoint(*(each[count:] for each in ends))
+            seed,
+            LevelPoint(*(values[:count] for values in ends)),
+            LevelPoint(*(values[count:] for values in ends)),
         )
 
-    def _seed(self, tau_e: FloatArray, q: FloatArray) -> LevelPoint:
+    def _seed_point(self, tau_e: FloatArray, q: FloatArray) -> LevelPoint:
         """Return a point of the branch at torques and positions, NaN where there is none.
 
         Torque and position move proportionally from the start to their values. Meanwhile the point moves
@@ -310,20 +324,20 @@ class ContinuedBranch:
             )
             stays = stays & (self._curves.distance_to_range_end(reached) >= 0)
             point, share = reached.where(stays, point), np.where(stays, target, share)
-            aside, better = self._curves.step(point, h, start + share * (tau_e - start), share * q)
-            better = better & (self._curves.distance_to_range_end(aside) >= 0)
-            better = better & (self._curves.room(aside) > self._curves.room(point))
-            h = np.where(better, 1.5 * h, -h / 2)
+            sidestep, is_better = self._curves.step(point, h, start + share * (tau_e - start), share * q)
+            is_better = is_better & (self._curves.distance_to_range_end(sidestep) >= 0)
+            is_better = is_better & (self._curves.room(sidestep) > self._curves.room(point))
+            h = np.where(is_better, 1.5 * h, -h / 2)
             h = np.where(np.abs(h) > MAX_STEP, MAX_STEP, h)
             gain = np.where(stays, 2 * gain, gain / 3)
-            return (share, gain, h, *aside.where(better, point)), (share == 1) | ~(gain > LEAST_STEP)
+            return (share, gain, h, *sidestep.where(is_better, point)), (share == 1) | ~(gain > LEAST_STEP)
 
-        like = np.zeros_like(tau_e)
-        begin = (like, like + 0.25, like + 0.02, *(like + each for each in self.start))
-        share, _, _, *values = repeat(step, begin, (tau_e, q), MAX_STEPS)
-        return LevelPoint(*(np.where(share == 1, each, np.nan) for each in values))
+        zero = np.zeros_like(tau_e)
+        initial_state = (zero, zero + 0.25, zero + 0.02, *(zero + component for component in self.start))
+        share, _, _, *values = repeat(step, initial_state, (tau_e, q), MAX_STEPS)
+        return LevelPoint(*(np.where(share == 1, component, np.nan) for component in values))
 
-    def _walk(
+    def _walk_to_goal(
         self, seed: LevelPoint, direction: FloatArray, goal: FloatArray, tau_e: FloatArray, q: FloatArray
     ) -> LevelPoint:
         """Return the goal, or the end of the piece before it; direction 1 for growing stiffness, else -1."""
@@ -334,27 +348,29 @@ class ContinuedBranch:
             reached, stays = self._curves.step(point, h * direction * self.orientation, tau_e, q)
             room_before, room_after = (
                 np.minimum(
-                    self._curves.distance_to_range_end(each),
-                    direction * (goal - each.stiffness) / point.stiffness,
+                    self._curves.distance_to_range_end(projected),
+                    direction * (goal - projected.stiffness) / point.stiffness,
                 )
-                for each in (
+                for projected in (
                     self._curves.project_onto(point, tau_e),
                     self._curves.project_onto(reached, tau_e),
                 )
             )
-            inside = stays & (room_after >= 0)
+            is_inside = stays & (room_after >= 0)
             share = np.where(
                 stays, np.minimum(np.maximum(room_before / (room_before - room_after), 0.02), 0.98), 1 / 3
             )
-            over = ~inside & ((h * share <= LEAST_STEP) | (room_before <= LEAST_STEP))
-            over = over | (vector_length(*point.newton_step(tau_e, goal)) <= CLOSE * np.abs(point.sine))
-            point = reached.where(inside, point)
-            none = point.stiffness <= LEAST_STIFFNESS * self.start.stiffness
-            h = np.where(inside, np.minimum(1.5 * h, MAX_STEP), h * share)
-            return (h, *point), over | none | ~(point.sine * self.orientation > LEAST_SINE)
+            is_finished = ~is_inside & ((h * share <= LEAST_STEP) | (room_before <= LEAST_STEP))
+            is_finished = is_finished | (
+                vector_length(*point.newton_step(tau_e, goal)) <= CLOSE * np.abs(point.sine)
+            )
+            point = reached.where(is_inside, point)
+            is_zero = point.stiffness <= LEAST_STIFFNESS * self.start.stiffness
+            h = np.where(is_inside, np.minimum(1.5 * h, MAX_STEP), h * share)
+            return (h, *point), is_finished | is_zero | ~(point.sine * self.orientation > LEAST_SINE)
 
-        begin = (np.full_like(tau_e, MAX_STEP / 4), *seed)
-        _, *values = repeat(step, begin, (direction, goal, tau_e, q), MAX_STEPS)
+        initial_state = (np.full_like(tau_e, MAX_STEP / 4), *seed)
+        _, *values = repeat(step, initial_state, (direction, goal, tau_e, q), MAX_STEPS)
         end = self._curves.project_onto(LevelPoint(*values), tau_e)
         return self._curves.point_at(end.phi, end.s, q)
 
@@ -363,12 +379,12 @@ class ContinuedBranch:
     ) -> LevelPoint:
         """Return the point of the piece with a stiffness: by a walk, then by Newton's method."""
         direction = np.where(demand >= seed.stiffness, 1.0, -1.0)
-        point = self._walk(seed, direction, demand, tau_e, q)
+        point = self._walk_to_goal(seed, direction, demand, tau_e, q)
         for _ in range(NEWTON_STEPS):
             step = point.newton_step(tau_e, demand)
-            small = vector_length(*step) <= CONTRACTION * np.abs(point.sine)
+            is_small = vector_length(*step) <= CONTRACTION * np.abs(point.sine)
             point = self._curves.move(
-                point, (np.where(small, step[0], 0.0), np.where(small, step[1], 0.0)), q
+                point, (np.where(is_small, step[0], 0.0), np.where(is_small, step[1], 0.0)), q
             )
         return point
 

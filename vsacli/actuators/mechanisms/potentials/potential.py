@@ -15,7 +15,7 @@ from vsacli.actuators.laws.law import PairSolution
 from vsacli.actuators.mechanisms.mechanism import Mechanism
 from vsacli.actuators.mechanisms.potentials.continuation import ContinuedBranch, LevelCurves
 from vsacli.actuators.mechanisms.potentials.potential_energy import (
-    ACCELERATIONS,
+    ACCELERATION_DERIVATIVES,
     RESERVED,
     PotentialEnergy,
     PotentialState,
@@ -36,7 +36,7 @@ from vsacli.documents.fields import (
 )
 from vsacli.documents.record_checks import DeclaredRecord
 
-_WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 GRID = 32
 """Number of points along each range at which the energy is checked."""
@@ -111,29 +111,32 @@ class Potential(Mechanism):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings of points at which the energy is invalid."""
-        return (*self._gaps(), *self._poles())
+        return (*self._gap_warnings(), *self._pole_warnings())
 
-    def _gaps(self) -> Iterator[str]:
+    def _gap_warnings(self) -> Iterator[str]:
         """Yield the grid point nearest to the start at which the energy is not finite."""
         shares = (np.arange(GRID) + 0.5) / GRID
         ends, start = (self.range.phi, self.range.theta_2), (self.start.theta_1, self.start.theta_2)
         axes = [low + (high - low) * shares for low, high in ends]
-        far = [(axis - at) / (high - low) for axis, at, (low, high) in zip(axes, start, ends, strict=True)]
+        distances = [
+            (axis - origin) / (high - low)
+            for axis, origin, (low, high) in zip(axes, start, ends, strict=True)
+        ]
         grid = np.meshgrid(*axes, [0.0], indexing="ij")
         with np.errstate(all="ignore"):
-            lost = ~self._potential.derivatives(grid, ACCELERATIONS).finite[..., 0]
-        if lost.any():
-            distance = np.where(lost, np.hypot(far[0][:, None], far[1]), np.inf)
+            is_undefined = ~self._potential.derivatives(grid, ACCELERATION_DERIVATIVES).finite[..., 0]
+        if is_undefined.any():
+            distance = np.where(is_undefined, np.hypot(distances[0][:, None], distances[1]), np.inf)
             phi, s = np.unravel_index(distance.argmin(), distance.shape)
             what = "the energy or one of its first four derivatives is not finite"
             yield f"{what} {_format_position(axes[0][phi], axes[1][s])}; narrow the range to where it holds"
 
-    def _poles(self) -> Iterator[str]:
+    def _pole_warnings(self) -> Iterator[str]:
         """Yield a point at which the stiffness grows without bound on the branch of the start."""
         stiffest = self._branch.stiffest
         if stiffest.stiffness[0] > UNBOUNDED * self._branch.start.stiffness[0]:
-            place = _format_position(stiffest.phi[0], stiffest.s[0])
-            yield f"the energy is not finite {place}, where the stiffness grows beyond all bounds"
+            position = _format_position(stiffest.phi[0], stiffest.s[0])
+            yield f"the energy is not finite {position}, where the stiffness grows beyond all bounds"
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:
         """See `Mechanism.solve`; on the branch of the start."""
@@ -160,25 +163,25 @@ class Potential(Mechanism):
 
     def _word_problems(self) -> Iterator[FieldProblem]:
         constants = dict(self.constants)
-        wrong = {name: reason for name in constants if (reason := _why_no_word(name))}
-        yield from (FieldProblem(("constants", name), reason) for name, reason in wrong.items())
-        if wrong:
+        invalid_names = {name: reason for name in constants if (reason := _invalid_name_reason(name))}
+        yield from (FieldProblem(("constants", name), reason) for name, reason in invalid_names.items())
+        if invalid_names:
             return
         try:
             names = read_energy(self.energy, constants).names
         except ExpressionError as error:
             yield FieldProblem(("energy",), str(error))
             return
-        needed = (("theta_2",), ("theta_1", "phi"), ("q", "phi"))
-        lacking = [words[0] for words in needed if names.isdisjoint(words)]
-        yield from (FieldProblem(("energy",), f"does not depend on {word}") for word in lacking)
-        if not lacking:  # otherwise the unused constants may belong to the missing terms
+        required = (("theta_2",), ("theta_1", "phi"), ("q", "phi"))
+        missing = [words[0] for words in required if names.isdisjoint(words)]
+        yield from (FieldProblem(("energy",), f"does not depend on {word}") for word in missing)
+        if not missing:  # otherwise the unused constants may belong to the missing terms
             unused = (name for name in constants if name not in names)
             yield from (FieldProblem(("constants", name), "does not occur in the energy") for name in unused)
 
     def _range_problems(self) -> Iterator[FieldProblem]:
-        at_start = {"phi": self.start.theta_1, "theta_2": self.start.theta_2}
-        for name, position in at_start.items():
+        start_positions = {"phi": self.start.theta_1, "theta_2": self.start.theta_2}
+        for name, position in start_positions.items():
             low, high = getattr(self.range, name)
             if not -math.inf < low < high < math.inf:
                 yield FieldProblem(("range", name), "must have two finite ends, the lower one first")
@@ -192,9 +195,9 @@ class Potential(Mechanism):
         start = self._branch.start
         with np.errstate(all="ignore"):
             (sine,), (stiffness,) = np.abs(start.sine), start.stiffness
-            at_start = np.array([[self.start.theta_1], [self.start.theta_2], [0.0]])
-            finite = self._potential.derivatives(at_start, ACCELERATIONS).finite
-        if not finite.all():
+            start_coordinates = np.array([[self.start.theta_1], [self.start.theta_2], [0.0]])
+            is_finite = self._potential.derivatives(start_coordinates, ACCELERATION_DERIVATIVES).finite
+        if not is_finite.all():
             reason = "the energy or one of its first four derivatives is not finite here"
         elif stiffness <= 0:
             reason = f"the stiffness, the second derivative over q, must be positive here, not {stiffness:g}"
@@ -218,8 +221,8 @@ def _format_position(phi: float, theta_2: float) -> str:
     return f"at phi = {phi:.4g}, theta_2 = {theta_2:.4g}"
 
 
-def _why_no_word(name: str) -> str:
+def _invalid_name_reason(name: str) -> str:
     """Return why no constant may have a name; empty if one may."""
-    if not _WORD.fullmatch(name):
+    if not _NAME.fullmatch(name):
         return "is not a name: expected letters, digits and _, beginning with a letter or _"
     return "has a meaning of its own in the energy; choose another name" if name in RESERVED else ""

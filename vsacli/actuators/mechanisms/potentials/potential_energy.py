@@ -40,18 +40,22 @@ def read_energy(text: str, constants: Mapping[str, float]) -> Expression:
     )
 
 
-def _truncation(of_q: int, of_motors: int, degree: int) -> Truncation:
+def _truncation(q_order: int, motor_order: int, total_order: int) -> Truncation:
     """Return derivatives over (q, theta_1, theta_2) up to an order over q, over both motors, and in all."""
     return Truncation(
         (a, b, c)
-        for a in range(of_q + 1)
-        for b in range(of_motors + 1)
-        for c in range(of_motors + 1 - b)
-        if a + b + c <= degree
+        for a in range(q_order + 1)
+        for b in range(motor_order + 1)
+        for c in range(motor_order + 1 - b)
+        if a + b + c <= total_order
     )
 
 
-TORQUES, ROWS, ACCELERATIONS = _truncation(1, 1, 1), _truncation(2, 1, 3), _truncation(4, 2, 4)
+TORQUE_DERIVATIVES, STIFFNESS_DERIVATIVES, ACCELERATION_DERIVATIVES = (
+    _truncation(1, 1, 1),
+    _truncation(2, 1, 3),
+    _truncation(4, 2, 4),
+)
 """Derivatives of the potential for the torques; for the stiffness and the matrix A; for the accelerations."""
 
 
@@ -71,14 +75,14 @@ class PotentialEnergy:
         """
         if not all(isinstance(row, np.ndarray) for row in coordinates):
             return PotentialDerivatives(
-                dict(zip(truncation.orders, self._series(coordinates, truncation), strict=True))
+                dict(zip(truncation.orders, self._series_derivatives(coordinates, truncation), strict=True))
             )
         if truncation not in self._row_functions:
             self._row_functions[truncation] = self._trace_series(truncation)
         function, shape = self._row_functions[truncation], coordinates[0].shape
-        flat = [np.ravel(row) for row in coordinates]
-        values = np.empty((len(truncation.orders), flat[0].size))
-        function(flat, values, function.workspace(flat[0].size))
+        flat_coordinates = [np.ravel(row) for row in coordinates]
+        values = np.empty((len(truncation.orders), flat_coordinates[0].size))
+        function(flat_coordinates, values, function.workspace(flat_coordinates[0].size))
         return PotentialDerivatives(
             dict(zip(truncation.orders, values.reshape(len(values), *shape), strict=True))
         )
@@ -87,9 +91,9 @@ class PotentialEnergy:
         from vsacli.compute.tracing import Kind, trace
         from vsacli.compute.tracing.row_functions import RowFunction
 
-        return RowFunction(trace(lambda rows: self._series(rows, truncation), [Kind.REAL] * 3))
+        return RowFunction(trace(lambda rows: self._series_derivatives(rows, truncation), [Kind.REAL] * 3))
 
-    def _series(self, coordinates: Components, truncation: Truncation) -> list[FloatArray]:
+    def _series_derivatives(self, coordinates: Components, truncation: Truncation) -> list[FloatArray]:
         """Return the derivatives in the truncation's order, from rows of phi, theta_2 and q."""
         phi, s, q = coordinates
         names = {
@@ -139,57 +143,57 @@ class PotentialState(MechanismState):
         self._potential, self._coordinates = potential, coordinates
 
     @cached_property
-    def _first(self) -> PotentialDerivatives:
-        return self._potential.derivatives(self._coordinates, TORQUES)
+    def _torque_derivatives(self) -> PotentialDerivatives:
+        return self._potential.derivatives(self._coordinates, TORQUE_DERIVATIVES)
 
     @cached_property
-    def _all(self) -> PotentialDerivatives:
-        return self._potential.derivatives(self._coordinates, ACCELERATIONS)
+    def _acceleration_derivatives(self) -> PotentialDerivatives:
+        return self._potential.derivatives(self._coordinates, ACCELERATION_DERIVATIVES)
 
     @property
     def energy(self) -> FloatArray:
         """U."""
-        return self._first()
+        return self._torque_derivatives()
 
     @property
     def tau_e(self) -> FloatArray:
         """-U_q."""
-        return -self._first(0)
+        return -self._torque_derivatives(0)
 
     @property
     def stiffness(self) -> FloatArray:
         """U_qq."""
-        return self._all(0, 0)
+        return self._acceleration_derivatives(0, 0)
 
     @property
     def tau_transmission(self) -> tuple[FloatArray, ...]:
         """Derivatives of U over theta_1 and theta_2."""
-        return self._first(1), self._first(2)
+        return self._torque_derivatives(1), self._torque_derivatives(2)
 
     @property
     def matrix(self) -> MotorMatrix:
         """Derivatives of tau_e and the stiffness over theta_1 and theta_2."""
-        return self._all.matrix
+        return self._acceleration_derivatives.matrix
 
     def torque_rate(self, rates: Components) -> FloatArray:
         """Return the rate of -U_q."""
-        return -self._rate((0,), rates)
+        return -self._derivative_rate((0,), rates)
 
     def stiffness_rate(self, rates: Components) -> FloatArray:
         """Return the rate of U_qq."""
-        return self._rate((0, 0), rates)
+        return self._derivative_rate((0, 0), rates)
 
     def stiffness_curvature(self, rates: Components) -> FloatArray:
         """Return the terms of U_qq'' that are quadratic in the rates of x."""
-        return self._curvature((0, 0), rates)
+        return self._quadratic_terms((0, 0), rates)
 
     def transmission_rates(self, rates: Components) -> tuple[FloatArray, ...]:
         """Return the rates of the derivatives by theta_1 and theta_2."""
-        return self._rate((1,), rates), self._rate((2,), rates)
+        return self._derivative_rate((1,), rates), self._derivative_rate((2,), rates)
 
     def rates(self, dtau_e: FloatArray, dstiffness: FloatArray, dq: FloatArray) -> tuple[FloatArray, ...]:
         """Return A^-1 (y' - y_q q'), with phi' = theta_1' - q'."""
-        u = self._all
+        u = self._acceleration_derivatives
         dtheta_1, dtheta_2 = self.matrix.solve(dtau_e + u(0, 0) * dq, dstiffness - u(0, 0, 0) * dq)
         return dtheta_1 - dq, dtheta_2, dq
 
@@ -197,19 +201,28 @@ class PotentialState(MechanismState):
         self, rates: Components, ddq: FloatArray, ddtau_e: FloatArray, ddstiffness: FloatArray
     ) -> tuple[FloatArray, ...]:
         """Return A^-1 of y'' - y_q q'' minus the terms quadratic in the rates."""
-        u = self._all
-        torque_row = ddtau_e + u(0, 0) * ddq + self._curvature((0,), rates)
+        u = self._acceleration_derivatives
+        torque_row = ddtau_e + u(0, 0) * ddq + self._quadratic_terms((0,), rates)
         stiffness_row = ddstiffness - u(0, 0, 0) * ddq - self.stiffness_curvature(rates)
         return self.matrix.solve(torque_row, stiffness_row)
 
-    def _rate(self, of: tuple[int, ...], rates: Components) -> FloatArray:
+    def _derivative_rate(self, variables: tuple[int, ...], rates: Components) -> FloatArray:
         """Return the rate of a derivative of the potential."""
-        return sum((self._all(*of, i) * each for i, each in _position_rates(rates)), np.zeros_like(rates[0]))
+        return sum(
+            (
+                self._acceleration_derivatives(*variables, index) * rate
+                for index, rate in _position_rates(rates)
+            ),
+            np.zeros_like(rates[0]),
+        )
 
-    def _curvature(self, of: tuple[int, ...], rates: Components) -> FloatArray:
+    def _quadratic_terms(self, variables: tuple[int, ...], rates: Components) -> FloatArray:
         """Return the terms quadratic in the rates of the second time derivative of a partial derivative."""
         return sum(
-            (self._rate((*of, i), rates) * each for i, each in _position_rates(rates)),
+            (
+                self._derivative_rate((*variables, index), rates) * rate
+                for index, rate in _position_rates(rates)
+            ),
             np.zeros_like(rates[0]),
         )
 

@@ -72,7 +72,7 @@ class CamBranch(NamedTuple):
         return ApproximateEnds(root * outer, root * inner, end, sign)
 
 
-SHARES = np.concatenate((np.geomspace(1e-9, 0.01, 150, endpoint=False), np.linspace(0.01, 1, 800)))
+SAMPLED_SHARES = np.concatenate((np.geomspace(1e-9, 0.01, 150, endpoint=False), np.linspace(0.01, 1, 800)))
 """Shares of the domain at which curves are sampled; a fitted profile has some dozen features."""
 
 FIRST_CELLS = 32
@@ -87,7 +87,7 @@ MAX_HALVINGS = 36
 MAX_SLOPE_SUM = 10.0
 """Sum of the slopes at both ends of a cell, over its height and width, beyond which no cubic is close."""
 
-AT_REST = 1e-4
+REST_SHARE = 1e-4
 """Share of the largest cube root of the torque at which the limit at rest is taken."""
 
 LiftOf = Callable[[FloatArray], Lift]
@@ -109,10 +109,10 @@ def map_branch(
         _CamSide(lambda phi: lift(-phi).mirrored(), -domain[0], k, pretension),
     )
     symmetric = domain[0] == -domain[1] and all(map(np.array_equal, *(side.lift_at_nodes for side in sides)))
-    above = sides[0].nodes()
-    below = above if symmetric else sides[1].nodes()
-    parts = below.mirrored().cells(), above.cells()
-    cells = TorqueCells(*(np.concatenate(columns, axis=-1) for columns in zip(*parts, strict=True)))
+    nodes_above = sides[0].nodes()
+    nodes_below = nodes_above if symmetric else sides[1].nodes()
+    cells_of_sides = nodes_below.mirrored().cells(), nodes_above.cells()
+    cells = TorqueCells(*(np.concatenate(columns, axis=-1) for columns in zip(*cells_of_sides, strict=True)))
     return CamBranch(cells, (-sides[1].largest_torque, sides[0].largest_torque))
 
 
@@ -129,14 +129,16 @@ class _Nodes(NamedTuple):
 
     def mirrored(self) -> _Nodes:
         """Return the nodes of the mirrored cam."""
-        turned = self.take(slice(None, None, -1))
-        return turned._replace(
-            root=-turned.root, outer_slope=-turned.outer_slope, inner_slope=-turned.inner_slope
+        reversed_nodes = self.take(slice(None, None, -1))
+        return reversed_nodes._replace(
+            root=-reversed_nodes.root,
+            outer_slope=-reversed_nodes.outer_slope,
+            inner_slope=-reversed_nodes.inner_slope,
         )
 
-    def take(self, chosen: IndexArray | slice) -> _Nodes:
+    def take(self, nodes: IndexArray | slice) -> _Nodes:
         """Return a selection of the nodes."""
-        return _Nodes(*(values[chosen] for values in self))
+        return _Nodes(*(values[nodes] for values in self))
 
     def merged(self, added: _Nodes) -> _Nodes:
         """Return these nodes and others, sorted."""
@@ -145,32 +147,34 @@ class _Nodes(NamedTuple):
 
     def misses(self, middle: _Nodes) -> BoolArray:
         """Return where the kind of end changes within a cell, or a cubic is inaccurate in its middle."""
-        differ: BoolArray = (np.diff(self.end) != 0) | (np.diff(self.sign) != 0)
+        is_inaccurate: BoolArray = (np.diff(self.end) != 0) | (np.diff(self.sign) != 0)
         width = np.diff(self.root)
-        for values, slope, wanted in (
+        for values, slope, expected in (
             (self.outer, self.outer_slope, middle.outer),
             (self.inner, self.inner_slope, middle.inner),
         ):
             a, b, c, d = _cubic_coefficients(width, values, slope)
-            guess = a + width / 2 * (b + width / 2 * (c + width / 2 * d))
-            differ |= ~(np.abs(guess - wanted) <= GUESS_RTOL * np.abs(wanted))
-        return differ
+            interpolated = a + width / 2 * (b + width / 2 * (c + width / 2 * d))
+            is_inaccurate |= ~(np.abs(interpolated - expected) <= GUESS_RTOL * np.abs(expected))
+        return is_inaccurate
 
     def cells(self) -> TorqueCells:
         """Return cubics between the nodes; each cell has the kind of end of its node nearer to rest."""
         width = np.diff(self.root)
         outer = _cubic_coefficients(width, self.outer, self.outer_slope)
         inner = _cubic_coefficients(width, self.inner, self.inner_slope)
-        nearer = slice(1, None) if self.root[0] < 0 else slice(None, -1)
-        return TorqueCells(self.root[:-1], outer, inner, self.end[nearer], self.sign[nearer])
+        node_nearer_rest = slice(1, None) if self.root[0] < 0 else slice(None, -1)
+        return TorqueCells(
+            self.root[:-1], outer, inner, self.end[node_nearer_rest], self.sign[node_nearer_rest]
+        )
 
 
 def _cubic_coefficients(width: FloatArray, values: FloatArray, slopes: FloatArray) -> FloatArray:
     """Return coefficients of cubics with values and slopes, or of lines where too steep; (4, cells)."""
-    mean, first, last = np.diff(values) / width, slopes[:-1], slopes[1:]
-    usable = np.abs(first) + np.abs(last) <= MAX_SLOPE_SUM * np.abs(values).max() / width
-    first, last = np.where(usable, first, mean), np.where(usable, last, mean)
-    quadratic, cubic = (3 * mean - 2 * first - last) / width, (first + last - 2 * mean) / width**2
+    chord, first, last = np.diff(values) / width, slopes[:-1], slopes[1:]
+    is_usable = np.abs(first) + np.abs(last) <= MAX_SLOPE_SUM * np.abs(values).max() / width
+    first, last = np.where(is_usable, first, chord), np.where(is_usable, last, chord)
+    quadratic, cubic = (3 * chord - 2 * first - last) / width, (first + last - 2 * chord) / width**2
     return np.stack((values[:-1], first, quadratic, cubic))
 
 
@@ -189,20 +193,20 @@ class _ZeroCurve:
 
     def slope(self, phi: FloatArray, tau_e: FloatArray) -> FloatArray:
         """Return the derivative of the deflection over the torque along the curve; infinite at its turns."""
-        on_curve = self(phi)
+        function = self(phi)
         with np.errstate(all="ignore"):
-            return -on_curve.b / on_curve.slope(tau_e)
+            return -function.b / function.slope(tau_e)
 
     def turns(self, phi: FloatArray) -> FloatArray:
         """Return deflections strictly between nodes at which the torque has an extremum along the curve."""
 
-        def turning(phi: FloatArray) -> FloatArray:
-            on_curve = self(phi)
-            return on_curve.a_slope * on_curve.b - on_curve.a * on_curve.b_slope
+        def torque_slope(phi: FloatArray) -> FloatArray:
+            function = self(phi)
+            return function.a_slope * function.b - function.a * function.b_slope
 
-        sign = np.sign(turning(phi))
-        turn = np.flatnonzero(sign[:-1] * sign[1:] < 0)
-        return bracketed_root(turning, phi[turn], phi[turn + 1])
+        sign = np.sign(torque_slope(phi))
+        sign_changes = np.flatnonzero(sign[:-1] * sign[1:] < 0)
+        return bracketed_root(torque_slope, phi[sign_changes], phi[sign_changes + 1])
 
 
 class _CamSide:
@@ -217,41 +221,41 @@ class _CamSide:
             FOLD: self._fold_curve,
             PEAK: _ZeroCurve(lift, lambda lift: lift.torque_peak_condition(k)),
         }
-        phi = end * SHARES
+        phi = end * SAMPLED_SHARES
         self.lift_at_nodes = lift(phi)
         turns = [curve.turns(phi) for curve in (self._outer_curve, *self._ends.values())]
         self._phi = np.unique(np.concatenate((phi, *turns)))
-        self._at_nodes = {end: curve(self._phi) for end, curve in self._ends.items()}
-        held = self._outer_curve(self._phi)
-        falling = np.flatnonzero(held.a_slope <= 0)
-        count = falling[0] + 1 if falling.size else self._phi.size
+        self._conditions_at_nodes = {end: curve(self._phi) for end, curve in self._ends.items()}
+        outer_function = self._outer_curve(self._phi)
+        falling_indices = np.flatnonzero(outer_function.a_slope <= 0)
+        count = falling_indices[0] + 1 if falling_indices.size else self._phi.size
         self._outer_phi = np.append(0.0, self._phi[:count])
-        self._outer_torque = np.maximum.accumulate(np.append(0.0, held.a[:count]))
+        self._outer_torque = np.maximum.accumulate(np.append(0.0, outer_function.a[:count]))
         self.largest_torque = float(self._outer_torque[-1])
 
     def nodes(self) -> _Nodes:
         """Return nodes dense enough that cubics between them are good first guesses."""
         largest = np.cbrt(self.largest_torque)
-        at_rest = self._at_rest(self._at(np.array([AT_REST * largest])))
-        nodes = at_rest.merged(self._at(np.linspace(0, largest, FIRST_CELLS + 1)[1:]))
+        at_rest = self._rest_node(self._nodes_at(np.array([REST_SHARE * largest])))
+        nodes = at_rest.merged(self._nodes_at(np.linspace(0, largest, FIRST_CELLS + 1)[1:]))
         for _ in range(MAX_HALVINGS):
-            middle = self._at((nodes.root[:-1] + nodes.root[1:]) / 2)
-            wrong = np.flatnonzero(nodes.misses(middle))
-            if not wrong.size:
+            middle = self._nodes_at((nodes.root[:-1] + nodes.root[1:]) / 2)
+            inaccurate = np.flatnonzero(nodes.misses(middle))
+            if not inaccurate.size:
                 break
-            nodes = nodes.merged(middle.take(wrong))
+            nodes = nodes.merged(middle.take(inaccurate))
         return nodes
 
-    def _at_rest(self, near: _Nodes) -> _Nodes:
+    def _rest_node(self, node: _Nodes) -> _Nodes:
         """Return the node without torque, from one next to it.
 
         There the deflection is proportional to the torque; only that of a fold, to its cube root.
         """
-        fold, zero = near.end == FOLD, np.zeros(1)
-        inner, slope = (np.where(fold, values, 0.0) for values in (near.inner, near.inner_slope))
-        return near._replace(root=zero, outer=zero, outer_slope=zero, inner=inner, inner_slope=slope)
+        is_fold, zero = node.end == FOLD, np.zeros(1)
+        inner, slope = (np.where(is_fold, values, 0.0) for values in (node.inner, node.inner_slope))
+        return node._replace(root=zero, outer=zero, outer_slope=zero, inner=inner, inner_slope=slope)
 
-    def _at(self, root: FloatArray) -> _Nodes:
+    def _nodes_at(self, root: FloatArray) -> _Nodes:
         """Return both ends of the branch at torques with these cube roots."""
         tau_e = np.minimum(root**3, self.largest_torque)
         node = np.clip(np.searchsorted(self._outer_torque, tau_e), 1, self._outer_phi.size - 1)
@@ -263,8 +267,8 @@ class _CamSide:
         sign = np.where(self._fold_curve(outer).at(tau_e) < 0, -1.0, 1.0)
         return _Nodes(
             root,
-            *_over_root(root, outer, self._outer_curve.slope(outer, tau_e)),
-            *_over_root(root, inner, slope),
+            *_divided_by_root(root, outer, self._outer_curve.slope(outer, tau_e)),
+            *_divided_by_root(root, inner, slope),
             end.astype(float),
             sign,
         )
@@ -272,21 +276,21 @@ class _CamSide:
     def _inner_ends(self, tau_e: FloatArray, outer: FloatArray) -> tuple[FloatArray, IndexArray]:
         """Return the first end of the branch at deflections above the outer one, and its kind."""
         inner, end = np.full_like(outer, self._phi[-1]), np.full(outer.shape, DOMAIN)
-        beyond = self._phi > outer[:, None]
+        is_beyond = self._phi > outer[:, None]
         for kind, curve in self._ends.items():
-            of_nodes = self._at_nodes[kind]
-            positive = of_nodes.a + of_nodes.b * tau_e[:, None] > 0
-            changed = beyond & (positive != (curve(outer).at(tau_e) > 0)[:, None])
-            crossed = np.flatnonzero(changed.any(axis=1))
-            node = np.argmax(changed[crossed], axis=1)
-            before = np.maximum(self._phi[np.maximum(node - 1, 0)], outer[crossed])
-            crossing = curve.root(before, self._phi[node], tau_e[crossed])
-            first = crossing < inner[crossed]
-            inner[crossed[first]], end[crossed[first]] = crossing[first], kind
+            values = self._conditions_at_nodes[kind]
+            positive = values.a + values.b * tau_e[:, None] > 0
+            is_changed = is_beyond & (positive != (curve(outer).at(tau_e) > 0)[:, None])
+            crossed_rows = np.flatnonzero(is_changed.any(axis=1))
+            node = np.argmax(is_changed[crossed_rows], axis=1)
+            left_node = np.maximum(self._phi[np.maximum(node - 1, 0)], outer[crossed_rows])
+            crossing = curve.root(left_node, self._phi[node], tau_e[crossed_rows])
+            is_nearer = crossing < inner[crossed_rows]
+            inner[crossed_rows[is_nearer]], end[crossed_rows[is_nearer]] = crossing[is_nearer], kind
         return inner, end
 
 
-def _over_root(root: FloatArray, phi: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _divided_by_root(root: FloatArray, phi: FloatArray, slope: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return phi over the cube root of the torque, and its derivative over that root, from d phi/d torque."""
     ratio = phi / root
     return ratio, (3 * root * root * slope - ratio) / root

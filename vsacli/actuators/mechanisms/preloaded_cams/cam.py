@@ -63,22 +63,22 @@ class CamProfile(NamedTuple):
 
 def fit_profile(deflection: FloatArray, lift: FloatArray) -> CamProfile:
     """Fit lifts (rows,) at ascending deflections (rows,), the lowest neither first nor last."""
-    most = max(PIECES[0], len(lift) // ROWS_PER_PIECE)
+    most_pieces = max(PIECES[0], len(lift) // ROWS_PER_PIECE)
     if _is_symmetric(deflection, lift):
-        rest, pieces = 0.0, _pieces(deflection, lift, most)
+        rest, pieces = 0.0, _choose_piece_count(deflection, lift, most_pieces)
     else:
         lowest = float(deflection[np.argmin(lift)])
-        near = lowest + _rest(deflection - lowest, lift, min(FIRST_PIECES, most))
-        pieces = _pieces(deflection - near, lift, most)
-        rest = near + _rest(deflection - near, lift, pieces)
-    fit = _fit(deflection - rest, lift, pieces)
+        first_rest = lowest + _best_rest(deflection - lowest, lift, min(FIRST_PIECES, most_pieces))
+        pieces = _choose_piece_count(deflection - first_rest, lift, most_pieces)
+        rest = first_rest + _best_rest(deflection - first_rest, lift, pieces)
+    fit = _fit_pieces(deflection - rest, lift, pieces)
     return CamProfile(rest, fit.curve, fit.misfit)
 
 
-def _pieces(phi: FloatArray, lift: FloatArray, most: int) -> int:
+def _choose_piece_count(phi: FloatArray, lift: FloatArray, most_pieces: int) -> int:
     """Return the number of pieces that the points require, over deflections from rest."""
-    counts = [pieces for pieces in PIECES if pieces <= most]
-    return min(counts, key=lambda pieces: _fit(phi, lift, pieces).criterion)
+    counts = [pieces for pieces in PIECES if pieces <= most_pieces]
+    return min(counts, key=lambda pieces: _fit_pieces(phi, lift, pieces).criterion)
 
 
 class _ProfileFit(NamedTuple):
@@ -89,24 +89,24 @@ class _ProfileFit(NamedTuple):
     criterion: float
 
 
-def _fit(phi: FloatArray, lift: FloatArray, pieces: int) -> _ProfileFit:
+def _fit_pieces(phi: FloatArray, lift: FloatArray, pieces: int) -> _ProfileFit:
     """Return the fit with this number of pieces, over deflections from rest."""
     knots = spline_knots(float(phi[0]), float(phi[-1]), pieces, DEGREE)
-    count = len(knots) - DEGREE - 1
-    shapes = [spline_curve(knots, weights, DEGREE, _lift) for weights in np.eye(count)]
+    weight_count = len(knots) - DEGREE - 1
+    shapes = [spline_curve(knots, weights, DEGREE, _integrate_lift) for weights in np.eye(weight_count)]
     columns = np.column_stack([shape(phi, 0, 0)[0] for shape in shapes])
-    weights, _ = _weights(columns, lift, _smallest_curvature(phi, lift))
+    weights, _ = _fit_weights(columns, lift, _smallest_curvature(phi, lift))
     if _is_symmetric(phi, lift):
         weights = (weights + weights[::-1]) / 2
-    curve = spline_curve(knots, weights, DEGREE, _lift)
+    curve = spline_curve(knots, weights, DEGREE, _integrate_lift)
     misfit = lift - curve(phi, 0, 0)[0]
     misfit -= (misfit.min() + misfit.max()) / 2
-    size = np.sum(misfit**2) / len(lift) + (ROUNDING_SHARE * np.ptp(lift)) ** 2
-    criterion = len(lift) * math.log(size) + PIECE_PENALTY * count * math.log(len(lift))
+    mean_square = np.sum(misfit**2) / len(lift) + (ROUNDING_SHARE * np.ptp(lift)) ** 2
+    criterion = len(lift) * math.log(mean_square) + PIECE_PENALTY * weight_count * math.log(len(lift))
     return _ProfileFit(curve, misfit, criterion)
 
 
-def _lift(spline: PPoly) -> PPoly:
+def _integrate_lift(spline: PPoly) -> PPoly:
     return times_deflection(spline).antiderivative()
 
 
@@ -115,39 +115,41 @@ def _smallest_curvature(phi: FloatArray, lift: FloatArray) -> float:
     return LEAST_CURVATURE_SHARE * 2 * float(np.ptp(lift)) / float(np.abs(phi).max()) ** 2
 
 
-def _weights(columns: FloatArray, lift: FloatArray, least: float) -> tuple[FloatArray, float]:
-    """Fit weights of columns, at least `least`, and a constant to a lift; return also the misfit."""
-    level = np.ones((len(lift), 1))
-    both = np.hstack((level, -level, columns))
-    sizes = np.maximum(np.abs(both).max(axis=0), np.finfo(float).tiny)
-    excess, distance = scipy.optimize.nnls(both / sizes, lift - least * columns.sum(axis=1) - lift.min())
-    return least + (excess / sizes)[2:], distance
+def _fit_weights(columns: FloatArray, lift: FloatArray, smallest: float) -> tuple[FloatArray, float]:
+    """Fit weights of columns, at least `smallest`, and a constant to a lift; return also the misfit."""
+    constant = np.ones((len(lift), 1))
+    columns_with_level = np.hstack((constant, -constant, columns))
+    scales = np.maximum(np.abs(columns_with_level).max(axis=0), np.finfo(float).tiny)
+    excess_weights, distance = scipy.optimize.nnls(
+        columns_with_level / scales, lift - smallest * columns.sum(axis=1) - lift.min()
+    )
+    return smallest + (excess_weights / scales)[2:], distance
 
 
-def _rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
+def _best_rest(phi: FloatArray, lift: FloatArray, pieces: int) -> float:
     """Return the deflection of rest with the best fit, between the neighbors of the lowest point."""
     knots = spline_knots(float(phi[0]), float(phi[-1]), pieces, DEGREE)
     bases = [
         scipy.interpolate.PPoly.from_spline((knots, weights, DEGREE))
         for weights in np.eye(len(knots) - DEGREE - 1)
     ]
-    of_first = np.column_stack([times_deflection(basis).antiderivative()(phi) for basis in bases])
-    of_rest = np.column_stack([basis.antiderivative()(phi) for basis in bases])
-    least, lowest = _smallest_curvature(phi, lift), int(np.argmin(lift))
-    best = scipy.optimize.minimize_scalar(
-        lambda rest: _weights(of_first - rest * of_rest, lift, least)[1],
+    moment_columns = np.column_stack([times_deflection(basis).antiderivative()(phi) for basis in bases])
+    basis_columns = np.column_stack([basis.antiderivative()(phi) for basis in bases])
+    smallest_curvature, lowest = _smallest_curvature(phi, lift), int(np.argmin(lift))
+    minimum = scipy.optimize.minimize_scalar(
+        lambda rest: _fit_weights(moment_columns - rest * basis_columns, lift, smallest_curvature)[1],
         bounds=(phi[lowest - 1], phi[lowest + 1]),
         method="bounded",
         options={"xatol": float(np.finfo(float).eps * np.ptp(phi))},
     )
-    return float(best.x)
+    return float(minimum.x)
 
 
 def _is_symmetric(phi: FloatArray, lift: FloatArray) -> bool:
     """Return whether lifts are those of the opposite deflections."""
     return all(
-        np.allclose(column, other[::-1], rtol=0, atol=ROUNDING_SHARE * float(np.ptp(column)))
-        for column, other in ((phi, -phi), (lift, lift))
+        np.allclose(column, negated[::-1], rtol=0, atol=ROUNDING_SHARE * float(np.ptp(column)))
+        for column, negated in ((phi, -phi), (lift, lift))
     )
 
 
@@ -169,11 +171,13 @@ class Cam(PreloadedCam):
     )
 
     def _problems(self) -> list[FieldProblem]:
-        of_fields = super()._problems()
-        of_table = [] if of_fields else list(_profile_problems(self.profile)) or list(self._misfits())
-        if of_table:
-            raise InputError(of_table)
-        return of_fields
+        field_problems = super()._problems()
+        table_problems = (
+            [] if field_problems else list(_profile_problems(self.profile)) or list(self._misfit_problems())
+        )
+        if table_problems:
+            raise InputError(table_problems)
+        return field_problems
 
     @classmethod
     def example(cls, joint_type: str) -> dict[str, Any]:
@@ -183,16 +187,18 @@ class Cam(PreloadedCam):
         return {"k": 60000, "r": 0.005, "pretension": [0.01, 0.05], "profile": "cam_profile.csv"}
 
     @cached_property
-    def _fitted(self) -> CamProfile:
+    def _profile_fit(self) -> CamProfile:
         return fit_profile(*self.profile.values.T)
 
-    def _misfits(self) -> Iterator[Problem]:
+    def _misfit_problems(self) -> Iterator[Problem]:
         """Yield the point that the fitted curve misses most, if the fit is refused."""
-        row, share = worst_misfit(self.profile, self._fitted.misfit)
+        row, share = worst_misfit(self.profile, self._profile_fit.misfit)
         if share > LARGEST_MISFIT:
-            missed = f"misses the lift {self.profile.values[row, 1]:.4g} by {100 * share:.2g} % of its range"
+            description = (
+                f"misses the lift {self.profile.values[row, 1]:.4g} by {100 * share:.2g} % of its range"
+            )
             message = (
-                f"a smooth profile {missed}, more than {100 * LARGEST_MISFIT:g} %: there is a kink or"
+                f"a smooth profile {description}, more than {100 * LARGEST_MISFIT:g} %: there is a kink or"
                 " an outlier nearby, or rows are too few"
             )
             yield Problem(self.profile.source.path, self.profile.line_of(row), message)
@@ -200,7 +206,7 @@ class Cam(PreloadedCam):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings of a poor fit."""
-        return misfit_warnings(self.profile, self._fitted.misfit)
+        return misfit_warnings(self.profile, self._profile_fit.misfit)
 
     @property
     def sources(self) -> tuple[Source, ...]:
@@ -210,7 +216,7 @@ class Cam(PreloadedCam):
     @property
     def rest(self) -> float:
         """Minimum of the fitted curve."""
-        return self._fitted.rest
+        return self._profile_fit.rest
 
     @property
     def deflection_range(self) -> tuple[float, float]:
@@ -219,7 +225,7 @@ class Cam(PreloadedCam):
 
     def lift(self, from_rest: FloatArray) -> Lift:
         """Return the fitted curve."""
-        return Lift(*self._fitted.curve(from_rest, 0, 4))
+        return Lift(*self._profile_fit.curve(from_rest, 0, 4))
 
 
 def _profile_problems(table: CsvTable) -> Iterator[Problem]:
@@ -234,11 +240,11 @@ def _profile_problems(table: CsvTable) -> Iterator[Problem]:
         yield Problem(table.source.path, table.line_of(lowest), message)
         return
     tolerance = SHAPE_TOLERANCE * np.ptp(lift)
-    outward = lift[lowest:], lift[lowest::-1]
-    for side, step in zip(outward, (1, -1), strict=True):
-        falls = np.flatnonzero(np.maximum.accumulate(side) - side > tolerance)
-        if falls.size:
-            row = lowest + step * int(falls[0])
+    lifts_from_minimum = lift[lowest:], lift[lowest::-1]
+    for side, step in zip(lifts_from_minimum, (1, -1), strict=True):
+        falling = np.flatnonzero(np.maximum.accumulate(side) - side > tolerance)
+        if falling.size:
+            row = lowest + step * int(falling[0])
             message = (
                 f"the lift {lift[row]:.4g} lies below that of a row nearer to the minimum at "
                 f"{deflection[lowest]:.4g}: a cam needs one minimum"

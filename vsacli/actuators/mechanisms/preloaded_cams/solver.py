@@ -87,13 +87,13 @@ class CamSolver:
     def solve(self, tau_e: FloatArray, stiffness: FloatArray) -> PairSolution:
         """Return deflections from rest (phi_1) and pretensions (phi_2); arrays (samples,)."""
         with np.errstate(all="ignore"):  # steps are arbitrary at torques that cannot be carried
-            piece = self._piece(tau_e)
+            piece = self._branch_at_torque(tau_e)
             lower = np.minimum(piece.inner.stiffness, piece.outer.stiffness)
             upper = np.maximum(piece.inner.stiffness, piece.outer.stiffness)
             demand = np.minimum(np.maximum(stiffness, lower), upper)
-            phi, lift = self._deflection(piece, tau_e, demand)
-            x = self._compression(lift, tau_e, demand)
-        least, most = self.pretension
+            phi, lift = self._deflection_and_lift(piece, tau_e, demand)
+            compression = self._spring_compression(lift, tau_e, demand)
+        smallest, largest = self.pretension
         return PairSolution(
             lower=lower,
             upper=upper,
@@ -101,44 +101,46 @@ class CamSolver:
             upper_critical=piece.at_fold & (piece.sign < 0),
             slack_below=np.zeros_like(piece.at_fold),
             phi_1=np.where(np.isnan(demand), np.nan, phi),
-            phi_2=np.minimum(np.maximum(x - lift.l, least), most),
+            phi_2=np.minimum(np.maximum(compression - lift.l, smallest), largest),
         )
 
-    def _piece(self, tau_e: FloatArray) -> BranchAtTorque:
+    def _branch_at_torque(self, tau_e: FloatArray) -> BranchAtTorque:
         """Return the branch between its ends."""
-        k, (least, most) = self.k, self.pretension
+        k, (smallest, largest) = self.k, self.pretension
         guess = self.branch.ends(tau_e)
-        held, fold, peak = guess.end == PRETENSION, guess.end == FOLD, guess.end == PEAK
-        last = np.where(guess.inner < 0, *self.domain)
+        is_pretension, is_fold, is_peak = guess.end == PRETENSION, guess.end == FOLD, guess.end == PEAK
+        domain_end = np.where(guess.inner < 0, *self.domain)
 
-        def at_outer(lift: Lift, _: FloatArray) -> LinearInTorque:
-            return lift.torque_error(k, most)
+        def outer_condition(lift: Lift, _: FloatArray) -> LinearInTorque:
+            return lift.torque_error(k, largest)
 
-        def at_inner(lift: Lift, phi: FloatArray) -> LinearInTorque:
+        def inner_condition(lift: Lift, phi: FloatArray) -> LinearInTorque:
             return LinearInTorque(
                 *(
-                    np.where(held, a, np.where(fold, b, np.where(peak, c, d)))
+                    np.where(is_pretension, a, np.where(is_fold, b, np.where(is_peak, c, d)))
                     for a, b, c, d in zip(
-                        lift.torque_error(k, least),
+                        lift.torque_error(k, smallest),
                         lift.fold_condition(k),
                         lift.torque_peak_condition(k),
-                        _distance_to_end(phi, last),
+                        _distance_to_end(phi, domain_end),
                         strict=True,
                     )
                 )
             )
 
-        outer, of_outer = self._correct_by_newton(guess.outer, tau_e, at_outer)
-        inner, of_inner = self._correct_by_newton(guess.inner, tau_e, at_inner)
+        outer, outer_lift = self._correct_by_newton(guess.outer, tau_e, outer_condition)
+        inner, inner_lift = self._correct_by_newton(guess.inner, tau_e, inner_condition)
         low, high = self.branch.torque_range
-        carried = (tau_e >= low) & (tau_e <= high)
-        stiffness = np.where(held, of_inner.spring(k, least).sigma, of_inner.stiffness(k, tau_e))
+        is_carried = (tau_e >= low) & (tau_e <= high)
+        stiffness = np.where(
+            is_pretension, inner_lift.spring(k, smallest).sigma, inner_lift.stiffness(k, tau_e)
+        )
         return BranchAtTorque(
-            BranchEnd(outer, np.where(carried, of_outer.spring(k, most).sigma, np.nan)),
-            BranchEnd(inner, np.where(carried, np.where(peak, 0.0, stiffness), np.nan)),
-            fold,
+            BranchEnd(outer, np.where(is_carried, outer_lift.spring(k, largest).sigma, np.nan)),
+            BranchEnd(inner, np.where(is_carried, np.where(is_peak, 0.0, stiffness), np.nan)),
+            is_fold,
             guess.sign,
-            of_inner.l2,
+            inner_lift.l2,
         )
 
     def _correct_by_newton(
@@ -150,7 +152,7 @@ class CamSolver:
         step = step + _limited_newton_step(function(lift.after(step), phi + step), phi, tau_e)
         return phi + step, lift.after(step)
 
-    def _deflection(
+    def _deflection_and_lift(
         self, piece: BranchAtTorque, tau_e: FloatArray, demand: FloatArray
     ) -> tuple[FloatArray, Lift]:
         """Return the deflection from rest with the demanded stiffness at the torque, and the lift there."""
@@ -159,11 +161,11 @@ class CamSolver:
         start = np.minimum(np.maximum(self._first_guess(piece, tau_e, demand), low), high)
         constants = (tau_e, demand, piece.sign)
         phi, _, _, error, *lift = repeat(
-            self._step, (start, low, high, *[np.zeros_like(start)] * 6), constants, MAX_STEPS
+            self._parabola_step, (start, low, high, *[np.zeros_like(start)] * 6), constants, MAX_STEPS
         )
         phi, *lift = where_needed(
             ~(error <= STEP_RTOL) & ~np.isnan(demand),
-            self._bracketed,
+            self._bracket_root,
             (tau_e, demand, low, high),
             (phi, *lift),
         )
@@ -177,26 +179,28 @@ class CamSolver:
         slope = 2 * scale * np.sin(np.arcsin(np.minimum(np.maximum(load, -1), 1)) / 3)
         return np.where(demand > 0, slope / curvature, piece.inner.phi)
 
-    def _step(self, state: Values, constants: Values) -> tuple[Values, BoolArray]:
+    def _parabola_step(self, state: Values, constants: Values) -> tuple[Values, BoolArray]:
         """Return a step to the root of a parabola touching g, if between the ends; else to their middle."""
         (phi, low, high, *_), (tau_e, demand, sign) = state, constants
         lift = self.lift(phi)
         squared, growth = self.k * lift.l1 * lift.l1, self.k * lift.l1 * lift.l2
-        missing = demand - 3 * squared
+        stiffness_error = demand - 3 * squared
         g = lift.l1 * (demand - squared) - tau_e * lift.l2
-        slope = lift.l2 * missing - tau_e * lift.l3
-        curvature = lift.l3 * missing - 6 * growth * lift.l2 - tau_e * lift.l4
+        slope = lift.l2 * stiffness_error - tau_e * lift.l3
+        curvature = lift.l3 * stiffness_error - 6 * growth * lift.l2 - tau_e * lift.l4
         low, high = np.where(sign * g <= 0, phi, low), np.where(sign * g >= 0, phi, high)
         slope_sum = slope + sign * np.sqrt(np.maximum(slope * slope - 2 * g * curvature, 0))
         target = phi - np.where(g == 0, 0.0, 2 * g / slope_sum)
-        short = STEP_RTOL * np.abs(phi)
-        inside = (target >= low - short) & (target <= high + short)
-        target = np.where(inside, np.minimum(np.maximum(target, low), high), (low + high) / 2)
+        tolerance = STEP_RTOL * np.abs(phi)
+        is_inside = (target >= low - tolerance) & (target <= high + tolerance)
+        target = np.where(is_inside, np.minimum(np.maximum(target, low), high), (low + high) / 2)
         step = target - phi
         error = np.where(step == 0, 0.0, np.abs(step / phi))
         return (target, low, high, error, *lift.after(step)), ~(error > STEP_RTOL)
 
-    def _bracketed(self, tau_e: FloatArray, demand: FloatArray, low: FloatArray, high: FloatArray) -> Values:
+    def _bracket_root(
+        self, tau_e: FloatArray, demand: FloatArray, low: FloatArray, high: FloatArray
+    ) -> Values:
         """Return the deflection, and the lift there, by bracketing."""
 
         def g(phi: FloatArray, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
@@ -206,19 +210,19 @@ class CamSolver:
         phi = bracketed_root(g, low, high, (tau_e, demand))
         return phi, *self.lift(phi)
 
-    def _compression(self, lift: Lift, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
+    def _spring_compression(self, lift: Lift, tau_e: FloatArray, demand: FloatArray) -> FloatArray:
         """Return the compression of the spring, from the torque; at rest, from the stiffness."""
         at_rest = self.k * lift.l1 * lift.l1 <= AT_REST_SHARE * demand
         return np.where(at_rest, demand / lift.l2, tau_e / lift.l1) / self.k
 
 
-def _distance_to_end(phi: FloatArray, last: FloatArray) -> LinearInTorque:
+def _distance_to_end(phi: FloatArray, domain_end: FloatArray) -> LinearInTorque:
     """Return the distance to the end of the domain, zero there at any torque."""
     zero = np.zeros_like(phi)
-    return LinearInTorque(phi - last, np.ones_like(phi), zero, zero)
+    return LinearInTorque(phi - domain_end, np.ones_like(phi), zero, zero)
 
 
-def _limited_newton_step(on_curve: LinearInTorque, phi: FloatArray, tau_e: FloatArray) -> FloatArray:
-    slope, most = on_curve.slope(tau_e), MAX_GUESS_ERROR * np.abs(phi)
-    step = np.where(slope == 0, 0.0, -on_curve.at(tau_e) / slope)
-    return np.minimum(np.maximum(step, -most), most)
+def _limited_newton_step(function: LinearInTorque, phi: FloatArray, tau_e: FloatArray) -> FloatArray:
+    slope, largest = function.slope(tau_e), MAX_GUESS_ERROR * np.abs(phi)
+    step = np.where(slope == 0, 0.0, -function.at(tau_e) / slope)
+    return np.minimum(np.maximum(step, -largest), largest)

@@ -60,32 +60,32 @@ class Sine(SpringRecord):
         return energy, SpringState(tau, sigma, -squared * tau, -squared * sigma)
 
 
-TURN = Sine(k=2.0, ratio=2.0)
+UNIT_SINE = Sine(k=2.0, ratio=2.0)
 """g = sin 2phi, of w = sin^2(phi)."""
 
 
-def ratio_partials(scale: ScaleDerivatives, energy: FloatArray, form: SpringState) -> Partials:
+def ratio_partials(scale: ScaleDerivatives, energy: FloatArray, torque: SpringState) -> Partials:
     """Return the partial derivatives of the potential K(s) w(phi).
 
     Args:
         scale: K and two derivatives.
         energy: w.
-        form: g and three derivatives.
+        torque: g and three derivatives.
     """
     value, slope, curvature = scale
     return Partials(
         energy=value * energy,
         setting_torque=slope * energy,
         setting_stiffness=curvature * energy,
-        T=value * form.tau,
-        T_p=value * form.sigma,
-        T_s=slope * form.tau,
-        T_pp=value * form.zeta,
-        T_ps=slope * form.sigma,
-        T_ss=curvature * form.tau,
-        T_ppp=value * form.eta,
-        T_pps=slope * form.zeta,
-        T_pss=curvature * form.sigma,
+        T=value * torque.tau,
+        T_p=value * torque.sigma,
+        T_s=slope * torque.tau,
+        T_pp=value * torque.zeta,
+        T_ps=slope * torque.sigma,
+        T_ss=curvature * torque.tau,
+        T_ppp=value * torque.eta,
+        T_pps=slope * torque.zeta,
+        T_pss=curvature * torque.sigma,
     )
 
 
@@ -114,22 +114,27 @@ class SineRatio(Mechanism):
 
     def partials(self, phi: FloatArray, s: FloatArray) -> Partials:
         """Return the derivatives of K(s) sin^2(phi)."""
-        return ratio_partials(self.scale(s), *TURN.energy_and_state(phi))
+        return ratio_partials(self.scale(s), *UNIT_SINE.energy_and_state(phi))
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
         """Solve by (2 K_min)^2 <= sigma^2 + (2 tau_e)^2 <= (2 K_max)^2, cut at sigma = 0."""
         load = 2 * np.abs(np.where(np.isfinite(tau_e), tau_e, np.nan))
-        least, most = ((2 * scale - load) * (2 * scale + load) for scale in self.scale_range)
-        carried = most >= 0
-        lower, upper = (np.sqrt(np.where(carried, np.maximum(each, 0), np.nan)) for each in (least, most))
+        smallest_squared, largest_squared = (
+            (2 * scale - load) * (2 * scale + load) for scale in self.scale_range
+        )
+        is_carried = largest_squared >= 0
+        lower, upper = (
+            np.sqrt(np.where(is_carried, np.maximum(squared, 0), np.nan))
+            for squared in (smallest_squared, largest_squared)
+        )
         demand = np.minimum(np.maximum(stiffness, lower), upper)
-        never = np.zeros_like(carried)
+        nowhere = np.zeros_like(is_carried)
         return PairSolution(
             lower=lower,
             upper=upper,
-            lower_critical=never,
-            upper_critical=never,
-            slack_below=never,
+            lower_critical=nowhere,
+            upper_critical=nowhere,
+            slack_below=nowhere,
             phi_1=np.arctan2(2 * tau_e, demand) / 2,
             phi_2=self.setting(np.hypot(demand, load) / 2),
         )
@@ -219,12 +224,12 @@ class Lever(SineRatio):
 
     def scale(self, s: FloatArray) -> ScaleDerivatives:
         """Return K = k/2 (L x)^2 with x = p/(L - p)."""
-        rest = self.length - self.lead * s
-        ratio, slope = self.lead * s / rest, self.length * self.lead / (rest * rest)
+        distance = self.length - self.lead * s
+        ratio, slope = self.lead * s / distance, self.length * self.lead / (distance * distance)
         factor = self.k * self.length * self.length
         # x'' is 2 x' lead/(L - p)
-        bent = slope * slope + 2 * self.lead * ratio * slope / rest
-        return ScaleDerivatives(factor / 2 * ratio * ratio, factor * ratio * slope, factor * bent)
+        curvature_factor = slope * slope + 2 * self.lead * ratio * slope / distance
+        return ScaleDerivatives(factor / 2 * ratio * ratio, factor * ratio * slope, factor * curvature_factor)
 
     def setting(self, scale: FloatArray) -> FloatArray:
         """Return theta_2 of the pivot position, L x/(1 + x)."""

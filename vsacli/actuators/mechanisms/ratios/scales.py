@@ -31,7 +31,7 @@ MAX_STEPS = 100
 SHORT_STEP = OfRounding(1e-5, power=1 / 3)
 """Step relative to x whose third power, the error after it, is rounding."""
 
-LEFT_ERROR = OfRounding(1e-17)
+REMAINING_ERROR = OfRounding(1e-17)
 """Error after a step, relative to x, below rounding: Newton step times Halley's correction squared. Where the
 slope vanishes, as next to a fold, `SHORT_STEP` alone does not suffice."""
 
@@ -56,19 +56,19 @@ def increasing_root(
         correction = newton * curvature / (2 * slope)
         target = x - newton / np.minimum(np.maximum(1 - correction, 0.5), 2)
         low, high = np.where(value <= 0, x, low), np.where(value >= 0, x, high)
-        inside = (low <= target) & (target <= high)
-        following = np.where(inside, target, (low + high) / 2)
-        size = np.abs(following)
+        is_inside = (low <= target) & (target <= high)
+        next_x = np.where(is_inside, target, (low + high) / 2)
+        magnitude = np.abs(next_x)
         error = np.abs(newton) * (correction * correction)
-        short = (np.abs(newton) <= SHORT_STEP * size) & (error <= LEFT_ERROR * size)
-        return (following, low, high), inside & short | ~(low < high)
+        is_short = (np.abs(newton) <= SHORT_STEP * magnitude) & (error <= REMAINING_ERROR * magnitude)
+        return (next_x, low, high), is_inside & is_short | ~(low < high)
 
     with np.errstate(all="ignore"):  # without slope, a step leads nowhere
         first = np.where((low < start) & (start < high), start, (low + high) / 2)
         return repeat(step, (first, low, high), constants, MAX_STEPS)[0]
 
 
-SETTINGS = 2001
+SETTING_COUNT = 2001
 """Points of the range at which the scale is checked; neither a power nor a quartic changes faster."""
 
 
@@ -94,16 +94,16 @@ class ScaleLaw(SpringRecord, ABC):
         first, last = self.at(np.array(settings, dtype=float)).value.tolist()
         sign = math.copysign(1.0, last - first)
 
-        def missing(s: FloatArray, wanted: FloatArray) -> Values:
+        def scale_error(s: FloatArray, target: FloatArray) -> Values:
             value, slope, curvature = self.at(s)
-            return sign * (value - wanted), sign * slope, sign * curvature
+            return sign * (value - target), sign * slope, sign * curvature
 
         start = low + (scale - first) * ((settings[1] - settings[0]) / (last - first))
-        return increasing_root(missing, low, high, start, (scale,))
+        return increasing_root(scale_error, low, high, start, (scale,))
 
     def problems(self, settings: tuple[float, float]) -> Iterator[str]:
         """Yield the reasons why the scale is invalid for a range of settings."""
-        s = np.linspace(*settings, SETTINGS)
+        s = np.linspace(*settings, SETTING_COUNT)
         with np.errstate(all="ignore"):
             scale = self.at(s)
         if not (scale.value > 0).all():
@@ -152,11 +152,15 @@ class PolynomialScale(ScaleLaw):
     def at(self, s: FloatArray) -> ScaleDerivatives:
         """Return K with its derivatives, by Horner's scheme."""
         row = (self.c0, self.c1, self.c2, self.c3, self.c4)
-        rate = tuple(power * each for power, each in enumerate(row))[1:]
-        bent = tuple(power * each for power, each in enumerate(rate))[1:]
+        slope_coefficients = tuple(power * coefficient for power, coefficient in enumerate(row))[1:]
+        curvature_coefficients = tuple(
+            power * coefficient for power, coefficient in enumerate(slope_coefficients)
+        )[1:]
         value, slope, curvature = (
-            reduce(lambda total, each: total * s + each, reversed(coefficients), np.zeros_like(s))
-            for coefficients in (row, rate, bent)
+            reduce(
+                lambda total, coefficient: total * s + coefficient, reversed(coefficients), np.zeros_like(s)
+            )
+            for coefficients in (row, slope_coefficients, curvature_coefficients)
         )
         return ScaleDerivatives(value, slope, curvature)
 

@@ -28,7 +28,7 @@ TORQUES = LazyRegistry({**LAWS.homes, "sine": "vsacli.actuators.mechanisms.ratio
 DEFLECTIONS = np.geomspace(1e-6, 1.0, 4000)
 """Shares of a law's domain at which the sign of g'^2 - g g'' is sampled; laws change over tenths of it."""
 
-ENDLESS = 1e3
+LARGEST_DEFLECTION = 1e3
 """Deflection, rad (m), at which an unbounded domain is cut off: no springs deflect so far."""
 
 
@@ -48,7 +48,7 @@ class _DeflectionLimit(NamedTuple):
     stiffness: float
 
 
-class _EndAtTorque(NamedTuple):
+class _BranchEnds(NamedTuple):
     """An end of the branch at given torques; arrays (samples,)."""
 
     phi: FloatArray
@@ -112,24 +112,36 @@ class VariableRatio(Mechanism):
 
     def solve(self, tau_e: FloatArray, stiffness: FloatArray, q: FloatArray) -> PairSolution:  # noqa: ARG002
         """Solve tau_e/sigma = g/g' for phi between the ends of the scale, then K = sigma/g'."""
-        least, most = sorted(self.scale.at(np.array(self.setting, dtype=float)).value.tolist())
+        smallest_scale, largest_scale = sorted(
+            self.scale.at(np.array(self.setting, dtype=float)).value.tolist()
+        )
         with np.errstate(all="ignore"):  # a torque of a tendon that pushes, for instance
-            soft, stiff = self._end(tau_e, least), self._end(tau_e, most)
-            carried = ~stiff.limited & np.isfinite(tau_e)
-            lower, upper = (np.where(carried, end.stiffness, np.nan) for end in (soft, stiff))
+            softest_end, stiffest_end = (
+                self._end_at_scale(tau_e, smallest_scale),
+                self._end_at_scale(tau_e, largest_scale),
+            )
+            is_carried = ~stiffest_end.limited & np.isfinite(tau_e)
+            lower, upper = (
+                np.where(is_carried, end.stiffness, np.nan) for end in (softest_end, stiffest_end)
+            )
             demand = np.minimum(np.maximum(stiffness, lower), upper)
             ratio = tau_e / demand
-            ends = np.minimum(stiff.phi, soft.phi), np.maximum(stiff.phi, soft.phi)
-            phi = self._deflection(ratio, *ends)
-            scale = np.minimum(np.maximum(demand / self.torque.state(phi).sigma, least), most)
+            deflection_ends = (
+                np.minimum(stiffest_end.phi, softest_end.phi),
+                np.maximum(stiffest_end.phi, softest_end.phi),
+            )
+            phi = self._deflection(ratio, *deflection_ends)
+            scale = np.minimum(
+                np.maximum(demand / self.torque.state(phi).sigma, smallest_scale), largest_scale
+            )
             setting = self.scale.setting(scale, self.setting)
-        never = np.zeros_like(tau_e, dtype=bool)
+        nowhere = np.zeros_like(tau_e, dtype=bool)
         return PairSolution(
             lower=lower,
             upper=upper,
-            lower_critical=soft.critical & carried,
-            upper_critical=never,
-            slack_below=never,
+            lower_critical=softest_end.critical & is_carried,
+            upper_critical=nowhere,
+            slack_below=nowhere,
             phi_1=np.where(np.isnan(demand), np.nan, phi),
             phi_2=np.where(np.isnan(demand), np.nan, setting),
         )
@@ -143,21 +155,25 @@ class VariableRatio(Mechanism):
     def _torque_over_stiffness(self, phi: FloatArray, ratio: FloatArray) -> Values:
         """Return g/g' minus a ratio, which increases with phi along the branch, and two derivatives."""
         state = self.torque.state(phi)
-        quotient, slope, curvature = (each / state.sigma for each in (state.tau, state.zeta, state.eta))
-        bent = 2 * quotient * slope * slope - slope - quotient * curvature
-        return quotient - ratio, 1 - quotient * slope, bent
+        quotient, slope, curvature = (
+            derivative / state.sigma for derivative in (state.tau, state.zeta, state.eta)
+        )
+        second_derivative = 2 * quotient * slope * slope - slope - quotient * curvature
+        return quotient - ratio, 1 - quotient * slope, second_derivative
 
-    def _end(self, tau_e: FloatArray, scale: float) -> _EndAtTorque:
+    def _end_at_scale(self, tau_e: FloatArray, scale: float) -> _BranchEnds:
         below, above = self._limits
         torque = tau_e / scale
-        under, over = torque < below.torque, torque > above.torque
-        inside = np.minimum(np.maximum(torque, below.torque), above.torque)
-        phi = np.where(under, below.phi, np.where(over, above.phi, self.torque.deflection(inside)))
+        is_below, is_above = torque < below.torque, torque > above.torque
+        clipped_torque = np.minimum(np.maximum(torque, below.torque), above.torque)
+        phi = np.where(
+            is_below, below.phi, np.where(is_above, above.phi, self.torque.deflection(clipped_torque))
+        )
         state = self.torque.state(phi)
-        sigma = np.where(under, below.stiffness, np.where(over, above.stiffness, state.sigma))
-        factor = np.where(under | over, tau_e / state.tau, scale)
-        critical = (under & below.critical) | (over & above.critical)
-        return _EndAtTorque(phi, factor * sigma, under | over, critical)
+        sigma = np.where(is_below, below.stiffness, np.where(is_above, above.stiffness, state.sigma))
+        factor = np.where(is_below | is_above, tau_e / state.tau, scale)
+        critical = (is_below & below.critical) | (is_above & above.critical)
+        return _BranchEnds(phi, factor * sigma, is_below | is_above, critical)
 
     @cached_property
     def _limits(self) -> tuple[_DeflectionLimit, _DeflectionLimit]:
@@ -169,21 +185,21 @@ class VariableRatio(Mechanism):
 def _deflection_limit(law: SpringLaw | Sine, end: float, torque: float) -> _DeflectionLimit:
     """Return the limit of the deflection to one side, which ends there with a torque."""
 
-    def falling(phi: FloatArray) -> FloatArray:
+    def stiffness_fall(phi: FloatArray) -> FloatArray:
         """Return a function that is positive where the stiffness falls along the branch."""
         state = law.state(phi)
         return state.sigma * state.sigma - state.tau * state.zeta
 
-    phi = DEFLECTIONS * (end if np.isfinite(end) else np.copysign(ENDLESS, end))
+    phi = DEFLECTIONS * (end if np.isfinite(end) else np.copysign(LARGEST_DEFLECTION, end))
     with np.errstate(all="ignore"):  # overflow of laws that grow fast
-        turned = np.flatnonzero(falling(phi) < 0)
-    if not turned.size:
+        falling_indices = np.flatnonzero(stiffness_fall(phi) < 0)
+    if not falling_indices.size:
         with np.errstate(all="ignore"):
             stiffness = 0.0 if isinstance(law, Sine) else float(law.state(np.array([end])).sigma[0])
         return _DeflectionLimit(end, torque, critical=False, stiffness=stiffness)
-    first = max(int(turned[0]), 1)
-    turn = bracketed_root(falling, phi[first - 1 : first], phi[first : first + 1])
-    state = law.state(turn)
+    first = max(int(falling_indices[0]), 1)
+    extremum = bracketed_root(stiffness_fall, phi[first - 1 : first], phi[first : first + 1])
+    state = law.state(extremum)
     return _DeflectionLimit(
-        float(turn[0]), float(state.tau[0]), critical=True, stiffness=float(state.sigma[0])
+        float(extremum[0]), float(state.tau[0]), critical=True, stiffness=float(state.sigma[0])
     )
