@@ -298,7 +298,7 @@ def test_a_cached_library_that_cannot_be_loaded_is_compiled_anew(own_cache: Path
     library.unlink()  # this process has loaded it: another file takes its place
     library.write_bytes(b"no program")
     library.with_name(CHECKSUM).write_text(hashlib.sha256(b"no program").hexdigest())
-    _loaded.clear()
+    _loaded_libraries.clear()
     said: list[str] = []
     assert choose_engine("c", KERNEL, 1, tell=said.append).reason.startswith("C code computes, compiled now")
     (sentence,) = said
