@@ -13,7 +13,7 @@ from samples.command_line import REPOSITORY
 from vsacli import laws, load_robot
 from vsacli.actuators.motor import Motor
 from vsacli.dynamics import limits
-from vsacli.results.store.reader import RANGES, SIZES
+from vsacli.results.store.reader import MAGNITUDE_DATASETS, RANGE_DATASETS
 from vsacli.studies.search import fixed_text
 from vsacli.studies.sizing.sizing import KEPT
 from vsacli.trajectory.curves.closed_form import ClosedForm
@@ -32,7 +32,7 @@ def test_figures_draw_every_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(limits.math, "isfinite", lambda _: True)
     robot = load_robot(REPOSITORY / "robots" / "maccepa_vd_1r.yaml")
     checked = {check.variable for joint in robot.joints for check in limits.limit_checks(joint)}
-    assert checked == RANGES.keys() | SIZES.keys()
+    assert checked == RANGE_DATASETS.keys() | MAGNITUDE_DATASETS.keys()
 
 
 def test_a_chosen_motor_keeps_every_field_of_motors() -> None:

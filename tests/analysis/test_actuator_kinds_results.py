@@ -24,8 +24,7 @@ from vsacli.dynamics.drive import drive
 from vsacli.dynamics.integrated_deflections import integrate_deflections
 from vsacli.results.charts.figures import feasibility
 from vsacli.results.charts.stored import StoredCharts
-from vsacli.results.plots import compare_files, plot_stored
-from vsacli.results.plots import drawn as drawn_sheet
+from vsacli.results.plots import compare_files, draw_sheet, plot_stored
 from vsacli.robot.file import load_robot
 from vsacli.robot.joint import Limits
 from vsacli.robot.model import Robot
@@ -256,7 +255,7 @@ def compared_panels(*results: Any) -> list[Any]:
 def test_no_stiffness_panel_for_a_rigid_joint_and_no_corridor_for_an_elastic_one() -> None:
     for figure, first in (
         (plot_stored(drawn())["motion"], 1),
-        (drawn_sheet(feasibility(StoredCharts([drawn()]))), 0),
+        (draw_sheet(feasibility(StoredCharts([drawn()]))), 0),
     ):
         shoulder, elbow = figure.axes[first:]
         assert titles([shoulder, elbow]) == ["shoulder", "elbow"]

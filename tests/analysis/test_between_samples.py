@@ -15,7 +15,7 @@ from scipy.optimize import minimize_scalar
 from vsacli import inverse_dynamics
 from vsacli.actuators.motor import Motor
 from vsacli.actuators.reach import margin
-from vsacli.analysis.between_samples import SAMPLES_ONLY, SCANNED
+from vsacli.analysis.between_samples import SAMPLES_ONLY, SCAN_TIMES
 from vsacli.analysis.report import Report
 from vsacli.analysis.run import Run
 from vsacli.base.arrays import FloatArray
@@ -183,7 +183,7 @@ def test_what_is_found_does_not_depend_on_the_blocks(
     block_samples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of a run that is looked at around its steps, as if it were a long one."""
-    monkeypatch.setattr("vsacli.analysis.between_samples.SCANNED", 0)
+    monkeypatch.setattr("vsacli.analysis.between_samples.SCAN_TIMES", 0)
     robot, trajectory = three_joints(rate=21.0)
     whole = inverse_dynamics(robot, trajectory)
     run = Run(robot, trajectory, block_samples=block_samples)
@@ -200,7 +200,7 @@ def test_what_is_found_does_not_depend_on_the_blocks(
 def test_every_dip_below_the_corridor_is_found_and_its_nearest_step_marked() -> None:
     """The oracle looks at a hundred times from each step to the next."""
     robot, trajectory = three_joints()
-    assert trajectory.samples > SCANNED
+    assert trajectory.samples > SCAN_TIMES
     dense = trajectory.at(np.linspace(0, DURATION, 100 * (trajectory.samples - 1) + 1))
     block = compute_block(robot, dense)
     gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)

@@ -15,7 +15,7 @@ from vsacli.dynamics.integrated_deflections import IntegratedDeflections, integr
 from vsacli.dynamics.inverse import DeflectionStop
 from vsacli.results.charts.figures import FEASIBILITY_VARIABLES, feasibility
 from vsacli.results.charts.stored import StoredCharts
-from vsacli.results.plots import drawn as drawn_sheet
+from vsacli.results.plots import draw_sheet
 
 PNG = b"\x89PNG\r\n\x1a\n"
 FIGURE = "figures/vsa_3r-soft-feasibility.png"
@@ -27,10 +27,10 @@ def figures(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     drawn: list[Figure] = []
 
     def drawing(sheet) -> Figure:
-        drawn.append(drawn_sheet(sheet))
+        drawn.append(draw_sheet(sheet))
         return drawn[-1]
 
-    monkeypatch.setattr("vsacli.results.plots.figures.drawn", drawing)
+    monkeypatch.setattr("vsacli.results.plots.figures.draw_sheet", drawing)
     return drawn
 
 
@@ -136,7 +136,7 @@ def test_upper_end_of_the_corridor_is_drawn():
     above = result.read("stiffness") > upper
     bounded = rest_to_rest(sigma=(850, 1275), stiffness_max=upper, flags=above.astype(np.uint32))
     assert set(FEASIBILITY_VARIABLES) <= set(bounded.variables)
-    for axes in drawn_sheet(feasibility(StoredCharts([bounded]))).axes:
+    for axes in draw_sheet(feasibility(StoredCharts([bounded]))).axes:
         assert any((line.get_ydata() == 1200).all() for line in axes.lines)
         ((start, _),) = shaded(axes)
         assert 2 < start < 4

@@ -101,7 +101,7 @@ def test_the_size_of_the_blocks_makes_no_difference(stored, block, monkeypatch):
     result = stored(block)
     expected = rows(result, ["tau_motor", "q"], rate=RATE / 3)
     for cells in (1, 50, 100):
-        monkeypatch.setattr(selection, "CELLS", cells)
+        monkeypatch.setattr(selection, "MAX_BLOCK_VALUES", cells)
         assert rows(result, ["tau_motor", "q"], rate=RATE / 3) == expected
 
 

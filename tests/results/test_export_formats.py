@@ -114,7 +114,7 @@ def test_parquet_says_units_and_where_it_comes_from(stored):
 
 
 def test_parquet_comes_in_groups_of_rows(stored, monkeypatch):
-    monkeypatch.setattr(selection, "CELLS", 200)
+    monkeypatch.setattr(selection, "MAX_BLOCK_VALUES", 200)
     file = parquet.ParquetFile(exported(stored(random_block(SAMPLES, 2)), "parquet"))
     assert file.num_row_groups == 5
     assert file.read().num_rows == SAMPLES

@@ -43,17 +43,19 @@ def test_letters_of_an_installed_font_are_drawn_with_it(
     monkeypatch: pytest.MonkeyPatch, installed: list[FontEntry]
 ) -> None:
     monkeypatch.setattr(letters, "usual_letters", lambda: frozenset(" abcdefghijklmnopqrstuvwxyz"))
-    installed.append(FontEntry(fname=SERIF, name="DejaVu Serif", weight=letters.REGULAR))
+    installed.append(FontEntry(fname=SERIF, name="DejaVu Serif", weight=letters.REGULAR_WEIGHT))
     figure = Figure()
     figure.suptitle("arm Ω", parse_math=False)
     letters.make_legible(figure)
     assert figure.get_suptitle() == "arm Ω"
-    assert figure.texts[0].get_fontfamily() == [letters.USUAL, "DejaVu Serif"]
+    assert figure.texts[0].get_fontfamily() == [letters.DEFAULT_FONT, "DejaVu Serif"]
 
 
 def test_a_font_that_cannot_be_read_has_no_letters(tmp_path: Path, installed: list[FontEntry]) -> None:
     (tmp_path / "broken.ttf").write_bytes(b"no font")
-    installed.append(FontEntry(fname=str(tmp_path / "broken.ttf"), name="Broken", weight=letters.REGULAR))
+    installed.append(
+        FontEntry(fname=str(tmp_path / "broken.ttf"), name="Broken", weight=letters.REGULAR_WEIGHT)
+    )
     assert title("机") == r"\u673a"
 
 

@@ -45,9 +45,9 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def in_a_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     """Short files, too, are written in a thread, and stored by another."""
-    monkeypatch.setattr(new_file, "BEHIND_FROM", 0)
-    monkeypatch.setattr(new_file, "BEHIND", 5000)
-    monkeypatch.setattr(new_file, "SYNCED", 3000)
+    monkeypatch.setattr(new_file, "DIRECT_BYTES", 0)
+    monkeypatch.setattr(new_file, "MAX_PENDING_BYTES", 5000)
+    monkeypatch.setattr(new_file, "SYNC_BYTES", 3000)
 
 
 def threads() -> list[str]:
@@ -194,8 +194,8 @@ def test_a_disk_that_fails_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyP
 @pytest.fixture
 def behind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[NewFile]:
     """A file all of whose tasks are done in a thread; 10 bytes may wait."""
-    monkeypatch.setattr(new_file, "BEHIND_FROM", 0)
-    monkeypatch.setattr(new_file, "BEHIND", 10)
+    monkeypatch.setattr(new_file, "DIRECT_BYTES", 0)
+    monkeypatch.setattr(new_file, "MAX_PENDING_BYTES", 10)
     file = NewFile(Staged.unnamed(tmp_path / "r.h5"))
     yield file
     file.discard()
@@ -210,10 +210,10 @@ def test_what_waits_is_bounded(behind: NewFile) -> None:
         return lambda: (go.wait(), done.append(number))
 
     for number in range(5):
-        behind.do(task(number), 2)
+        behind.schedule_write(task(number), 2)
     timer = threading.Timer(0.05, lambda: (done.append("go"), go.set()))
     timer.start()
-    behind.do(task(5), 2)
+    behind.schedule_write(task(5), 2)
     assert done[:2] == ["go", 0]
     behind.wait()
     assert done == ["go", 0, 1, 2, 3, 4, 5]
@@ -221,7 +221,7 @@ def test_what_waits_is_bounded(behind: NewFile) -> None:
 
 def test_what_goes_wrong_in_the_thread_is_raised_once_by_the_caller(behind: NewFile) -> None:
     done = []
-    behind.do(lambda: 1 / 0, 5)
-    behind.do(lambda: done.append(1), 5)
+    behind.schedule_write(lambda: 1 / 0, 5)
+    behind.schedule_write(lambda: done.append(1), 5)
     with pytest.raises(ZeroDivisionError):
         behind.wait()

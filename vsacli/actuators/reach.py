@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import LIMITS, MIN_MARGIN, SINGULAR_MARGIN, Flag, marked
+from vsacli.base.flags import LIMITS, MIN_MARGIN, SINGULAR_MARGIN, Flag, flags_where
 from vsacli.base.variables import VARIABLES, deviation
 from vsacli.compute.vector import Scalar
 
@@ -56,7 +56,7 @@ class LimitCheck(NamedTuple):
 
     def flags(self, of_joint: OfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
         """Return the bit where values leave the range by more than rounding and an allowance; not at NaN."""
-        return marked(self.flag, self.outside(self.values(of_joint)) > self.tolerance + allowance)
+        return flags_where(self.flag, self.outside(self.values(of_joint)) > self.tolerance + allowance)
 
     def allowance(self, of_joint: OfJoint) -> FloatArray | float:
         """Return the excess that uncertain values are allowed, (samples,); 0 without standard deviations.
@@ -134,7 +134,7 @@ class Reach(NamedTuple):
     def flags(self) -> FlagArray:
         """The bits of the same names."""
         bits = (Flag.INFEASIBLE, Flag.SLACK, Flag.SINGULAR, Flag.NEAR_SINGULAR)
-        first, *further_bits = (marked(flag, where) for flag, where in zip(bits, self, strict=True))
+        first, *further_bits = (flags_where(flag, where) for flag, where in zip(bits, self, strict=True))
         return reduce(operator.or_, further_bits, first)
 
 

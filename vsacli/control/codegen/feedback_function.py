@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from vsacli.actuators.drivetrain import Drivetrain, DrivetrainState
-from vsacli.base.flags import Flag, finite, marked, not_finite_flags
+from vsacli.base.flags import Flag, finite, flags_where, not_finite_flags
 from vsacli.base.wrench import WrenchFrame
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure, arrays_by_argument
 from vsacli.control.codegen.robot_functions import (
@@ -198,5 +198,5 @@ class _Law:
         """Return the flags of a joint: torque undefined, or a limit exceeded by state or torque."""
         joint, of_joint = self._robot.joints[index], {name: array[index] for name, array in values.items()}
         there = finite(of_joint["tau_motor"][: joint.actuator.motor_count])
-        flags = marked(Flag.SINGULAR, singular) | not_finite_flags(~(there | singular))
+        flags = flags_where(Flag.SINGULAR, singular) | not_finite_flags(~(there | singular))
         return limit_flags(joint, of_joint, flags)

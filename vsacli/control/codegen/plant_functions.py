@@ -13,7 +13,7 @@ import numpy as np
 from vsacli.actuators.drivetrain import SIDES, Drivetrain
 from vsacli.base.arrays import FLAG_TYPE
 from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag, finite, marked, not_finite_flags
+from vsacli.base.flags import Flag, finite, flags_where, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.tracing import cells_of
@@ -156,7 +156,7 @@ def _range_flags(drivetrain: Drivetrain, q: Any, theta: Any) -> Any:
     outside: list[Any] = [
         ~reduce(and_, inside[drivetrain.spring_joint == joint], np.True_) for joint in range(len(q))
     ]
-    return np.stack([marked(Flag.INFEASIBLE, each) for each in outside])
+    return np.stack([flags_where(Flag.INFEASIBLE, each) for each in outside])
 
 
 def step_function(robot: Robot, derivative: Function) -> Step:

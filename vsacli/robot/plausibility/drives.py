@@ -103,25 +103,31 @@ def _checked_motors(checked: CheckedRobot) -> Iterator[_CheckedMotor]:
             yield _CheckedMotor(checked, number, joint, path, motor)
 
 
-def _measure_motors(
-    name: str, size: Callable[[_CheckedMotor], float] | None = None, *, unit: str = "", carrying: bool = False
+def _motor_measurements(
+    field: str,
+    magnitude: Callable[[_CheckedMotor], float] | None = None,
+    *,
+    unit: str = "",
+    loaded_only: bool = False,
 ) -> Measure:
     """Return the measure of a field of the motors.
 
     Args:
-        name: name of the field.
-        size: function that returns the size of a motor; by default |value|, NaN if 0 or infinite.
+        field: name of the field.
+        magnitude: function that returns the size of a motor; by default |value|, NaN if 0 or infinite.
         unit: unit of the field; motors with another one are skipped. "" for any unit.
-        carrying: whether to skip motors that do not carry the load.
+        loaded_only: whether to skip motors that do not carry the load.
     """
 
-    def measure(checked: CheckedRobot) -> Iterator[Measured]:
-        for drive in _checked_motors(checked):
-            if unit in ("", drive.unit(name)) and (drive.carries_load or not carrying):
-                value = getattr(drive.motor, name) or math.nan
-                yield drive.measure(name, _nan_if_infinite(abs(value)) if size is None else size(drive))
+    def motor_measurements(checked: CheckedRobot) -> Iterator[Measured]:
+        for motor in _checked_motors(checked):
+            if unit in ("", motor.unit(field)) and (motor.carries_load or not loaded_only):
+                field_value = getattr(motor.motor, field) or math.nan
+                yield motor.measure(
+                    field, _nan_if_infinite(abs(field_value)) if magnitude is None else magnitude(motor)
+                )
 
-    return measure
+    return motor_measurements
 
 
 def _rotor_inertia_share(drive: _CheckedMotor) -> float:
@@ -165,12 +171,12 @@ def _measure_dry_friction(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 GEAR_RULES: tuple[Rule[CheckedRobot], ...] = (
-    Rule("gear ratios", "`gear_ratio`", _measure_motors("gear_ratio", unit="1"),
+    Rule("gear ratios", "`gear_ratio`", _motor_measurements("gear_ratio", unit="1"),
         size="motor turns per joint turn", low=1, high=5000, usual=100,
         reason="several stages reach some thousands",
         finding="is {size} turns of the motor to one of the joint",
         advice="it is the motor's turns over those of the joint, e.g. 100"),
-    Rule("gear ratios of prismatic joints", "`gear_ratio`", _measure_motors("gear_ratio", unit="rad/m"),
+    Rule("gear ratios of prismatic joints", "`gear_ratio`", _motor_measurements("gear_ratio", unit="rad/m"),
         size="rad/m", low=5, high=1e5, usual=600,
         reason="5: a wheel of 0.4 m; 100,000: a screw of 0.06 mm pitch",
         finding="turns the motor by {size} rad for each meter", units=(OtherUnit("rad/mm", 1e3),),
@@ -179,15 +185,16 @@ GEAR_RULES: tuple[Rule[CheckedRobot], ...] = (
 
 MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("light rotors", "`motor.inertia`",
-        _measure_motors(
-            "inertia", lambda m: ratio_or_nan(m.at_joint_side.inertia, m.link_inertia), carrying=True
+        _motor_measurements(
+            "inertia", lambda m: ratio_or_nan(m.at_joint_side.inertia, m.link_inertia), loaded_only=True
         ),
         size="joint-side, over the link's inertia about its joint", low=0.005,
         reason="gears multiply by the ratio squared; direct drives have large rotors",
         finding="is, on the joint's side of the gear, {size} of the inertia of the link about its joint",
         advice="is it the rotor's own? Then give `gear_ratio` and `side: shaft`, or multiply by its square",
         explained_by=GEARS),
-    Rule("heavy rotors", "`motor.inertia`", _measure_motors("inertia", _rotor_inertia_share, carrying=True),
+    Rule("heavy rotors", "`motor.inertia`",
+        _motor_measurements("inertia", _rotor_inertia_share, loaded_only=True),
         size="joint-side, over mass times reach squared (mass)",
         high=100, usual=0.1,
         reason="it would not feel the robot; robots below 0.1 m pass",
@@ -195,18 +202,18 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         units=(OtherUnit("kg cm^2", 1e-4), OtherUnit("g cm^2", 1e-7), OtherUnit("kg mm^2", 1e-6)),
         advice=WHICH_SIDE, explained_by=GEARS),
     Rule("velocities of motors", "`max_velocity`",
-        _measure_motors("max_velocity", _shaft_velocity, carrying=True),
+        _motor_measurements("max_velocity", _shaft_velocity, loaded_only=True),
         size="rad/s, of the motor's shaft", high=2500, usual=400, reason="robots have no faster motors",
         finding="is more than 24,000 turns a minute of the motor", units=ROTARY, in_angles=True),
     Rule("velocities of motors and joints", "`max_velocity`, `limits.velocity`",
-        _measure_motors("max_velocity", _joint_velocity, carrying=True),
+        _motor_measurements("max_velocity", _joint_velocity, loaded_only=True),
         size="joint-side, over the joint's limit", high=8,
         reason="a joint's limit is about what its motor can do",
         finding="lets the joint go {size} times as fast as its `limits.velocity`",
         units=ROTARY, advice="check the units of both", in_angles=True,
         explained_by=(*GEARS, "velocities of motors")),
     Rule("weak motors", "`max_torque`",
-        _measure_motors("max_torque", lambda m: ratio_or_nan(m.torque, m.load), carrying=True),
+        _motor_measurements("max_torque", lambda m: ratio_or_nan(m.torque, m.load), loaded_only=True),
         size="joint-side, over the load of the stretched arm's weight",
         low=0.05, usual=2,
         reason="it could accelerate the arm by only 0.05 g",
@@ -214,7 +221,7 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         advice="is it the motor's own? Then give `gear_ratio` and `side: shaft`, or multiply by it",
         explained_by=GEARS),
     Rule("strong motors", "`max_torque`",
-        _measure_motors("max_torque", lambda m: ratio_or_nan(m.torque, m.scale), carrying=True),
+        _motor_measurements("max_torque", lambda m: ratio_or_nan(m.torque, m.scale), loaded_only=True),
         size="joint-side, over weight times reach",
         high=300, usual=0.5, reason="it would lift 300 such robots",
         finding="is, on the joint's side of the gear, {size} times the weight of the robot at its reach",
@@ -229,7 +236,7 @@ RESISTANCE_RULES: tuple[Rule[CheckedRobot], ...] = (
 )  # fmt: skip
 
 WINDING_RULES: tuple[Rule[CheckedRobot], ...] = (
-    Rule("torque constants", "`torque_constant`", _measure_motors("torque_constant"),
+    Rule("torque constants", "`torque_constant`", _motor_measurements("torque_constant"),
         size="N m/A", low=1e-4, high=30, usual=0.1,
         reason="from the smallest motors, 0.0003, to large direct drives, a few",
         finding="is that of no motor", units=(OtherUnit("mN m/A", 1e-3), OtherUnit("N cm/A", 1e-2)),
@@ -238,7 +245,7 @@ WINDING_RULES: tuple[Rule[CheckedRobot], ...] = (
 
 RULES_OF_MOTORS_AND_SPRINGS: tuple[Rule[CheckedRobot], ...] = (
     Rule("motors compared with springs", "`max_torque`, `spring`",
-        _measure_motors("max_torque", _deflection_of_springs, carrying=True),
+        _motor_measurements("max_torque", _deflection_of_springs, loaded_only=True),
         size="deflection of the springs at rest under this torque, rad (of the reach)",
         low=0.01, reason="bundled robots: 0.03 to 6; the springs would not count",
         finding="deflects the springs of the joint by only {size} rad (of the reach)",
