@@ -11,7 +11,7 @@ from samples.command_line import REPOSITORY
 
 from vsacli import Limits, Motor, laws, load_robot
 from vsacli.dynamics import limits
-from vsacli.results.store.reader import RANGES, SIZES
+from vsacli.results.store.reader import MAGNITUDE_DATASETS, RANGE_DATASETS
 from vsacli.studies.search import fixed_text
 from vsacli.studies.sizing.sizing import KEPT
 from vsacli.trajectory.curves.closed_form import TYPES, ClosedForm
@@ -34,7 +34,7 @@ def test_figures_draw_every_limit() -> None:
     robot = load_robot(REPOSITORY / "robots" / "vsa_3r.yaml")
     robot = robot.replace({f"joints.*.{path}": value for path, value in bounds.items()})
     checked = {check.variable for joint in robot.joints for check in limits.limit_checks(joint)}
-    assert checked == RANGES.keys() | SIZES.keys()
+    assert checked == RANGE_DATASETS.keys() | MAGNITUDE_DATASETS.keys()
 
 
 def test_a_chosen_motor_keeps_every_field_of_motors() -> None:

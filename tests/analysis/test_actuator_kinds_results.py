@@ -234,7 +234,7 @@ def compared_panels(*results: Any) -> list[Any]:
 def test_no_stiffness_panel_for_a_rigid_joint_and_no_corridor_for_an_elastic_one() -> None:
     for figure, first in (
         (plot_stored(drawn())["motion"], 1),
-        (drawn_sheet(feasibility(StoredCharts([drawn()]))), 0),
+        (draw_sheet(feasibility(StoredCharts([drawn()]))), 0),
     ):
         shoulder, elbow = figure.axes[first:]
         assert titles([shoulder, elbow]) == ["shoulder", "elbow"]

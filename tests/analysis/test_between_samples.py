@@ -190,7 +190,7 @@ def test_what_is_found_does_not_depend_on_the_blocks(block_samples: int) -> None
 def test_every_dip_below_the_corridor_is_found_and_its_nearest_step_marked() -> None:
     """The oracle looks at a hundred times from each step to the next."""
     robot, trajectory = three_joints()
-    assert trajectory.samples > SCANNED
+    assert trajectory.samples > SCAN_TIMES
     dense = trajectory.at(np.linspace(0, DURATION, 100 * (trajectory.samples - 1) + 1))
     block = motor_torques(robot, dense)
     gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)

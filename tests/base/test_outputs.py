@@ -209,7 +209,7 @@ def test_the_leavings_of_dead_processes_are_swept_and_no_others(tmp_path: Path) 
     with Outputs() as outputs:
         outputs.file(tmp_path / "a")
     kept = {living, elsewhere, *strange, "a"}
-    if storage._start(os.getpid()) == storage.UNKNOWN_START:
+    if storage._process_start(os.getpid()) == storage.UNKNOWN_START:
         kept.add(used_again)  # a system that does not say when a process began
     assert {path.name for path in tmp_path.iterdir()} == kept
 
@@ -274,7 +274,7 @@ def write_until_ended(path: Path) -> None:
 @pytest.fixture
 def own_signals() -> Iterator[None]:
     """The test may set what signals do."""
-    before = {number: signal.getsignal(number) for number in ENDING}
+    before = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
     yield
     for number, handler in before.items():
         signal.signal(number, handler)

@@ -12,7 +12,7 @@ from samples.figures import rest_to_rest
 
 from vsacli.results.charts.figures import FEASIBILITY_VARIABLES, feasibility
 from vsacli.results.charts.stored import StoredCharts
-from vsacli.results.plots import drawn as drawn_sheet
+from vsacli.results.plots import draw_sheet
 
 PNG = b"\x89PNG\r\n\x1a\n"
 FIGURE = "figures/vsa_3r-soft-feasibility.png"
@@ -119,7 +119,7 @@ def test_upper_end_of_the_corridor_is_drawn():
     above = result.read("stiffness") > upper
     bounded = rest_to_rest(sigma=(850, 1275), stiffness_max=upper, flags=above.astype(np.uint32))
     assert set(FEASIBILITY_VARIABLES) <= set(bounded.variables)
-    for axes in drawn_sheet(feasibility(StoredCharts([bounded]))).axes:
+    for axes in draw_sheet(feasibility(StoredCharts([bounded]))).axes:
         assert any((line.get_ydata() == 1200).all() for line in axes.lines)
         ((start, _),) = shaded(axes)
         assert 2 < start < 4

@@ -45,7 +45,7 @@ def arm(tmp_path):
 def test_each_command_says_so_until_the_key_is_removed(vsacli, arm, words):
     done = vsacli(*words)
     assert done.code == 0, done.err
-    assert f"warning: {OF_PLACEHOLDERS}" in re.sub(r"\s+", " ", done.out + done.err)
+    assert f"warning: {PLACEHOLDER_WARNING}" in re.sub(r"\s+", " ", done.out + done.err)
     write(arm, ARM)
     again = vsacli(*words, *(() if words[0] in ("validate", "info") else ("--overwrite",)))
     assert again.code == 0, again.err
@@ -55,7 +55,7 @@ def test_each_command_says_so_until_the_key_is_removed(vsacli, arm, words):
 @pytest.mark.usefixtures("arm")
 @pytest.mark.parametrize("words", [("invdyn", "arm.yaml", "short.yaml"), ("info", "arm.yaml")])
 def test_data_say_so(vsacli, words):
-    assert json.loads(vsacli(*words, "--json").out)["warnings"] == [OF_PLACEHOLDERS]
+    assert json.loads(vsacli(*words, "--json").out)["warnings"] == [PLACEHOLDER_WARNING]
 
 
 def test_generated_code_says_so(vsacli, arm, tmp_path):
@@ -65,12 +65,12 @@ def test_generated_code_says_so(vsacli, arm, tmp_path):
     assert len(files) == 7
     for path in files:
         text = path.read_text().replace("\\", "")  # with which Markdown says that a letter is only a letter
-        assert OF_PLACEHOLDERS in re.sub(r"\s+(# )?", " ", text)
+        assert PLACEHOLDER_WARNING in re.sub(r"\s+(# )?", " ", text)
 
 
 def test_results_keep_it(vsacli, arm):
     assert vsacli("invdyn", arm, "short.yaml", "-o", "arm.h5").code == 0
-    assert f"warning: {OF_PLACEHOLDERS}" in re.sub(r"\s+", " ", vsacli("info", "arm.h5").out)
+    assert f"warning: {PLACEHOLDER_WARNING}" in re.sub(r"\s+", " ", vsacli("info", "arm.h5").out)
 
 
 @pytest.mark.parametrize("word", ["yes", "1", "True", '"true"', "[true]", "", "null"])
@@ -83,6 +83,6 @@ def test_only_true_and_false_are_read(tmp_path, word):
 def test_a_robot_may_say_that_it_is_none(tmp_path):
     robot = load_robot(write(tmp_path / "arm.yaml", ARM + "placeholder: false\n"))
     assert not robot.placeholder
-    assert robot.replace("placeholder", True).warnings == (OF_PLACEHOLDERS,)
+    assert robot.replace("placeholder", True).warnings == (PLACEHOLDER_WARNING,)
     with pytest.raises(InputError, match="placeholder: expected true or false, found 'perhaps'"):
         robot.replace("placeholder", "perhaps")

@@ -24,7 +24,7 @@ from samples.excited import Excitation, excited
 from samples.marks import needs_compiler
 
 from vsacli import load_robot
-from vsacli.base.interrupts import ENDING
+from vsacli.base.interrupts import ENDING_SIGNALS
 
 pytestmark = needs_compiler
 
@@ -228,7 +228,7 @@ def test_all_is_new_or_nothing(stage: MakeStage, case: tuple[str, str]) -> None:
     for at in sample(there.calls, TRIED, draw):
         check_failure(there, Disturbance(at=at, lasting=draw.random() < 0.5))
     for at in sample(there.calls, TRIED, draw):
-        check_ending(there, Disturbance(at=at, number=draw.choice(ENDING)))
+        check_ending(there, Disturbance(at=at, number=draw.choice(ENDING_SIGNALS)))
     for at in sample(there.calls, TRIED, draw):
         check_kill(there, Disturbance(at=at, number=signal.SIGKILL))
 
@@ -239,7 +239,7 @@ def test_a_moment_at_random(stage: MakeStage) -> None:
     draw = random.Random(0)
     for case in draw.sample(CASES, 2):
         there = stage(*case)
-        check_moment(there, draw.choice(ENDING), draw.random())
+        check_moment(there, draw.choice(ENDING_SIGNALS), draw.random())
 
 
 def check_moment(there: Stage, number: int, moment: float) -> None:

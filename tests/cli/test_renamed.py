@@ -45,7 +45,7 @@ def test_a_result_of_an_older_format_is_refused_and_its_inputs_come_out(vsacli, 
         file.attrs["format"] = "vsacli-result/1"
     outcome = vsacli(*command, "before.h5")
     assert outcome.code == 2
-    formats = f"{file_formats.RESULT} and {file_formats.OF_TREES[file_formats.RESULT]}"
+    formats = f"{file_formats.RESULT} and {file_formats.TREE_FORMATS[file_formats.RESULT]}"
     reads = f"but this version reads {formats}; run invdyn again"
     expected = f"before.h5: has the format vsacli-result/1, {reads}"
     assert expected in outcome.err

@@ -45,9 +45,9 @@ def test_a_new_robot_executes_its_new_trajectory(joints: str, actuator: str, tmp
     robot = robot_of(robot_template(joints, actuator), tmp_path)
     assert "".join(joint.type[0] for joint in robot.joints) == joints.lower()
     assert {joint.actuator_type for joint in robot.joints} == {actuator}
-    assert robot.warnings == (OF_PLACEHOLDERS,)
+    assert robot.warnings == (PLACEHOLDER_WARNING,)
     report = report_of(robot, trajectory_template(robot), tmp_path)
-    assert (report.verdict, report.warnings) == ("ok", (OF_PLACEHOLDERS,))
+    assert (report.verdict, report.warnings) == ("ok", (PLACEHOLDER_WARNING,))
 
 
 def test_a_mechanism_that_turns_drives_no_slide(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from samples.studies import DRAWN, study
 from samples.text_boxes import collisions, shown_texts
 
 from vsacli.cli.main import run
-from vsacli.files.info.robot_info import load_sizes, static_load
+from vsacli.files.info.robot_info import static_load, static_loads
 from vsacli.results.charts.arm_chart import arm_chart
 from vsacli.results.charts.chart import Chart, Line, PanelGrid, Sheet
 from vsacli.results.charts.look import LEGIBLE, STYLES, Look, drawing_with
@@ -33,7 +33,7 @@ from vsacli.results.plots import (
     actuators_figure,
     arm_figure,
     compare_files,
-    drawn,
+    draw_sheet,
     plot_stored,
     ranking_figure,
     recorded_figure,
@@ -41,8 +41,8 @@ from vsacli.results.plots import (
     study_figures,
     torque_speed_figure,
 )
-from vsacli.results.plots.arrangement import arranged
-from vsacli.results.plots.long_texts import broken
+from vsacli.results.plots.arrangement import arrange_blocks
+from vsacli.results.plots.long_texts import wrapped
 from vsacli.results.store.reader import open_stored
 from vsacli.results.store.study_table import StoredStudy
 
@@ -72,7 +72,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @cache
 def charts(name: str) -> list[ActuatorChart]:
     robot = shipped_robot(name)
-    return actuator_charts(robot, load_sizes(static_load(robot)).tolist())
+    return actuator_charts(robot, static_loads(static_load(robot)).tolist())
 
 
 def of_robot(name: str) -> Figures:
@@ -107,8 +107,8 @@ def of_lists() -> Figures:
         "ranking": ranking_figure(Ranking("sensitivity of vsa-3r, rest-to-rest: 8 parameters", bars)),
         "torque-speed": torque_speed_figure([motor(LIMITED)] * 6, "sizing of motors: vsa-3r, rest-to-rest"),
         "recording": recorded_figure([curve("shoulder.q"), curve("elbow.q", above=2.0)], "log"),
-        "optimum": drawn(change_sheet([joint("shoulder", limit=92.0)] * 3, "optimum", along_path=True)),
-        "measured": drawn(measured_sheet([measured] * 6, "comparison of a result with a recording")),
+        "optimum": draw_sheet(change_sheet([joint("shoulder", limit=92.0)] * 3, "optimum", along_path=True)),
+        "measured": draw_sheet(measured_sheet([measured] * 6, "comparison of a result with a recording")),
     }
 
 
@@ -177,15 +177,15 @@ def test_other_widths_are_kept(width: float) -> None:
 
 def test_the_usual_look_leaves_figures_as_declared() -> None:
     sheet = simulated(7)
-    assert arranged(sheet).natural == sheet.size
-    assert drawn(sheet).get_size_inches() == pytest.approx(sheet.size)
+    assert arrange_blocks(sheet).natural == sheet.size
+    assert draw_sheet(sheet).get_size_inches() == pytest.approx(sheet.size)
 
 
 @pytest.mark.slow
 def test_a_font_size_alone_scales_a_figure() -> None:
     sheet = simulated(3)
     with drawing_with(Look(font_size=15.0)):
-        figure = drawn(sheet)
+        figure = draw_sheet(sheet)
     assert figure.get_size_inches() == pytest.approx([1.5 * inches for inches in sheet.size])
     assert smallest(figure) == pytest.approx(1.5 * 9)
 
@@ -219,9 +219,9 @@ def side_by_side(figure: Figure) -> int:
 @pytest.mark.slow
 def test_many_joints_fold_into_as_many_columns_as_fit() -> None:
     sheet = simulated(8)
-    assert side_by_side(drawn(sheet)) == 4
+    assert side_by_side(draw_sheet(sheet)) == 4
     with drawing_with(PAPER):
-        figure = drawn(sheet)
+        figure = draw_sheet(sheet)
     assert side_by_side(figure) == 2
     assert len(figure.axes) == 16
 
@@ -229,7 +229,7 @@ def test_many_joints_fold_into_as_many_columns_as_fit() -> None:
 @pytest.mark.slow
 def test_a_difference_stays_below_its_curves() -> None:
     with drawing_with(replace(PAPER, width=5.0)):
-        figure = drawn(simulated(2, columns=3, rows=2))
+        figure = draw_sheet(simulated(2, columns=3, rows=2))
     assert side_by_side(figure) == 1
     seen = places(figure)
     for at in range(2):
@@ -242,7 +242,7 @@ def test_a_difference_stays_below_its_curves() -> None:
 
 def test_rows_that_are_too_wide_are_divided_after_their_first_panels() -> None:
     with drawing_with(PAPER):
-        seen = places(drawn(simulated(1, columns=3)))
+        seen = places(draw_sheet(simulated(1, columns=3)))
     first, second, third = (seen[f"joint 0, 0, {column}"] for column in range(3))
     assert first[0] == pytest.approx(second[0])
     assert first[1] > second[1]
@@ -253,7 +253,7 @@ def test_rows_that_are_too_wide_are_divided_after_their_first_panels() -> None:
 def test_figures_higher_than_a_page_have_more_panels_side_by_side() -> None:
     sheet = simulated(12, most_rows=12)
     with drawing_with(replace(PAPER, width=18.3)):
-        figure = drawn(sheet)
+        figure = draw_sheet(sheet)
     assert side_by_side(figure) == 4
     assert figure.get_figheight() * CM < 24
 
@@ -261,7 +261,7 @@ def test_figures_higher_than_a_page_have_more_panels_side_by_side() -> None:
 @pytest.mark.slow
 def test_a_slide_has_the_arrangement_with_the_largest_font() -> None:
     with drawing_with(SLIDE):
-        figure = drawn(simulated(7))
+        figure = draw_sheet(simulated(7))
     assert side_by_side(figure) == 4
     assert smallest(figure) > 7
 
@@ -280,7 +280,7 @@ def test_a_slide_has_the_arrangement_with_the_largest_font() -> None:
 def test_texts_break_between_clauses_and_keep_values_with_units(
     text: str, length: int, lines: list[str]
 ) -> None:
-    assert broken(text, length).split("\n") == lines
+    assert wrapped(text, length).split("\n") == lines
 
 
 def test_a_distant_limit_is_written_where_no_curve_is() -> None:

@@ -6,14 +6,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from vsacli.results.charts.measured import MeasuredCurve, measured_sheet
-from vsacli.results.plots import drawn
+from vsacli.results.plots import draw_sheet
 
 TIME = np.linspace(0.0, 1.0, 50)
 
 
 def figure(*computed: str) -> Figure:
     curve = MeasuredCurve("elbow.q", "rad", 0.1, TIME, np.sin(TIME), np.sin(TIME) + 0.1)
-    return drawn(measured_sheet([curve], "fit", *computed))
+    return draw_sheet(measured_sheet([curve], "fit", *computed))
 
 
 def test_every_curve_is_in_the_legend() -> None:

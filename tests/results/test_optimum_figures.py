@@ -20,7 +20,9 @@ def texts(figure):
 
 
 def test_a_joint_without_stiffness_has_torques_alone():
-    figure = drawn(change_sheet([joint("soft", limit=92.0), joint("stiff", np.nan)], "arm", along_path=True))
+    figure = draw_sheet(
+        change_sheet([joint("soft", limit=92.0), joint("stiff", np.nan)], "arm", along_path=True)
+    )
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     motors = [f"{name}, motor {motor}" for name in ("soft", "stiff") for motor in (1, 2)]
     assert titles == ["soft", *motors]
@@ -30,14 +32,14 @@ def test_a_joint_without_stiffness_has_torques_alone():
 
 
 def test_without_any_stiffness_there_are_torques_alone():
-    figure = drawn(change_sheet([joint("stiff", np.nan)], "arm", along_path=False))
+    figure = draw_sheet(change_sheet([joint("stiff", np.nan)], "arm", along_path=False))
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["stiff, motor 1", "stiff, motor 2"]
     assert figure.axes[0].get_xlabel() == "time [s]"
 
 
 def test_each_motor_has_a_panel_with_its_torque_before_and_after():
     """Curves of both motors in one panel would have the same look."""
-    figure = drawn(change_sheet([joint("soft")], "arm", along_path=False))
+    figure = draw_sheet(change_sheet([joint("soft")], "arm", along_path=False))
     for axes, sign in zip(figure.axes[1:], (1, -1), strict=True):
         before, after = axes.lines
         assert before.get_linestyle() != after.get_linestyle()
@@ -51,7 +53,7 @@ def test_a_joint_with_one_motor_has_one_panel_of_torques():
         before=one.before._replace(torques=one.before.torques[:1]),
         after=one.after._replace(torques=one.after.torques[:1]),
     )
-    figure = drawn(change_sheet([joint("soft"), single], "arm", along_path=False))
+    figure = draw_sheet(change_sheet([joint("soft"), single], "arm", along_path=False))
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert titles == ["soft", "soft, motor 1", "soft, motor 2", "stiff, motor 1"]
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from samples.figures import rest_to_rest
 
 from vsacli.results.charts.reduction import (
-    BLOCK,
+    BLOCK_SAMPLES,
     COLUMNS,
     FULL_DETAIL,
     column_starts,
@@ -85,9 +85,9 @@ def test_short_runs_are_drawn_sample_by_sample() -> None:
 
 
 def test_long_runs_are_read_in_blocks_and_reduced() -> None:
-    result = rest_to_rest(3 * BLOCK)
-    result.read("tau_motor")[2 * BLOCK, 1, 0] = 1e6
-    result.read("tau_motor")[BLOCK - 2 : BLOCK + 2, 2] = NAN
+    result = rest_to_rest(3 * BLOCK_SAMPLES)
+    result.read("tau_motor")[2 * BLOCK_SAMPLES, 1, 0] = 1e6
+    result.read("tau_motor")[BLOCK_SAMPLES - 2 : BLOCK_SAMPLES + 2, 2] = NAN
     longest = 0
 
     def reading(name: str, start: int = 0, stop: int | None = None, read=result.read) -> np.ndarray:
@@ -97,11 +97,13 @@ def test_long_runs_are_read_in_blocks_and_reduced() -> None:
 
     result.read = reading
     drawn = read_curves(result, ["tau_motor"])
-    assert longest < 1.1 * BLOCK  # a block ends with a column, here 164 samples
+    assert longest < 1.1 * BLOCK_SAMPLES  # a block ends with a column, here 164 samples
     assert all(np.all(np.diff(joint.time) > 0) for joint in drawn)
     assert all(joint.time.size <= 10 * COLUMNS for joint in drawn)
     assert drawn[1].values[0].max() == 1e6
-    gap = (drawn[2].time >= result.time[BLOCK - 2]) & (drawn[2].time <= result.time[BLOCK + 1])
+    gap = (drawn[2].time >= result.time[BLOCK_SAMPLES - 2]) & (
+        drawn[2].time <= result.time[BLOCK_SAMPLES + 1]
+    )
     assert np.isnan(drawn[2].values[:, gap]).all()
     assert gap.any()
 

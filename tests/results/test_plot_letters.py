@@ -50,7 +50,9 @@ def test_letters_of_an_installed_font_are_drawn_with_it(installed: list[FontEntr
 
 def test_a_font_that_cannot_be_read_has_no_letters(tmp_path: Path, installed: list[FontEntry]) -> None:
     (tmp_path / "broken.ttf").write_bytes(b"no font")
-    installed.append(FontEntry(fname=str(tmp_path / "broken.ttf"), name="Broken", weight=letters.REGULAR))
+    installed.append(
+        FontEntry(fname=str(tmp_path / "broken.ttf"), name="Broken", weight=letters.REGULAR_WEIGHT)
+    )
     assert title("机") == r"\u673a"
 
 

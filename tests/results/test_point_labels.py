@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from vsacli.results.plots.point_labels import BELOW, label_points
+from vsacli.results.plots.point_labels import SIDES_BELOW_LINE, label_points
 from vsacli.results.plots.styles import house_style
 
 
@@ -55,7 +55,7 @@ def test_the_most_important_labels_remain_where_there_is_no_space() -> None:
 
 
 def test_labels_below_a_line_are_right_of_its_points() -> None:
-    assert labeled([(0.2, 0.3), (0.6, 0.5)], ["run 1", "run 2"], sides=BELOW) == ["run 1", "run 2"]
+    assert labeled([(0.2, 0.3), (0.6, 0.5)], ["run 1", "run 2"], sides=SIDES_BELOW_LINE) == ["run 1", "run 2"]
 
 
 def test_labels_cover_no_other_points() -> None:

@@ -32,7 +32,7 @@ bundled = pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 
 
 def charts(robot: Robot) -> list[ActuatorChart]:
-    return actuator_charts(robot, load_sizes(static_load(robot)).tolist())
+    return actuator_charts(robot, static_loads(static_load(robot)).tolist())
 
 
 @cache
@@ -128,7 +128,7 @@ def test_joints_with_other_limits_of_the_same_springs_are_drawn_apart() -> None:
 @pytest.mark.parametrize("name", ["maccepa_1r", "vsa_3r", "tendon_1r"])
 def test_motors_that_hold_no_spring_leave_a_figure_beyond_limits(name: str) -> None:
     weak = charts(shipped_robot(name).replace("joints.*.actuator.motor.*.max_torque", 1e-9))
-    assert not weak[0].stiffness.within.any()
+    assert not weak[0].stiffness.within_limits.any()
     for figure in (actuators_figure(weak, "weak"), stiffness_figure(weak, "weak")):
         figure.draw_without_rendering()
 

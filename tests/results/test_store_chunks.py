@@ -212,10 +212,10 @@ def test_what_waits_is_bounded(behind: NewFile) -> None:
         return lambda: (go.wait(), done.append(number))
 
     for number in range(5):
-        behind.do(task(number), 2)
+        behind.schedule_write(task(number), 2)
     timer = threading.Timer(0.05, lambda: (done.append("go"), go.set()))
     timer.start()
-    behind.do(task(5), 2)
+    behind.schedule_write(task(5), 2)
     assert done[:2] == ["go", 0]
     behind.wait()
     assert done == ["go", 0, 1, 2, 3, 4, 5]
@@ -223,7 +223,7 @@ def test_what_waits_is_bounded(behind: NewFile) -> None:
 
 def test_what_goes_wrong_in_the_thread_is_raised_once_by_the_caller(behind: NewFile) -> None:
     done = []
-    behind.do(lambda: 1 / 0, 5)
-    behind.do(lambda: done.append(1), 5)
+    behind.schedule_write(lambda: 1 / 0, 5)
+    behind.schedule_write(lambda: done.append(1), 5)
     with pytest.raises(ZeroDivisionError):
         behind.wait()

@@ -20,7 +20,7 @@ from samples.results import PlannedTrajectory, random_block, robot, writing
 
 from vsacli.results.store import new_file
 
-new_file.BEHIND_FROM = 2**20
+new_file.DIRECT_BYTES = 2**20
 block = random_block(2000, 2)
 with writing("r.h5", robot(), PlannedTrajectory(10**7), overwrite=True) as writer:
     while threading.active_count() == 1:
@@ -39,7 +39,7 @@ from vsacli.base.interrupts import interrupts_deferred
 from vsacli.results.store import new_file
 
 block = random_block(20_000, 2)
-limit, new_file.BEHIND_FROM = map(int, sys.argv[1:])
+limit, new_file.DIRECT_BYTES = map(int, sys.argv[1:])
 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 try:
     write_result("r.h5", block, step=5000, overwrite=True)

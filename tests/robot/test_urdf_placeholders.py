@@ -86,7 +86,7 @@ def test_the_desk_arm_of_any_weight_can_move(tmp_path, actuator, size):
     arm = import_urdf(path, tip="flange", placeholders=Placeholders(actuator)).robot
     motion = write(tmp_path / "move.yaml", trajectory_template(arm).replace("rate: 1000", "rate: 50  "))
     report = inverse_dynamics(arm, load_trajectory(motion, arm)).report
-    assert (report.verdict, report.warnings[0]) == ("ok", OF_PLACEHOLDERS)
+    assert (report.verdict, report.warnings[0]) == ("ok", PLACEHOLDER_WARNING)
 
 
 def test_what_is_given_is_not_sized():
@@ -109,7 +109,7 @@ def test_a_robot_without_masses_is_told_in_one_line(tmp_path):
         *(link(name, "") for name in "abc"), joint("one", "a", "b"), joint("two", "b", "c", rpy="1 0 0")
     )
     conversion = import_urdf(write(tmp_path / "arm.urdf", text))
-    assert conversion.robot.warnings == (OF_PLACEHOLDERS, WITHOUT_MASSES)
+    assert conversion.robot.warnings == (PLACEHOLDER_WARNING, WITHOUT_MASSES)
     actuator = conversion.robot.joints[0].actuator
     assert (actuator.motor[0].inertia, actuator.spring[0].k) == (UNLOADED.motor_inertia, UNLOADED.spring[0])
     some = import_urdf(

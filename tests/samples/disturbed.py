@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from samples.command_line import COMMAND
-from vsacli.base.interrupts import ENDING
+from vsacli.base.interrupts import ENDING_SIGNALS
 
 PATIENCE = 60
 """Seconds until a run that should have ended counts as broken."""
@@ -247,5 +247,5 @@ class Disturber:
 
 def allow_interrupts() -> None:
     """In a child process: undo that a parent may ignore signals, as shells do for background jobs."""
-    for number in ENDING:
+    for number in ENDING_SIGNALS:
         signal.signal(number, signal.SIG_DFL)

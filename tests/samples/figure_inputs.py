@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from vsacli.results.charts.measured import AmplitudeSpectrum, Highest, RecordedCurve
-from vsacli.results.charts.optimum import Moved, OptimizedJoint
+from vsacli.results.charts.measured import AmplitudeSpectrum, HighestDerivative, RecordedCurve
+from vsacli.results.charts.optimum import JointMotion, OptimizedJoint
 from vsacli.results.charts.reduction import Curve
 from vsacli.results.plots import MotorLimits, TorqueSpeed
 
@@ -42,14 +42,14 @@ def curve(
         noise=1e-4,
         inside=(0.5, 9.0),
         spectrum=AmplitudeSpectrum(FREQUENCIES, motion + 1e-5, motion, 1e-5, cutoff, above),
-        highest=Highest("d4q", "rad/s^4", 4, 0.0123 if rms else np.nan),
+        highest=HighestDerivative("d4q", "rad/s^4", 4, 0.0123 if rms else np.nan),
     )
 
 
-def moved(stiffness: float) -> Moved:
+def moved(stiffness: float) -> JointMotion:
     """A motion with constant stiffness and torques."""
     rows = np.full_like(PLACE, stiffness)
-    return Moved(PLACE, rows, 0.5 * rows, 2 * rows, np.stack([rows / 10, -rows / 10]))
+    return JointMotion(PLACE, rows, 0.5 * rows, 2 * rows, np.stack([rows / 10, -rows / 10]))
 
 
 def joint(name: str, stiffness: float = 900.0, limit: float = np.inf) -> OptimizedJoint:

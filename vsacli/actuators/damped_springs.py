@@ -27,7 +27,7 @@ from vsacli.actuators.elasticity import Components, ElasticState, MotorMatrix
 from vsacli.actuators.reach import Reach, classify_stiffness
 from vsacli.actuators.transmission import Command, InternalMotion, JointVariables
 from vsacli.base.arrays import BoolArray, FloatArray
-from vsacli.base.flags import SINGULAR_MARGIN, Flag, marked
+from vsacli.base.flags import SINGULAR_MARGIN, Flag, flags_where
 from vsacli.base.signals import DAMPING, STIFFNESS
 from vsacli.base.variables import VARIABLES
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from vsacli.actuators.laws.law import PairSolution
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import LIMITS, MIN_MARGIN, SINGULAR_MARGIN, Flag, marked
+from vsacli.base.flags import LIMITS, MIN_MARGIN, SINGULAR_MARGIN, Flag, flags_where
 from vsacli.base.variables import VARIABLES, deviation
 from vsacli.compute.vector import Scalar
 

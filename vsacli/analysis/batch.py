@@ -89,12 +89,12 @@ class Batch:
     ) -> None:
         check_min_margin(min_margin)
         self.variants, self.trajectories = variants, _adapt_trajectories(variants.robots, trajectories)
-        robot, trajectory, self._samples = variants.robots[0], self.trajectories[0], 0
-        self._of_variant = trajectory.samples
+        robot, trajectory, self._sample_count = variants.robots[0], self.trajectories[0], 0
+        self._samples_per_run = trajectory.samples
         self._stop_on_infeasible = stop_on_infeasible
         self._min_margin = min_margin
-        usual = usual_block(len(robot.joints)) if block_samples is None else block_samples
-        self._block_samples = usual if len(variants) == 1 else trajectory.samples
+        samples_per_block = usual_block(len(robot.joints)) if block_samples is None else block_samples
+        self._block_samples = samples_per_block if len(variants) == 1 else trajectory.samples
         self._dynamics = RunDynamics(
             variants,
             self.trajectories,
@@ -104,42 +104,46 @@ class Batch:
         )
         # where memory limits the blocks of a long chain, only one is computed at a time
         is_long = usual_block(len(robot.joints)) < usual_block(1)
-        self._ahead = trajectory.samples > self._block_samples and not is_long
-        busy = int(self._ahead)  # one thread updates the summaries while the others compute
+        self._computes_ahead = trajectory.samples > self._block_samples and not is_long
+        summary_threads = int(
+            self._computes_ahead
+        )  # one thread updates the summaries while the others compute
         samples = kernel_samples or trajectory.samples * len(variants)
         self.choice = choose_engine(engine, self._dynamics.kernel, samples, threads, tell, busy=busy)
         self._dynamics.engine = self.choice.engine
         self._uncertainty = _prepare_uncertainty(robot, trajectory, asked, self.choice.engine)
         self._minima_search = MinimaSearch(self._dynamics, min_margin, self._uncertainty)
-        self._check = RunCheck(self._dynamics)
+        self._run_check = RunCheck(self._dynamics)
         self._summaries = [
-            [JointSummary(joint, index) for index, joint in enumerate(each.joints)]
-            for each in variants.robots
+            [JointSummary(joint, index) for index, joint in enumerate(robot_of_variant.joints)]
+            for robot_of_variant in variants.robots
         ]
-        self._passages = [FrictionPassages(each) for each in variants.robots]
+        self._friction_passages = [FrictionPassages(robot_of_variant) for robot_of_variant in variants.robots]
         self._drifts = _drift_summaries(robot, self._dynamics.deflections)
         self._energy = RunEnergy(variants, self.choice.engine)
-        self._tools = [_prepare_tools(each, trajectory, asked) for each in variants.robots]
+        self._tool_stiffness = [
+            _prepare_tools(robot_of_variant, trajectory, asked) for robot_of_variant in variants.robots
+        ]
         self._stopped = False
 
     def __iter__(self) -> Iterator[Block]:
         """Yield the blocks in time order; each is released before the next is computed."""
-        waiting: deque[Block] = deque()
+        pending: deque[Block] = deque()
         # Blocks wait until the samples after them are known: a minimum between two blocks may set a flag.
-        for block in self._computed():
+        for block in self._computed_blocks():
             self._minima_search.search_around(block)
-            waiting.append(block)
+            pending.append(block)
             del block  # else this name would keep the block alive while the next is computed
-            while waiting and self._minima_search.is_complete_for(len(waiting[0].time)) and not self._stopped:
-                yield self._finish(waiting.popleft())
+            while pending and self._minima_search.is_complete_for(len(pending[0].time)) and not self._stopped:
+                yield self._finish(pending.popleft())
             if self._stopped:
                 return
 
-    def _computed(self) -> Iterator[Block]:
+    def _computed_blocks(self) -> Iterator[Block]:
         """Return an iterator of computed blocks; with several threads, blocks are computed ahead."""
-        starts = range(0, self._of_variant, self._block_samples)
-        motions = (self._dynamics.motion(start, start + self._block_samples) for start in starts)
-        if self.choice.threads == 1 or not self._ahead:
+        block_starts = range(0, self._samples_per_run, self._block_samples)
+        motions = (self._dynamics.motion(start, start + self._block_samples) for start in block_starts)
+        if self.choice.threads == 1 or not self._computes_ahead:
             return map(self._dynamics.compute, motions)
         from vsacli.base.background import ahead
 
@@ -155,29 +159,40 @@ class Batch:
             block = self._uncertainty.add(block)
             _mark_minima(between, block)  # again, since the samples themselves may keep limits within it
         block = self._with_tools(block)
-        self._check.add(block)
-        for variant, part in enumerate(block.divided(len(self.variants))):
-            self._summarize(variant, part, [each.where(each.variant == variant) for each in between])
-        self._samples += len(block.time) // len(self.variants)
-        stored = {name: array for name, array in block.arrays().items() if name not in BALANCES}
-        return Block(**stored, motor_energy=self._energy.add(block))
+        self._run_check.add(block)
+        for variant, variant_block in enumerate(block.divided(len(self.variants))):
+            self._summarize(
+                variant, variant_block, [minima.where(minima.variant == variant) for minima in between]
+            )
+        self._sample_count += len(block.time) // len(self.variants)
+        arrays = {name: array for name, array in block.arrays().items() if name not in BALANCES}
+        return Block(**arrays, motor_energy=self._energy.add(block))
 
     def _with_tools(self, block: Block) -> Block:
         """Return a block with the variables of the tools, if they are computed."""
-        computed = [tools for tools in self._tools if tools is not None]  # of all variants, or of none
-        if not computed:
+        tool_stiffnesses = [
+            tools for tools in self._tool_stiffness if tools is not None
+        ]  # of all variants, or of none
+        if not tool_stiffnesses:
             return block
-        parts = zip(computed, block.divided(len(computed)), strict=True)
-        added = [tools.add(part) for tools, part in parts]
-        return block.replaced(**{name: np.concatenate([each[name] for each in added]) for name in added[0]})
+        parts = zip(tool_stiffnesses, block.divided(len(tool_stiffnesses)), strict=True)
+        tool_variables = [tools.add(part) for tools, part in parts]
+        return block.replaced(
+            **{
+                name: np.concatenate([variables[name] for variables in tool_variables])
+                for name in tool_variables[0]
+            }
+        )
 
-    def _until_infeasible(self, block: Block, between: list[Minima]) -> tuple[Block, list[Minima]]:
+    def _until_infeasible(self, block: Block, minima_between: list[Minima]) -> tuple[Block, list[Minima]]:
         """Return a block up to its first infeasible sample, with the minima of these samples."""
         infeasible = has_flag(block.flags, Flag.INFEASIBLE).any(axis=1)
         if not infeasible.any():
-            return block, between
-        self._stopped, last = True, int(infeasible.argmax())
-        return block.taken(slice(last + 1)), [minima.where(minima.step <= last) for minima in between]
+            return block, minima_between
+        self._stopped, last_sample = True, int(infeasible.argmax())
+        return block.taken(slice(last_sample + 1)), [
+            minima.where(minima.step <= last_sample) for minima in minima_between
+        ]
 
     def _summarize(self, variant: int, block: Block, between: Sequence[Minima]) -> None:
         """Merge a block of a variant and the minima between its samples into its report."""
@@ -186,7 +201,7 @@ class Batch:
             self._minima_search.add(minima, variant)
             for index in set(minima.joint.tolist()):
                 summaries[index].add_bounded(minima.of_joint(index), between=True)
-        self._passages[variant].add(block)
+        self._friction_passages[variant].add(block)
         for summary in summaries:
             summary.add(block)
         for drift in self._drifts:
@@ -204,30 +219,30 @@ class Batch:
 
     @cached_property
     def _self_checks(self) -> list[SelfCheck]:
-        return self._check.outcomes()
+        return self._run_check.outcomes()
 
     def findings(self, variant: int = 0) -> Report:
         """Return the report on the run of a variant without the warnings and notes, which take longer.
 
         It has the self-check of the whole run.
         """
-        trajectory, complete = self.trajectories[variant], self._samples == self._of_variant
+        trajectory, complete = self.trajectories[variant], self._sample_count == self._samples_per_run
         minima_reports = self._minima_search.reports(variant)
         joint_parts = zip(self._energy.report(variant), minima_reports, self._uncertainties, strict=True)
         return Report(
             robot=self.variants.robots[variant].name,
             trajectory=trajectory.name,
-            samples=self._samples,
+            samples=self._sample_count,
             duration=trajectory.duration,
             complete=complete,
             self_check=self._self_checks[variant],
             joints=tuple(
-                summary.report(*of_joint, complete=complete)
-                for summary, of_joint in zip(self._summaries[variant], joint_parts, strict=True)
+                summary.report(*parts, complete=complete)
+                for summary, parts in zip(self._summaries[variant], joint_parts, strict=True)
             ),
             drifts=tuple(drift.report() for drift in self._drifts),
             fits=trajectory.fits,
-            tools=() if (tools := self._tools[variant]) is None else tools.reports(),
+            tools=() if (tools := self._tool_stiffness[variant]) is None else tools.reports(),
         )
 
     @property
@@ -241,8 +256,8 @@ def is_alone(robot: Robot, trajectory: Trajectory) -> bool:
     Its signals were recorded, or it has a state that is integrated over time: the deviations of 401 samples,
     or the integration, take more than half the time of the run.
     """
-    damped = any(joint.damper_at("transmission") for joint in robot.joints)
-    return bool(trajectory.estimates) or damped
+    has_damped_transmission = any(joint.damper_at("transmission") for joint in robot.joints)
+    return bool(trajectory.estimates) or has_damped_transmission
 
 
 def _adapt_trajectories(robots: Sequence[Robot], trajectories: Sequence[Trajectory]) -> list[Trajectory]:

@@ -46,8 +46,10 @@ class DifferenceErrors:
 
     def __init__(self, steps: FloatArray, bound: float, noise_gain: float) -> None:
         self._steps, self._bound, self._noise_gain = steps, bound, noise_gain
-        self._open: tuple[AnyArray, ...] = ()  # of the times not judged yet, and of the neighbors before them
-        self._judged = 0  # number of times judged
+        self._pending: tuple[
+            AnyArray, ...
+        ] = ()  # of the times not judged yet, and of the neighbors before them
+        self._settled_count = 0  # number of times judged
         self._errors_and_bounds: list[tuple[FloatArray, ...]] = []
         self._peak: FloatArray | float = 0.0
 
@@ -69,78 +71,80 @@ class DifferenceErrors:
             grain: Smallest noise of the values, (scales, times, variants, joints, motors).
         """
         difference, *noise = (
-            _combined(weights, each)
-            for weights, each in (
+            _weighted_sum(weights, array)
+            for weights, array in (
                 (WEIGHTS, values),
                 (SIXTH_DIFFERENCE, values),
                 (SIXTH_DIFFERENCE, derivatives),
             )
         )
         is_compared = np.broadcast_to(compared[..., None], difference.shape)
-        of_value, of_derivative = (np.where(is_compared, np.abs(each), 0.0) for each in noise)
-        middle = derivatives[:, MIDDLE]
+        value_noise, derivative_noise = (np.where(is_compared, np.abs(array), 0.0) for array in noise)
+        middle_derivatives = derivatives[:, MIDDLE]
         terms: tuple[AnyArray, ...] = (
             difference,
-            middle,
-            np.maximum(of_value, grain),
-            of_derivative,
+            middle_derivatives,
+            np.maximum(value_noise, grain),
+            derivative_noise,
             is_compared,
         )
-        if self._open:
-            terms = tuple(np.concatenate(pair, axis=1) for pair in zip(self._open, terms, strict=True))
-        self._open = terms
+        if self._pending:
+            terms = tuple(np.concatenate(pair, axis=1) for pair in zip(self._pending, terms, strict=True))
+        self._pending = terms
         valid: BoolArray = np.any(is_compared, axis=0)
         self._peak = np.maximum(self._peak, np.max(size, axis=0, where=valid, initial=0.0))
-        self._judge(self._first_open + terms[0].shape[1] - NEIGHBORS)
+        self._settle_errors(self._first_pending + terms[0].shape[1] - NEIGHBORS)
 
     @property
-    def _first_open(self) -> int:
-        """Index of the first time in `_open`."""
-        return max(self._judged - NEIGHBORS, 0)
+    def _first_pending(self) -> int:
+        """Index of the first time in `_pending`."""
+        return max(self._settled_count - NEIGHBORS, 0)
 
-    def _judge(self, end: int) -> None:
+    def _settle_errors(self, end: int) -> None:
         """Find the errors of the times before `end`, and drop what no later time needs.
 
         The step with the least sum of error and noise decides: noise grows as steps shrink, and a wrong
         derivative is wrong at each step.
         """
-        if end <= self._judged:
+        if end <= self._settled_count:
             return
-        begin = self._first_open
-        now = slice(self._judged - begin, end - begin)
-        difference, derivative, *noise, is_compared = self._open
-        steps = self._steps[:, self._judged : end, :, None, None]
-        of_value, of_derivative = (_largest_near(each)[:, now] for each in noise)
-        admitted = self._noise_gain * (of_value / steps + of_derivative)
-        error = np.abs(difference[:, now] / steps - derivative[:, now])
-        best = np.argmin(np.where(is_compared[:, now], error + admitted, np.inf), axis=0)[None]
-        valid = is_compared[:, now].any(axis=0)
-        at_best = (np.take_along_axis(each, best, axis=0)[0] for each in (error, admitted))
-        self._errors_and_bounds.append(tuple(np.where(valid, each, 0.0) for each in at_best))
-        self._judged = end
-        self._open = tuple(each[:, self._first_open - begin :].copy() for each in self._open)
+        begin = self._first_pending
+        judged_slice = slice(self._settled_count - begin, end - begin)
+        difference, derivative, *noise, is_compared = self._pending
+        steps = self._steps[:, self._settled_count : end, :, None, None]
+        value_noise, derivative_noise = (_largest_of_neighbors(array)[:, judged_slice] for array in noise)
+        tolerated_noise = self._noise_gain * (value_noise / steps + derivative_noise)
+        error = np.abs(difference[:, judged_slice] / steps - derivative[:, judged_slice])
+        best_scale = np.argmin(
+            np.where(is_compared[:, judged_slice], error + tolerated_noise, np.inf), axis=0
+        )[None]
+        valid = is_compared[:, judged_slice].any(axis=0)
+        best_errors = (np.take_along_axis(array, best_scale, axis=0)[0] for array in (error, tolerated_noise))
+        self._errors_and_bounds.append(tuple(np.where(valid, array, 0.0) for array in best_errors))
+        self._settled_count = end
+        self._pending = tuple(array[:, self._first_pending - begin :].copy() for array in self._pending)
 
     def relative(self) -> tuple[FloatArray, FloatArray]:
         """Return the error nearest to its bound of any joint, and that bound, (times, variants) each."""
-        self._judge(self._steps.shape[1])
-        error, admitted = map(np.concatenate, zip(*self._errors_and_bounds, strict=True))
+        self._settle_errors(self._steps.shape[1])
+        error, tolerated_noise = map(np.concatenate, zip(*self._errors_and_bounds, strict=True))
         scale = np.maximum(self._peak, SMALL_JOINT * np.max(self._peak, axis=(-2, -1), keepdims=True))
         error, bound = (
-            np.divide(each, scale, out=np.zeros_like(each), where=scale != 0).reshape(*each.shape[:2], -1)
-            for each in (error, admitted)
+            np.divide(array, scale, out=np.zeros_like(array), where=scale != 0).reshape(*array.shape[:2], -1)
+            for array in (error, tolerated_noise)
         )
         worst = np.argmax(error / np.maximum(bound, self._bound), axis=2)[..., None]
-        error, bound = (np.take_along_axis(each, worst, axis=2)[..., 0] for each in (error, bound))
+        error, bound = (np.take_along_axis(array, worst, axis=2)[..., 0] for array in (error, bound))
         return error, bound
 
 
-def _combined(weights: FloatArray, values: FloatArray) -> FloatArray:
+def _weighted_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
     """Return a weighted sum over the offsets of values (scales, offsets, ...)."""
     scales, offsets, *rest = values.shape
     return (weights @ values.reshape(scales, offsets, -1)).reshape(scales, *rest)
 
 
-def _largest_near(noise: FloatArray) -> FloatArray:
+def _largest_of_neighbors(noise: FloatArray) -> FloatArray:
     """Return the largest of each time (axis 1) and its neighbors."""
     largest = noise.copy()
     for shift in range(1, min(NEIGHBORS + 1, noise.shape[1])):

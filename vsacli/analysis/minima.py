@@ -23,7 +23,7 @@ from vsacli.dynamics.limits import MARGIN, Finding, limit_checks
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 
-REACH = Flag.INFEASIBLE | Flag.SLACK | Flag.SINGULAR | Flag.NEAR_SINGULAR | Flag.NOT_FINITE
+STIFFNESS_FLAGS = Flag.INFEASIBLE | Flag.SLACK | Flag.SINGULAR | Flag.NEAR_SINGULAR | Flag.NOT_FINITE
 """Bits that concern a stiffness in its attainable range."""
 
 
@@ -43,7 +43,7 @@ class Bounded(NamedTuple):
     @property
     def bits(self) -> Flag:
         """Bits that a sample may have for this quantity."""
-        return REACH if self.limit is None else self.limit.flag
+        return STIFFNESS_FLAGS if self.limit is None else self.limit.flag
 
     def clearance(self, of_joint: VariablesOfJoint) -> FloatArray:
         """Return the relative distance to the nearer bound, (samples,), negative beyond it.
@@ -53,8 +53,8 @@ class Bounded(NamedTuple):
         """
         if self.limit is not None:
             return np.fmin(self.limit.clearance(of_joint), np.inf)  # fmin replaces NaN by inf
-        gap = margin(of_joint["stiffness"], of_joint["stiffness_min"], of_joint["stiffness_max"])
-        return np.fmax(gap, -np.inf)
+        margins = margin(of_joint["stiffness"], of_joint["stiffness_min"], of_joint["stiffness_max"])
+        return np.fmax(margins, -np.inf)
 
     def sides(self, min_margin: float) -> Iterator[Side]:
         """Yield each side with a bound; margins below `min_margin` are flagged."""
@@ -72,18 +72,18 @@ class Bounded(NamedTuple):
             return self.clearance(of_joint)
         return np.fmin(sign * self.limit.values(of_joint), np.inf)
 
-    def at(self, block: Block, step: int, *, between: bool = False) -> Finding:
+    def at(self, block: Block, sample: int, *, between: bool = False) -> Finding:
         """Return the value and the nearer bound at a sample of a block, or at an instant between samples."""
         of_joint, limit = block.of_joint(self.joint_index), self.limit
         if limit is None:
             kind, motor, unit = MARGIN, None, units.STIFFNESS.unit(self.joint.type)
             values = of_joint["stiffness"]
-            ends = of_joint["stiffness_min"][step], of_joint["stiffness_max"][step]
+            bounds = of_joint["stiffness_min"][sample], of_joint["stiffness_max"][sample]
         else:
             kind, motor, unit = limit.flag.label, limit.motor, limit.unit(self.joint.type)
-            values, ends = limit.values(of_joint), limit.range
-        value, time = float(values[step]), float(block.time[step])
-        bound = nearer_end(value, *map(float, ends))
+            values, bounds = limit.values(of_joint), limit.range
+        value, time = float(values[sample]), float(block.time[sample])
+        bound = nearer_end(value, *map(float, bounds))
         return Finding(kind, time, value, bound, unit, motor, self.joint.name, between)
 
 
@@ -92,7 +92,7 @@ Side: TypeAlias = tuple[float, float, float, float, float, float]
 from it that is a clearance of 1, and distances below it beyond which flags are set, the gravest first."""
 
 
-DECISIVE = 2
+DECISIVE_FLAGS = 2
 """Number of these flags on which the verdict depends; the last, of a near-singular sample, is a warning."""
 
 
@@ -116,10 +116,14 @@ class Sides:
     """
 
     def __init__(self, quantities: Sequence[list[Bounded]], min_margin: float) -> None:
-        in_turn = enumerate(each for of_variant in quantities for each in of_variant)
-        sides = [(number, side) for number, each in in_turn for side in each.sides(min_margin)]
+        numbered = enumerate(quantity for variant_quantities in quantities for quantity in variant_quantities)
+        sides = [
+            (quantity_index, side)
+            for quantity_index, quantity in numbered
+            for side in quantity.sides(min_margin)
+        ]
         self._quantities, self.count = quantities[0], len(sides) // len(quantities)
-        self.quantity = np.array([number for number, _ in sides], dtype=np.intp)
+        self.quantity = np.array([quantity_index for quantity_index, _ in sides], dtype=np.intp)
         table = np.array([side for _, side in sides]).reshape(-1, 6)
         self._sign, self._bound, self.size = table[:, :3].T
         self._tolerances = table[:, 3:]
@@ -127,10 +131,16 @@ class Sides:
 
     def values(self, block: Block) -> FloatArray:
         """Return the values of all sides of a single variant, (sides, samples), or of each sample's own."""
-        of_joints = {each.joint_index: block.of_joint(each.joint_index) for each in self._quantities}
-        quantities = (self._quantities[number] for number in self.quantity[: self.count])
-        signed = zip(quantities, self._sign[: self.count].tolist(), strict=True)
-        rows = [quantity.signed_values(of_joints[quantity.joint_index], sign) for quantity, sign in signed]
+        of_joints = {
+            quantity_of_joint.joint_index: block.of_joint(quantity_of_joint.joint_index)
+            for quantity_of_joint in self._quantities
+        }
+        quantities = (self._quantities[quantity_index] for quantity_index in self.quantity[: self.count])
+        signed_quantities = zip(quantities, self._sign[: self.count].tolist(), strict=True)
+        rows = [
+            quantity.signed_values(of_joints[quantity.joint_index], sign)
+            for quantity, sign in signed_quantities
+        ]
         return np.array(rows).reshape(-1, len(block.time))
 
     def clearance(self, side: IndexArray, value: FloatArray) -> FloatArray:
@@ -145,9 +155,9 @@ class Sides:
 
     def next_flag_values(self, side: IndexArray, value: FloatArray) -> FloatArray:
         """Return the values, (n,), below which sides get another flag; -inf if they have all."""
-        ahead = np.where(self.beyond(side, value), np.inf, self._tolerances[side])
-        following: FloatArray = self._bound[side] - ahead.min(axis=1)
-        return following
+        tolerances = np.where(self.beyond(side, value), np.inf, self._tolerances[side])
+        next_values: FloatArray = self._bound[side] - tolerances.min(axis=1)
+        return next_values
 
 
 def bounded_quantities(robot: Robot) -> list[Bounded]:
@@ -176,10 +186,10 @@ a flag, and more than rounding."""
 ROUNDING = 1e-10
 """Clearance by which a minimum without a further flag is below the samples, lest rounding be reported."""
 
-SHARES = np.array([1, 2]) / 3
+NEW_TIME_SHARES = np.array([1, 2]) / 3
 """New times in both halves of a bracket, for functions that no parabola describes."""
 
-CLOSE = np.array([-0.01, 0.0, 0.01])
+PARABOLA_OFFSETS = np.array([-0.01, 0.0, 0.01])
 """New times about the lowest point of a parabola, in widths of the bracket: around a smooth minimum the
 bracket becomes fifty times narrower, and the possible fall 2500 times smaller."""
 
@@ -229,7 +239,7 @@ class SampledFunctions(NamedTuple):
         """Return these with the last time twice, slightly higher: the end of a fall is a minimum."""
         return self.followed_by(self.time[:, -1:], np.nextafter(self.value[:, -1:], np.inf))
 
-    def places(self, function: IndexArray, time: FloatArray) -> IndexArray:
+    def indices_of(self, function: IndexArray, time: FloatArray) -> IndexArray:
         """Return where times, (n,), of functions are among the times of these functions, from the left."""
         places = np.empty(len(time), dtype=np.intp)
         for number in set(function.tolist()):
@@ -262,12 +272,12 @@ class Brackets(NamedTuple):
         A convex function lies above the lines through the middle and either end. An end at the time of the
         middle is replaced by the mirror image of the other end.
         """
-        before, after = np.diff(self.time).T
-        first, second = self.value[:, 0] - self.value[:, 1], self.value[:, 2] - self.value[:, 1]
+        left_width, right_width = np.diff(self.time).T
+        left_rise, right_rise = self.value[:, 0] - self.value[:, 1], self.value[:, 2] - self.value[:, 1]
         with np.errstate(divide="ignore", invalid="ignore"):
             fall: FloatArray = np.maximum(
-                np.where(before > 0, first * after / before, second),
-                np.where(after > 0, second * before / after, first),
+                np.where(left_width > 0, left_rise * right_width / left_width, right_rise),
+                np.where(right_width > 0, right_rise * left_width / right_width, left_rise),
             )
         return fall
 
@@ -281,23 +291,28 @@ class Brackets(NamedTuple):
             critical: Value of each function at which a flag is set, (functions,).
         """
         with np.errstate(invalid="ignore"):
-            ignored = MINIMUM_ACCURACY * np.abs(self.value[:, 1] - critical[self.function])
-            unresolved: BoolArray = self.fall_bound > ignored + PRECISION * np.abs(self.value).max(axis=1)
+            tolerance = MINIMUM_ACCURACY * np.abs(self.value[:, 1] - critical[self.function])
+            unresolved: BoolArray = self.fall_bound > tolerance + PRECISION * np.abs(self.value).max(axis=1)
         return unresolved & np.isfinite(self.value).all(axis=1)
 
     @property
     def lowest_of_parabola(self) -> FloatArray:
         """Time of the minimum of the parabola through the three, (n, 1); the middle without one."""
-        (left, middle, right), (at_left, at_middle, at_right) = (
+        (left, middle, right), (left_value, middle_value, right_value) = (
             np.hsplit(array, 3) for array in (self.time, self.value)
         )
-        before, after = (middle - left) * (at_right - at_middle), (right - middle) * (at_left - at_middle)
-        shift = ((right - middle) * after - (middle - left) * before) / np.maximum(2 * (before + after), TINY)
+        left_weight, right_weight = (
+            (middle - left) * (right_value - middle_value),
+            (right - middle) * (left_value - middle_value),
+        )
+        shift = ((right - middle) * right_weight - (middle - left) * left_weight) / np.maximum(
+            2 * (left_weight + right_weight), TINY
+        )
         return np.clip(middle + shift, left, right)
 
-    def where(self, chosen: BoolArray | IndexArray) -> Brackets:
+    def where(self, selection: BoolArray | IndexArray) -> Brackets:
         """Return a selection of the brackets."""
-        return Brackets(self.function[chosen], self.time[chosen], self.value[chosen])
+        return Brackets(self.function[selection], self.time[selection], self.value[selection])
 
 
 def find_brackets(functions: SampledFunctions) -> Brackets:
@@ -307,9 +322,9 @@ def find_brackets(functions: SampledFunctions) -> Brackets:
     """
     values = functions.value
     falls = values[:, 1:] <= values[:, :-1]
-    function, before = np.nonzero(falls[:, :-1] & ~falls[:, 1:])
-    around = function[:, None], before[:, None] + np.arange(3)
-    return Brackets(function, functions.times(*around), values[around])
+    function, left_index = np.nonzero(falls[:, :-1] & ~falls[:, 1:])
+    bracket_index = function[:, None], left_index[:, None] + np.arange(3)
+    return Brackets(function, functions.times(*bracket_index), values[bracket_index])
 
 
 def narrow_brackets(wide: Brackets, evaluate: Evaluate, critical: FloatArray) -> Brackets:
@@ -318,29 +333,33 @@ def narrow_brackets(wide: Brackets, evaluate: Evaluate, critical: FloatArray) ->
     The critical values decide on the number of rounds alone, see `Brackets.unresolved`.
     """
     function, time, value = wide.function, wide.time.copy(), wide.value.copy()
-    open_ = np.flatnonzero(wide.unresolved(critical))
+    unresolved = np.flatnonzero(wide.unresolved(critical))
     for _ in range(ROUNDS):
-        if not open_.size:
+        if not unresolved.size:
             break
-        _, time[open_], value[open_] = _narrow_once(
-            wide._replace(time=time, value=value).where(open_), evaluate
+        _, time[unresolved], value[unresolved] = _narrow_once(
+            wide._replace(time=time, value=value).where(unresolved), evaluate
         )
-        open_ = open_[Brackets(function, time, value).where(open_).unresolved(critical)]
+        unresolved = unresolved[Brackets(function, time, value).where(unresolved).unresolved(critical)]
     return Brackets(function, time, value)
 
 
 def _narrow_once(wide: Brackets, evaluate: Evaluate) -> Brackets:
     """Return the lowest of the three times and of new ones between them, with its neighbors."""
     left, middle, right = np.hsplit(wide.time, 3)
-    close = wide.lowest_of_parabola + CLOSE * (right - left)
-    new = np.hstack(
-        (left + SHARES * (middle - left), middle + SHARES * (right - middle), np.clip(close, left, right))
+    near_parabola_minimum = wide.lowest_of_parabola + PARABOLA_OFFSETS * (right - left)
+    new_times = np.hstack(
+        (
+            left + NEW_TIME_SHARES * (middle - left),
+            middle + NEW_TIME_SHARES * (right - middle),
+            np.clip(near_parabola_minimum, left, right),
+        )
     )
-    times = np.hstack((wide.time, new))
-    values = np.hstack((wide.value, evaluate(wide.function, new)))
-    row = np.arange(len(times))[:, None]
-    order = row, times.argsort(axis=1, kind="stable")
+    times = np.hstack((wide.time, new_times))
+    values = np.hstack((wide.value, evaluate(wide.function, new_times)))
+    row_index = np.arange(len(times))[:, None]
+    order = row_index, times.argsort(axis=1, kind="stable")
     times, values = times[order], values[order]
     lowest = np.clip(values.argmin(axis=1), 1, values.shape[1] - 2)[:, None]
-    around = row, lowest + np.arange(-1, 2)
-    return Brackets(wide.function, times[around], values[around])
+    bracket_index = row_index, lowest + np.arange(-1, 2)
+    return Brackets(wide.function, times[bracket_index], values[bracket_index])

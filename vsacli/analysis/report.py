@@ -26,7 +26,7 @@ from vsacli.base.signals import STIFFNESS
 from vsacli.base.tables import ReportText, TextReport, headline
 from vsacli.base.texts import counted, warnings_and_notes
 
-_AT_A_ROW = re.compile(r":\d+: |^\w+\[\d+")
+_ROW_WARNING = re.compile(r":\d+: |^\w+\[\d+")
 """Regular expression of a warning on a row of a file or a sample of an array."""
 
 VERDICTS = ("ok", "over_limit", "singular", "infeasible", "unreliable", "self_check_failed")
@@ -79,9 +79,13 @@ class Report(Stored, TextReport):
         """Verdict: the worst of `VERDICTS` that applies."""
         if not self.self_check.passed:
             return VERDICTS[-1]
-        places: tuple[JointReport | ToolReport, ...] = (*self.joints, *self.tools)
-        applies = (each for each in reversed(VERDICTS) if any(place.shows(each) for place in places))
-        return next(applies, "ok")
+        joints_and_tools: tuple[JointReport | ToolReport, ...] = (*self.joints, *self.tools)
+        applicable = (
+            verdict
+            for verdict in reversed(VERDICTS)
+            if any(member.shows(verdict) for member in joints_and_tools)
+        )
+        return next(applicable, "ok")
 
     @property
     def deflections(self) -> str:
@@ -94,18 +98,18 @@ class Report(Stored, TextReport):
         Args:
             hint: a line below the findings, such as the command that lists fixes; none if empty.
         """
-        first = [warning for warning in self.warnings if self._is_cause(warning)]
-        further = [warning for warning in self.warnings if not self._is_cause(warning)]
+        causes = [warning for warning in self.warnings if self._is_cause(warning)]
+        other_warnings = [warning for warning in self.warnings if not self._is_cause(warning)]
         entries = [
             *self._failed_check(),
-            *warnings_and_notes(first, ()),
+            *warnings_and_notes(causes, ()),
             *finding_lines((*self.joints, *self.tools), self.samples),
             *text.integration_stop_lines(self.joints, self.drifts),
-            *self._recorded_infeasible(causes=bool(first)),
+            *self._recorded_infeasible(causes=bool(causes)),
             *([hint] if hint else []),
             *uncertainty_lines(self.joints),
-            *warnings_and_notes(further, ()),
-            *(little_effect(self.joints) if any(NOT_DETERMINED in each for each in further) else []),
+            *warnings_and_notes(other_warnings, ()),
+            *(little_effect(self.joints) if any(NOT_DETERMINED in each for each in other_warnings) else []),
             *warnings_and_notes((), self.notes),
         ]
         lines = [
@@ -132,12 +136,16 @@ class Report(Stored, TextReport):
         This is so for a question, which asks whether an input is meant, as in another unit, and for faults at
         a row of a recording.
         """
-        return "?" in warning or (bool(self.fits) and _AT_A_ROW.search(warning) is not None)
+        return "?" in warning or (bool(self.fits) and _ROW_WARNING.search(warning) is not None)
 
     def _recorded_infeasible(self, *, causes: bool) -> Iterator[str]:
         """Yield what infeasible samples mean if the stiffness was recorded, too, without any other cause."""
-        recorded = any(fit.get("signal") == STIFFNESS.key for fit in self.fits)
-        if recorded and not causes and any(joint.samples["infeasible"] for joint in self.joints):
+        has_recorded_stiffness = any(fit.get("signal") == STIFFNESS.key for fit in self.fits)
+        if (
+            has_recorded_stiffness
+            and not causes
+            and any(joint.samples["infeasible"] for joint in self.joints)
+        ):
             yield (
                 "if the arm did move like this, the recorded stiffness or the springs of the robot file are "
                 "wrong: run vsacli identify first"
@@ -148,8 +156,8 @@ class Report(Stored, TextReport):
 
     def _title(self) -> str:
         """Return names, size, and how many joints fail which requirement."""
-        length = counted(self.samples, "sample") + ("" if self.complete else ", stopped early")
-        title = f"{self.robot}, {self.trajectory}: {length}, {self.duration:g} s"
+        length_text = counted(self.samples, "sample") + ("" if self.complete else ", stopped early")
+        title = f"{self.robot}, {self.trajectory}: {length_text}, {self.duration:g} s"
         return "; ".join([title, *filter(None, [failing_joints_line(self.joints, self.tools)])])
 
     @classmethod

@@ -20,11 +20,14 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
     incomplete = any(math.isnan(energy.spent) for energy in energies)
     if not incomplete:
         spent, recovered = (
-            short_number(sum(each)) for each in zip(*((e.spent, e.recovered) for e in energies), strict=True)
+            short_number(sum(works))
+            for works in zip(*((e.spent, e.recovered) for e in energies), strict=True)
         )
-        name, _, most = max(joints, key=lambda joint: joint[2].elastic_peak)
-        stored = (
-            f"; springs store up to {short_number(most.elastic_peak)} J ({name})" if most.elastic_peak else ""
+        name, _, highest = max(joints, key=lambda joint: joint[2].elastic_peak)
+        stored_text = (
+            f"; springs store up to {short_number(highest.elastic_peak)} J ({name})"
+            if highest.elastic_peak
+            else ""
         )
         yield f"energy: motors deliver {spent} J and recover {recovered} J{stored}"
         yield from _losses(energies)
@@ -36,20 +39,22 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
         yield f"co-contraction{among}: up to {effort} rms per motor ({name}); its load requires {load}"
 
 
-def _losses(energies: Sequence[JointEnergy]) -> Iterator[str]:
+def _loss_lines(energies: Sequence[JointEnergy]) -> Iterator[str]:
     """Yield the losses by friction and in windings, if the robot file has them."""
-    lost = {
+    losses_by_words = {
         "friction and damping": [energy.dissipated for energy in energies],
         "motor windings": [energy.copper_loss for energy in energies],
     }
-    losses_by_cause = {words: [loss for loss in losses if loss is not None] for words, losses in lost.items()}
+    losses_by_cause = {
+        words: [loss for loss in losses if loss is not None] for words, losses in losses_by_words.items()
+    }
     sums = [f"{words} {short_number(sum(losses))} J" for words, losses in losses_by_cause.items() if losses]
     if sums:
         yield "losses: " + ", ".join(sums)
 
 
 JOINTS_PER_LINE = 3
-MOST_APART = 7
+MAX_SEPARATE_JOINTS = 7
 """Largest number of joints that are described one by one."""
 
 
@@ -84,8 +89,11 @@ def joint_rows(joints: Sequence[JointReport]) -> list[tuple[str, ...]]:
         lambda joint: (joint.peak_tau_e, *joint.peak_tau_motor),
         _bounding_range,
     )
-    huge = [any(EXPONENT <= value < math.inf for joint in joints for value in of(joint)) for of in columns]
-    return [header, *(_joint_row(joint, *huge) for joint in joints)]
+    has_exponents = [
+        any(EXPONENT <= value < math.inf for joint in joints for value in values_of(joint))
+        for values_of in columns
+    ]
+    return [header, *(_joint_row(joint, *has_exponents) for joint in joints)]
 
 
 def _joint_row(joint: JointReport, huge: bool, huge_range: bool) -> tuple[str, ...]:
@@ -125,8 +133,8 @@ def _bounding_range(joint: JointReport) -> tuple[float, float]:
 def _attainable_range(lower: float, upper: float, huge: bool) -> str:
     if math.isnan(lower):
         return "none"
-    least = short_number(lower, huge=huge)
-    return f"from {least}" if math.isinf(upper) else f"{least}-{short_number(upper, huge=huge)}"
+    lower_text = short_number(lower, huge=huge)
+    return f"from {lower_text}" if math.isinf(upper) else f"{lower_text}-{short_number(upper, huge=huge)}"
 
 
 def _stiffness_range(low: float, high: float) -> str:
@@ -146,7 +154,7 @@ def short_number(value: float, *, huge: bool = False) -> str:
         return "-"
     if huge or not 10 <= abs(value) < EXPONENT:
         return f"{value:.3g}"
-    return f"{value:.1f}" if abs(value) < WHOLE else f"{value:.0f}"
+    return f"{value:.1f}" if abs(value) < INTEGERS_FROM else f"{value:.0f}"
 
 
 def short_percent(share: float) -> str:
@@ -161,11 +169,15 @@ def short_percent(share: float) -> str:
 def initial_motor_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the initial motor positions, which motors move, and the largest torque discontinuity."""
     yield from _motor_position_lines("initial", joints, [joint.start_theta for joint in joints], "first")
-    deviations = [None if (each := joint.uncertainty) is None else each.start_dtheta for joint in joints]
+    deviations = [
+        None if (uncertainty := joint.uncertainty) is None else uncertainty.start_dtheta for joint in joints
+    ]
     yield from _motor_velocity_lines("initial", joints, [joint.start_dtheta for joint in joints], deviations)
-    if largest := largest_of_motors(joints, lambda joint: joint.torque_discontinuity):
-        jump, joint = largest
-        peak = max((peak for each in joints for peak in each.peak_tau_motor if peak > 0), default=0.0)
+    if discontinuity := largest_of_motors(joints, lambda joint: joint.torque_discontinuity):
+        jump, joint = discontinuity
+        peak = max(
+            (peak for uncertainty in joints for peak in uncertainty.peak_tau_motor if peak > 0), default=0.0
+        )
         if jump > ROUNDING_SHARE * peak:
             yield f"initial torque discontinuity: {jump:.3g} {TORQUE.unit(joint.type)} ({joint.name})"
 
@@ -175,30 +187,34 @@ def final_motor_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     if all(math.isnan(theta) for joint in joints for theta in joint.end_theta):
         return
     yield from _motor_position_lines("final", joints, [joint.end_theta for joint in joints], "last")
-    deviations = [None if (each := joint.uncertainty) is None else each.end_dtheta for joint in joints]
+    deviations = [
+        None if (uncertainty := joint.uncertainty) is None else uncertainty.end_dtheta for joint in joints
+    ]
     yield from _motor_velocity_lines("final", joints, [joint.end_dtheta for joint in joints], deviations)
 
 
 def _motor_position_lines(
-    which: str, joints: Sequence[JointReport], positions: Sequence[tuple[float, float]], sample: str
+    end: str, joints: Sequence[JointReport], positions: Sequence[tuple[float, float]], end_sample: str
 ) -> Iterator[str]:
     """Yield the motor positions at one end of a motion; once that there are none, if no joint has any."""
-    of_joint = [values_of_motors(joint, theta) for joint, theta in zip(joints, positions, strict=True)]
-    undefined = [any(map(math.isnan, theta)) for theta in of_joint]
-    if all(undefined):
-        yield f"{which} motor positions: undefined, since the {sample} sample is infeasible at every joint"
+    positions_by_joint = [
+        values_of_motors(joint, theta) for joint, theta in zip(joints, positions, strict=True)
+    ]
+    is_undefined = [any(map(math.isnan, theta)) for theta in positions_by_joint]
+    if all(is_undefined):
+        yield f"{end} motor positions: undefined, since the {end_sample} sample is infeasible at every joint"
         return
     positions_text = {
-        number: f"undefined ({sample} sample infeasible)"
-        if undefined[number]
-        else f"{_signed(of_joint[number])} {POSITION.unit(joint.type)}"
-        for number, joint in enumerate(joints)
+        index: f"undefined ({end_sample} sample infeasible)"
+        if is_undefined[index]
+        else f"{_signed_text(positions_by_joint[index])} {POSITION.unit(joint.type)}"
+        for index, joint in enumerate(joints)
     }
-    yield list_by_joint(f"{which} motor positions: ", positions_text, [joint.name for joint in joints])
+    yield list_by_joint(f"{end} motor positions: ", positions_text, [joint.name for joint in joints])
 
 
 def _motor_velocity_lines(
-    which: str,
+    end: str,
     joints: Sequence[JointReport],
     velocities: Sequence[tuple[float, float]],
     deviations: Sequence[float | None],
@@ -207,29 +223,29 @@ def _motor_velocity_lines(
 
     The standard deviation follows if it is large; it is None if no signal was recorded.
     """
-    fastest = max((peak for joint in joints for peak in joint.peak_dtheta if peak > 0), default=0.0)
+    peak_velocity = max((peak for joint in joints for peak in joint.peak_dtheta if peak > 0), default=0.0)
     moving = {
-        number: f"{_signed(values_of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
-        f"{_deviation_text(dtheta, spread)}"
-        for number, (joint, dtheta, spread) in enumerate(zip(joints, velocities, deviations, strict=True))
+        index: f"{_signed_text(values_of_motors(joint, dtheta))} {VELOCITY.unit(joint.type)}"
+        f"{_deviation_text(dtheta, deviation)}"
+        for index, (joint, dtheta, deviation) in enumerate(zip(joints, velocities, deviations, strict=True))
         if any(
-            abs(speed) > max(RESTING_SHARE * peak, ROUNDING_SHARE * fastest)
+            abs(speed) > max(RESTING_SHARE * peak, ROUNDING_SHARE * peak_velocity)
             for speed, peak in zip(dtheta, joint.peak_dtheta, strict=True)
         )
     }
     if moving:
-        yield list_by_joint(f"{which} motor velocities: ", moving, [joint.name for joint in joints])
+        yield list_by_joint(f"{end} motor velocities: ", moving, [joint.name for joint in joints])
 
 
-def _deviation_text(velocities: Sequence[float], spread: float | None) -> str:
+def _deviation_text(velocities: Sequence[float], deviation: float | None) -> str:
     """Return the standard deviation of velocities if twice of it exceeds what is `DETERMINED`."""
-    largest = max(abs(velocity) for velocity in velocities if not math.isnan(velocity))
-    if spread is None or 2 * spread <= DETERMINED * largest:
+    max_velocity = max(abs(velocity) for velocity in velocities if not math.isnan(velocity))
+    if deviation is None or 2 * deviation <= DETERMINED * max_velocity:
         return ""
-    return " +- unknown" if math.isnan(spread) else f" +- {spread:.2g}"
+    return " +- unknown" if math.isnan(deviation) else f" +- {deviation:.2g}"
 
 
-def _signed(values: Iterable[float]) -> str:
+def _signed_text(values: Iterable[float]) -> str:
     return " ".join(f"{value:+.4g}" for value in values)
 
 
@@ -246,10 +262,10 @@ def integration_stop_lines(joints: Iterable[JointReport], drifts: Iterable[Joint
 def drift_lines(drifts: Sequence[JointDrift]) -> Iterator[str]:
     """Yield the drift of integrated deflections, if there are any."""
     if drifts:
-        yield wrap_joint_entries("integration drift: ", [_drift_of(drift) for drift in drifts])
+        yield wrap_joint_entries("integration drift: ", [_drift_text(drift) for drift in drifts])
 
 
-def _drift_of(drift: JointDrift) -> str:
+def _drift_text(drift: JointDrift) -> str:
     if math.isnan(drift.largest):
         return f"{drift.joint} none (no sample integrated)"
     return f"{drift.joint} {drift.largest:.1e} {drift.unit} at {time_text(drift.time)}"
@@ -258,20 +274,20 @@ def _drift_of(drift: JointDrift) -> str:
 def wrap_joint_entries(label: str, entries: Sequence[str]) -> str:
     """Return the entries of the joints, several to a line."""
     lines = [
-        ", ".join(entries[first : first + JOINTS_PER_LINE])
-        for first in range(0, len(entries), JOINTS_PER_LINE)
+        ", ".join(entries[start : start + JOINTS_PER_LINE])
+        for start in range(0, len(entries), JOINTS_PER_LINE)
     ]
     return label + (",\n" + " " * len(label)).join(lines)
 
 
-def list_by_joint(label: str, texts: Mapping[int, str], names: Sequence[str]) -> str:
+def list_by_joint(label: str, texts_by_index: Mapping[int, str], names: Sequence[str]) -> str:
     """Return entries of joints by index; equal entries of many joints are combined."""
-    equal: dict[str, list[int]] = {}
-    for number, words in texts.items():
-        equal.setdefault(words, []).append(number)
-    if len(names) <= MOST_APART or len(equal) == len(texts):
-        return wrap_joint_entries(label, [f"{names[number]} {words}" for number, words in texts.items()])
-    lines = [f"{together(numbers, names)} {words}" for words, numbers in equal.items()]
+    indices_by_text: dict[str, list[int]] = {}
+    for index, text in texts_by_index.items():
+        indices_by_text.setdefault(text, []).append(index)
+    if len(names) <= MAX_SEPARATE_JOINTS or len(indices_by_text) == len(texts_by_index):
+        return wrap_joint_entries(label, [f"{names[index]} {text}" for index, text in texts_by_index.items()])
+    lines = [f"{together(indices, names)} {text}" for text, indices in indices_by_text.items()]
     return label + (";\n" + " " * len(label)).join(lines)
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from vsacli.results.plots.figures import Figures
 
 
-class Shown:
+class ResultDisplay:
     """Display of a result in a terminal or a notebook: run, verdict, a line for each joint."""
 
     report: Report
@@ -37,12 +37,12 @@ class Shown:
         return html_table(self._title(), joint_rows(self.report.joints))
 
     def _title(self) -> str:
-        run = f"{self.report.robot}, {self.report.trajectory}"
-        size = f"{self.report.samples} samples, {self.report.duration:g} s"
-        return f"Result of {run}: {size}, {self.report.verdict}"
+        run_text = f"{self.report.robot}, {self.report.trajectory}"
+        size_text = f"{self.report.samples} samples, {self.report.duration:g} s"
+        return f"Result of {run_text}: {size_text}, {self.report.verdict}"
 
 
-class Result(Shown, Block):
+class Result(ResultDisplay, Block):
     """All variables over the whole trajectory, with the report.
 
     Attributes:
@@ -52,8 +52,10 @@ class Result(Shown, Block):
 
     def __init__(self, *, report: Report, robot: Robot, trajectory: Trajectory, **arrays: AnyArray) -> None:
         declared = variables_by_tool(VARIABLES, len(robot.tool_names))
-        shaped = {name: split_axes(array, declared[name], robot.labels) for name, array in arrays.items()}
-        super().__init__(**shaped)
+        shaped_arrays = {
+            name: split_axes(array, declared[name], robot.labels) for name, array in arrays.items()
+        }
+        super().__init__(**shaped_arrays)
         self.report, self.robot, self.trajectory = report, robot, trajectory
 
     @property
@@ -116,8 +118,8 @@ class Result(Shown, Block):
         """
         from vsacli.results.plots import plot_stored, save_figures
 
-        with temporary_folder() as place:
-            path = place / f"{stem}.h5"
+        with temporary_folder() as folder_path:
+            path = folder_path / f"{stem}.h5"
             self.save(path)
             with StoredResult.open(path) as stored:
                 figures = plot_stored(stored)
@@ -136,7 +138,7 @@ class Result(Shown, Block):
         return labeled_dataset(self.arrays(), self.robot.labels, self.robot.joint_types)
 
 
-class ResultFile(Shown, StoredResult):
+class ResultFile(ResultDisplay, StoredResult):
     """A result file of `vsacli invdyn` or `Result.save`; a context manager that closes it.
 
     Each variable is an attribute as in `Result`, a NumPy array that is read at first access.

@@ -52,12 +52,12 @@ class Run(Batch):
         )
         return replace(
             report,
-            warnings=(*self.robot.warnings, *self._of_recording(undetermined=undetermined)),
+            warnings=(*self.robot.warnings, *self._trajectory_warnings(undetermined=undetermined)),
             notes=(
                 *self.trajectory.notes,
                 *self._minima_search.notes,
                 *self._internal_stops(),
-                *self._passages[0].notes(self._dynamics),
+                *self._friction_passages[0].notes(self._dynamics),
             ),
         )
 
@@ -65,7 +65,7 @@ class Run(Batch):
         """Return the energy of each joint over the blocks so far, as `report` does, without a self-check."""
         return self._energy.report()
 
-    def _of_recording(self, *, undetermined: bool) -> tuple[str, ...]:
+    def _trajectory_warnings(self, *, undetermined: bool) -> tuple[str, ...]:
         """Return the trajectory's warnings. Rigid robots use no derivative beyond the second.
 
         With them, warnings on the highest derivative become advice if a variable is undetermined.
@@ -74,15 +74,17 @@ class Run(Batch):
         if estimate is None or any(joint.actuator.sprung for joint in self.robot.joints):
             return warnings
         advice = estimate.advice_without_derivative()
-        return tuple(advice.get(each, each) for each in warnings if undetermined or each not in advice)
+        return tuple(
+            advice.get(warning, warning) for warning in warnings if undetermined or warning not in advice
+        )
 
     def _internal_stops(self) -> Iterator[str]:
         """Yield a note for each internal motion that ends before the trajectory does."""
         internal = self._dynamics.internal
         for index, stop in internal.stops.items() if internal is not None else ():
             joint = self.robot.joint_names[index]
-            when = f"cannot go on beyond t = {time_text(stop.time)}"
-            yield f"{joint}: what moves inside its damped transmission {when}: {stop.reason}"
+            stop_text = f"cannot go on beyond t = {time_text(stop.time)}"
+            yield f"{joint}: what moves inside its damped transmission {stop_text}: {stop.reason}"
 
 
 def inverse_dynamics(
@@ -131,7 +133,10 @@ def inverse_dynamics(
 
 def _concatenate_blocks(blocks: list[Block]) -> dict[str, AnyArray]:
     """Return the variables of consecutive blocks, concatenated, with the samples contiguous in memory."""
-    rows = [{name: np.moveaxis(array, 0, -1) for name, array in block.arrays().items()} for block in blocks]
+    arrays_by_block = [
+        {name: np.moveaxis(array, 0, -1) for name, array in block.arrays().items()} for block in blocks
+    ]
     return {
-        name: np.moveaxis(np.concatenate([row[name] for row in rows], axis=-1), -1, 0) for name in rows[0]
+        name: np.moveaxis(np.concatenate([arrays[name] for arrays in arrays_by_block], axis=-1), -1, 0)
+        for name in arrays_by_block[0]
     }

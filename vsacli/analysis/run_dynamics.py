@@ -66,8 +66,10 @@ class RunDynamics:
             inputs.append(InternalRows(internal.joints))
         wrench = self.trajectories[0].wrench
         self.frame = None if wrench is None else wrench.frame
-        of_base = BalancedDynamics(InverseDynamics(variants.base, self.frame, min_margin, tuple(inputs)))
-        self.kernel = variants.kernel(of_base)
+        base_dynamics = BalancedDynamics(
+            InverseDynamics(variants.base, self.frame, min_margin, tuple(inputs))
+        )
+        self.kernel = variants.kernel(base_dynamics)
 
     @property
     def robot(self) -> Robot:
@@ -85,8 +87,8 @@ class RunDynamics:
 
     def by_trajectory(self, function: Callable[[Trajectory], _Value]) -> list[_Value]:
         """Return a function of the trajectory of each variant, called once for each distinct one."""
-        values = {id(each): function(each) for each in self._distinct}
-        return [values[id(each)] for each in self.trajectories]
+        values = {id(trajectory): function(trajectory) for trajectory in self._distinct}
+        return [values[id(trajectory)] for trajectory in self.trajectories]
 
     @property
     def _distinct(self) -> list[Trajectory]:
@@ -98,8 +100,8 @@ class RunDynamics:
 
     def compute(self, motion: Motion) -> Block:
         """Return the variables of a motion of all variants, see `motion`."""
-        count = len(motion.time) // len(self.trajectories)
-        return self._compute(motion, np.repeat(np.arange(len(self.trajectories)), count))
+        samples_per_variant = len(motion.time) // len(self.trajectories)
+        return self._compute(motion, np.repeat(np.arange(len(self.trajectories)), samples_per_variant))
 
     def at(self, time: FloatArray, variant: IndexArray | None = None) -> Block:
         """Return the variables at any times, (samples,), of the trajectories; of the first one by default."""
@@ -108,22 +110,27 @@ class RunDynamics:
 
     def blocks_at(self, time: FloatArray, variant: IndexArray) -> Iterator[tuple[slice, Block]]:
         """Yield the variables at many times in blocks of the usual size, each with its part of the times."""
-        size = usual_block(len(self.robot.joints))
-        for start in range(0, len(time), size):
-            part = slice(start, start + size)
-            yield part, self.at(time[part], variant[part])
+        block_size = usual_block(len(self.robot.joints))
+        for start in range(0, len(time), block_size):
+            time_slice = slice(start, start + block_size)
+            yield time_slice, self.at(time[time_slice], variant[time_slice])
 
     def _motion_at(self, time: FloatArray, variant: IndexArray) -> Motion:
         """Return the motion at times; each distinct trajectory is evaluated once."""
         distinct = self._distinct
         if len(distinct) == 1:
             return distinct[0].at(time)
-        number_by_id = {id(each): number for number, each in enumerate(distinct)}
-        numbers = np.array([number_by_id[id(each)] for each in self.trajectories])[variant]
-        order = numbers.argsort(kind="stable")
-        parts = [distinct[number].at(time[numbers == number]) for number in sorted(set(numbers.tolist()))]
-        place = order.argsort()
-        return concatenate_motions(parts).mapped(time, lambda array, _: array[place])
+        number_by_id = {id(trajectory): index for index, trajectory in enumerate(distinct)}
+        trajectory_indices = np.array([number_by_id[id(trajectory)] for trajectory in self.trajectories])[
+            variant
+        ]
+        order = trajectory_indices.argsort(kind="stable")
+        parts = [
+            distinct[index].at(time[trajectory_indices == index])
+            for index in sorted(set(trajectory_indices.tolist()))
+        ]
+        inverse_order = order.argsort()
+        return concatenate_motions(parts).mapped(time, lambda array, _: array[inverse_order])
 
     def _compute(self, motion: Motion, variant: IndexArray) -> Block:
         time, rows = motion.time, dict[str, Iterable[FloatArray]](self.variants.inputs(variant))
@@ -143,8 +150,11 @@ def concatenate_motions(motions: Sequence[Motion]) -> Motion:
     arrays = {name: np.concatenate([motion.of_joints[name] for motion in motions]) for name in names}
     wrench, wrenches = None, [motion.wrench for motion in motions if motion.wrench is not None]
     if wrenches:
-        parts = (np.concatenate([getattr(each, name) for each in wrenches]) for name in WRENCH_NAMES)
-        wrench = Wrench(*parts, frame=wrenches[0].frame)
+        components = (
+            np.concatenate([getattr(other_wrench, name) for other_wrench in wrenches])
+            for name in WRENCH_NAMES
+        )
+        wrench = Wrench(*components, frame=wrenches[0].frame)
     return Motion.of(time, arrays, wrench)
 
 

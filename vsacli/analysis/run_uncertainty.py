@@ -22,7 +22,7 @@ SMALLEST_SHARE = 0.01
 """Smallest scale of a torque's uncertainty, as a share of the largest torque of any joint: the torque of a
 resting joint may be only noise."""
 
-WITHIN = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR}
+UNDECIDED_FLAGS = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR}
 """Kinds of samples that are counted if they are within the uncertainty."""
 
 
@@ -39,8 +39,8 @@ def judged_variables(names: Iterable[str], robot: Robot) -> tuple[str, ...]:
     judged: set[str] = set()
     for name in (name.removesuffix(deviation("")) for name in names):
         if name == "flags":
-            bounded = {check.variable for joint in robot.joints for check in limit_checks(joint)}
-            judged |= {"tau_e", *bounded}
+            limited_variables = {limit.variable for joint in robot.joints for limit in limit_checks(joint)}
+            judged |= {"tau_e", *limited_variables}
         elif "joint" in VARIABLES[name].dims:
             judged.add(name if name in UNCERTAIN else JUDGED)
     return tuple(name for name in UNCERTAIN if name in judged)
@@ -62,14 +62,14 @@ class RunUncertainty:
         """
         self._robot, self._trajectory, self._asked, self._engine = robot, trajectory, asked, engine
         first, last = trajectory.times.span
-        ends = [estimate.fit.unreliable for estimate in trajectory.estimates.values()]
-        start, end = np.minimum(np.max(ends, axis=0), (last - first) / 4).tolist()
-        self._inside = first + start, last - end
-        self._shown = {JUDGED, *asked}
-        self._powers: dict[str, _Powers] = {}
-        self._steps = [dict.fromkeys(WITHIN, 0) for _ in robot.joints]
+        unreliable_spans = [estimate.fit.unreliable for estimate in trajectory.estimates.values()]
+        start, end = np.minimum(np.max(unreliable_spans, axis=0), (last - first) / 4).tolist()
+        self._reliable_span = first + start, last - end
+        self._reported_variables = {JUDGED, *asked}
+        self._sums: dict[str, _SumsOfSquares] = {}
+        self._undecided_counts = [dict.fromkeys(UNDECIDED_FLAGS, 0) for _ in robot.joints]
         self._limits: list[dict[str, Finding]] = [{} for _ in robot.joints]
-        self._velocities: list[FloatArray] = []
+        self._end_velocity_deviations: list[FloatArray] = []
 
     @cached_property
     def _deviations(self) -> Uncertainty:
@@ -79,79 +79,88 @@ class RunUncertainty:
         """Merge a block into the report, and return it with its deviations and limit flags."""
         deviations = self._deviations.at(block.time)
         self._count_steps(block, deviations.pop(MARGIN))
-        inside = (block.time >= self._inside[0]) & (block.time <= self._inside[1])
+        inside = (block.time >= self._reliable_span[0]) & (block.time <= self._reliable_span[1])
         for name, array in deviations.items():
             values = getattr(block, name)
             array[np.isnan(values)] = np.nan
             unstated = self._deviations.unstated[name]
-            if name in self._shown:
-                powers = self._powers.setdefault(name, _Powers(unstated))
+            if name in self._reported_variables:
+                powers = self._sums.setdefault(name, _SumsOfSquares(unstated))
                 powers.add(values[inside], array[inside])
-        block = self._with(deviations, block)
+        block = self._with_deviations(deviations, block)
         first, last = np.fmax.reduce(getattr(block, deviation("dtheta"))[[0, -1]], axis=-1)
-        self._velocities = [self._velocities[0] if self._velocities else first, last]
+        self._end_velocity_deviations = [
+            self._end_velocity_deviations[0] if self._end_velocity_deviations else first,
+            last,
+        ]
         return block
 
     def judged(self, block: Block) -> Block:
         """Return a block of times between the samples with its deviations and limit flags."""
         deviations = self._deviations.at(block.time)
         del deviations[MARGIN]
-        return self._with(deviations, block, between=True)
+        return self._with_deviations(deviations, block, between=True)
 
-    def _with(self, deviations: Mapping[str, FloatArray], block: Block, *, between: bool = False) -> Block:
+    def _with_deviations(
+        self, deviations: Mapping[str, FloatArray], block: Block, *, between: bool = False
+    ) -> Block:
         for name, array in deviations.items():
             array[:, self._deviations.unstated[name]] = np.nan
-        stored = {deviation(name): array for name, array in deviations.items()}
-        block = block.replaced(**stored, flags=block.flags.copy())
+        deviation_variables = {deviation(name): array for name, array in deviations.items()}
+        block = block.replaced(**deviation_variables, flags=block.flags.copy())
         for index in range(len(self._robot.joints)):
             self._judge_limits(block, index, between=between)
         return block
 
     def _count_steps(self, block: Block, deviations: FloatArray) -> None:
         """Count samples that the uncertainty of the margin could make feasible, or regular."""
-        gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
-        near = np.abs(gap) <= ALLOWED_DEVIATIONS * deviations
-        for kind, bit in WITHIN.items():
-            for steps, undecided in zip(self._steps, (has_flag(block.flags, bit) & near).T, strict=True):
-                steps[kind] += int(np.count_nonzero(undecided))
+        margins = margin(block.stiffness, block.stiffness_min, block.stiffness_max)
+        is_undecided = np.abs(margins) <= ALLOWED_DEVIATIONS * deviations
+        for kind, bit in UNDECIDED_FLAGS.items():
+            for counts, joint_undecided in zip(
+                self._undecided_counts, (has_flag(block.flags, bit) & is_undecided).T, strict=True
+            ):
+                counts[kind] += int(np.count_nonzero(joint_undecided))
 
     def _judge_limits(self, block: Block, index: int, *, between: bool) -> None:
         """Clear the bits of limits where the excess is within the uncertainty."""
         joint, values = self._robot.joints[index], block.of_joint(index)
-        seen, exceeded = np.zeros((2, len(block.time)), dtype=FLAG_TYPE)
-        for check in limit_checks(joint):
-            seeming, certain = check.flags(values), check.flags(values, check.allowance(values))
-            seen |= seeming
-            exceeded |= certain
-            within = (seeming & ~certain) != 0
-            worst = worst_excess(joint, check, values, block.time, within, between=between)
+        seeming_flags, certain_flags = np.zeros((2, len(block.time)), dtype=FLAG_TYPE)
+        for limit in limit_checks(joint):
+            seeming, certain = limit.flags(values), limit.flags(values, limit.allowance(values))
+            seeming_flags |= seeming
+            certain_flags |= certain
+            is_uncertain = (seeming & ~certain) != 0
+            worst = worst_excess(joint, limit, values, block.time, is_uncertain, between=between)
             keep_worse(self._limits[index], worst)
-        block.flags[:, index] &= ~(seen & ~exceeded)  # other bits are of minima between the samples
+        block.flags[:, index] &= ~(
+            seeming_flags & ~certain_flags
+        )  # other bits are of minima between the samples
 
     def report(self) -> list[JointUncertainty]:
         """Return the findings so far, for each joint."""
         types = np.array(self._robot.joint_types)
-        spreads = [spread for name, powers in self._powers.items() for spread in powers.spreads(name, types)]
+        spreads = [spread for name, powers in self._sums.items() for spread in powers.spreads(name, types)]
         return [
             JointUncertainty(
-                variables={each.name: each for at, each in spreads if at == index},
+                variables={each.name: each for joint_index, each in spreads if joint_index == index},
                 asked=tuple(self._asked),
-                samples=dict(self._steps[index]),
+                samples=dict(self._undecided_counts[index]),
                 limits=dict(self._limits[index]),
-                start_dtheta=float(self._velocities[0][index]),
-                end_dtheta=float(self._velocities[1][index]),
+                start_dtheta=float(self._end_velocity_deviations[0][index]),
+                end_dtheta=float(self._end_velocity_deviations[1][index]),
             )
             for index in range(len(types))
         ]
 
 
-def _sum(before: FloatArray, terms: FloatArray) -> FloatArray:
+def _add_in_order(total_before: FloatArray, terms: FloatArray) -> FloatArray:
     """Sum one term after the other, so that rounding does not depend on the division into blocks."""
-    total: FloatArray = np.cumsum(np.concatenate([before[None], terms]), axis=0)[-1]
+    total: FloatArray = np.cumsum(np.concatenate([total_before[None], terms]), axis=0)[-1]
     return total
 
 
-class _Powers:
+class _SumsOfSquares:
     """Sums over samples of the squares of a variable and of its deviation, (joints[, 2])."""
 
     def __init__(self, unstated: BoolArray) -> None:
@@ -161,31 +170,43 @@ class _Powers:
             unstated: Whether a deviation must not be stated, (joints[, 2]).
         """
         self._unstated = unstated
-        self._count, self._values, self._deviations = np.zeros((3, *unstated.shape))
+        self._count, self._value_squares, self._deviations = np.zeros((3, *unstated.shape))
         self._peak, self._largest = np.zeros((2, *unstated.shape))
 
     def add(self, values: FloatArray, deviations: FloatArray) -> None:
         """Add samples, (samples, joints[, 2]); samples without a value are left out."""
         exists = np.isfinite(values)
         self._count += np.sum(exists, axis=0)
-        self._values = _sum(self._values, np.where(exists, values, 0.0) ** 2)
-        self._deviations = _sum(self._deviations, np.where(exists, deviations, 0.0) ** 2)
+        self._value_squares = _add_in_order(self._value_squares, np.where(exists, values, 0.0) ** 2)
+        self._deviations = _add_in_order(self._deviations, np.where(exists, deviations, 0.0) ** 2)
         self._peak = np.maximum(self._peak, np.max(np.abs(values), axis=0, where=exists, initial=0.0))
         self._largest = np.maximum(self._largest, np.max(deviations, axis=0, where=exists, initial=0.0))
 
     def spreads(self, name: str, types: AnyArray) -> Iterator[tuple[int, Spread]]:
         """Yield the spread and index of the joints that have the variable; types of joints are (joints,)."""
         with np.errstate(invalid="ignore"):
-            size, rms = np.sqrt([self._values / self._count, self._deviations / self._count])
+            rms_value, rms_deviation = np.sqrt(
+                [self._value_squares / self._count, self._deviations / self._count]
+            )
         for index, joint_type in enumerate(types):
             has_values = self._count[index] > 0
             if not has_values.any():
                 continue
-            least = SMALLEST_SHARE * np.nanmax(size[types == joint_type])
-            scale = np.maximum(size[index], least)
-            share = np.divide(rms[index], scale, out=np.zeros_like(scale), where=rms[index] != 0)
-            stated = {"rms": rms[index], "max": self._largest[index], "share": share}
-            stated = {key: np.where(self._unstated[index], np.nan, each) for key, each in stated.items()}
-            every = {**stated, "bound": ALLOWED_DEVIATIONS * share, "peak": self._peak[index]}
-            worst = {key: float(np.max(each, where=has_values, initial=0.0)) for key, each in every.items()}
-            yield index, Spread(name=name, unit=VARIABLES[name].quantity.unit(joint_type), **worst)
+            smallest_scale = SMALLEST_SHARE * np.nanmax(rms_value[types == joint_type])
+            scale = np.maximum(rms_value[index], smallest_scale)
+            share = np.divide(
+                rms_deviation[index], scale, out=np.zeros_like(scale), where=rms_deviation[index] != 0
+            )
+            stated_values = {"rms": rms_deviation[index], "max": self._largest[index], "share": share}
+            stated_values = {
+                key: np.where(self._unstated[index], np.nan, values) for key, values in stated_values.items()
+            }
+            all_values = {**stated_values, "bound": ALLOWED_DEVIATIONS * share, "peak": self._peak[index]}
+            largest_of_motors = {
+                key: float(np.max(values, where=has_values, initial=0.0))
+                for key, values in all_values.items()
+            }
+            yield (
+                index,
+                Spread(name=name, unit=VARIABLES[name].quantity.unit(joint_type), **largest_of_motors),
+            )

@@ -61,7 +61,7 @@ NOISE_GAIN = 12.0
 """Multiple of the estimated noise beyond which an error fails. The largest of 10^6 normally distributed
 errors lies at 5 widths, and the estimate may be a third of the width."""
 
-CLEAR = 1e-10
+CLEAR_ERROR = 1e-10
 """Error below which smaller steps are not tried, a hundredth of the bound."""
 
 
@@ -108,30 +108,36 @@ class RunCheck:
     """
 
     def __init__(self, dynamics: RunDynamics) -> None:
-        self._dynamics, self._variants = dynamics, len(dynamics.variants)
+        self._dynamics, self._variant_count = dynamics, len(dynamics.variants)
         samples = dynamics.trajectories[0].samples
-        probed = evenly(samples, max(FEWEST, PROBES // self._variants))
-        self._probed = (np.arange(self._variants)[:, None] * samples + probed).ravel()
-        self._of_probed = np.repeat(np.arange(self._variants), len(probed))
+        probe_samples = evenly(samples, max(MIN_PROBES, PROBES // self._variant_count))
+        self._probe_samples = (np.arange(self._variant_count)[:, None] * samples + probe_samples).ravel()
+        self._probe_variants = np.repeat(np.arange(self._variant_count), len(probe_samples))
         self._excerpts: list[dict[str, AnyArray]] = []
-        self._samples = 0
-        self._error, self._shaft_error = np.zeros((2, self._variants))
-        damped = len(joints_with_parallel_damper(dynamics.robot.joints))
-        self._damped_error, self._damped_size = np.zeros((2, self._variants, damped))
+        self._sample_count = 0
+        self._spring_error, self._shaft_error = np.zeros((2, self._variant_count))
+        damped_joints = len(joints_with_parallel_damper(dynamics.robot.joints))
+        self._damped_error, self._damped_size = np.zeros((2, self._variant_count, damped_joints))
 
     def add(self, block: Block) -> None:
         """Merge a block of `BalancedDynamics`, with the samples of one variant after the other."""
-        first, last = np.searchsorted(self._probed, (self._samples, self._samples + len(block.time)))
-        probed = self._probed[first:last] - self._samples
-        self._excerpts.append(
-            {name: array[probed] for name, array in block.arrays().items() if name in JointVariables._fields}
+        first, last = np.searchsorted(
+            self._probe_samples, (self._sample_count, self._sample_count + len(block.time))
         )
-        self._samples += len(block.time)
-        by_variant = self._variants, len(block.time) // self._variants
-        self._error, self._shaft_error, self._damped_error, self._damped_size = (
-            np.maximum(largest, values.reshape(*by_variant, *values.shape[1:]).max(axis=1))
+        probe_index = self._probe_samples[first:last] - self._sample_count
+        self._excerpts.append(
+            {
+                name: array[probe_index]
+                for name, array in block.arrays().items()
+                if name in JointVariables._fields
+            }
+        )
+        self._sample_count += len(block.time)
+        variant_shape = self._variant_count, len(block.time) // self._variant_count
+        self._spring_error, self._shaft_error, self._damped_error, self._damped_size = (
+            np.maximum(largest, values.reshape(*variant_shape, *values.shape[1:]).max(axis=1))
             for largest, values in (
-                (self._error, block.spring_error),
+                (self._spring_error, block.spring_error),
                 (self._shaft_error, block.shaft_error),
                 (self._damped_error, block.damped_error),
                 (self._damped_size, block.damped_size),
@@ -144,8 +150,10 @@ class RunCheck:
         errors, error_bounds = ladder(self._dynamics)
         columns = *self._residuals(), errors, error_bounds
         return [
-            SelfCheck(springs, error, bound, error_bound, shafts)
-            for springs, shafts, error, error_bound in zip(*(each.tolist() for each in columns), strict=True)
+            SelfCheck(spring_residual, derivative_error, bound, error_bound, shaft_residual)
+            for spring_residual, shaft_residual, derivative_error, error_bound in zip(
+                *(column.tolist() for column in columns), strict=True
+            )
         ]
 
     def _residuals(self) -> tuple[FloatArray, FloatArray]:
@@ -155,14 +163,14 @@ class RunCheck:
         joints = self._dynamics.variants.robot_with_rows(variant).joints
         of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(joints))]
         recomputed = balance_errors(joints, of_joints)
-        largest_probed = (
-            np.reshape(values, (-1, self._variants, len(variant) // self._variants)).max(axis=2)
+        probe_errors = (
+            np.reshape(values, (-1, self._variant_count, len(variant) // self._variant_count)).max(axis=2)
             for values in (recomputed["spring_error"], recomputed["shaft_error"], recomputed["damped_error"])
         )
         springs, shafts, damped_error = (
-            np.maximum(of_blocks, probed_error)
-            for of_blocks, probed_error in zip(
-                (self._error, self._shaft_error, self._damped_error.T), largest_probed, strict=True
+            np.maximum(block_error, probed_error)
+            for block_error, probed_error in zip(
+                (self._spring_error, self._shaft_error, self._damped_error.T), probe_errors, strict=True
             )
         )
         damped = damped_error / np.maximum(self._damped_size.T, np.finfo(float).tiny)
@@ -194,7 +202,7 @@ PROBES = 200
 """Approximate number of times of the derivative check, and of samples at which `RunCheck` recomputes; for all
 variants of a batch together."""
 
-FEWEST = 2 * NEIGHBORS + 1
+MIN_PROBES = 2 * NEIGHBORS + 1
 """Smallest number of these times and samples of a variant: so many estimate the noise."""
 
 JOINTS_AT_ALL_TIMES = 80
@@ -228,25 +236,27 @@ def ladder(run: RunDynamics) -> tuple[FloatArray, FloatArray]:
     """
     dynamics = run.from_zero()
     joints = max(len(run.robot.joints), JOINTS_AT_ALL_TIMES)
-    count = max(FEWEST, PROBES * JOINTS_AT_ALL_TIMES // joints // len(run.variants))
-    times, reach = np.stack(dynamics.by_trajectory(lambda each: each.check_points(count)), axis=-1)
-    duration = np.array([each.duration for each in dynamics.trajectories])
-    steps = np.minimum(reach / 3, duration / 500)
-    every = np.arange(len(duration))
-    errors, bounds, everywhere = _derivative_errors(
-        dynamics, every, times, FIRST_SCALES[:, None, None] * steps
+    time_count = max(MIN_PROBES, PROBES * JOINTS_AT_ALL_TIMES // joints // len(run.variants))
+    times, half_spans = np.stack(
+        dynamics.by_trajectory(lambda trajectory: trajectory.check_points(time_count)), axis=-1
     )
-    again = np.flatnonzero(~(everywhere & (errors.max(axis=(0, 1)) <= CLEAR)))
-    if again.size:
-        at_all_scales = STEP_SCALES[:, None, None] * steps[:, again]
-        errors[..., again], bounds[..., again], _ = _derivative_errors(
-            dynamics, again, times[:, again], at_all_scales
+    duration = np.array([trajectory.duration for trajectory in dynamics.trajectories])
+    steps = np.minimum(half_spans / 3, duration / 500)
+    all_variants = np.arange(len(duration))
+    errors, bounds, compared_throughout = _derivative_errors(
+        dynamics, all_variants, times, FIRST_SCALES[:, None, None] * steps
+    )
+    unclear = np.flatnonzero(~(compared_throughout & (errors.max(axis=(0, 1)) <= CLEAR_ERROR)))
+    if unclear.size:
+        all_steps = STEP_SCALES[:, None, None] * steps[:, unclear]
+        errors[..., unclear], bounds[..., unclear], _ = _derivative_errors(
+            dynamics, unclear, times[:, unclear], all_steps
         )
     rounding = ROUNDING_GAIN * np.finfo(float).eps * duration / (FIRST_SCALES[-1] * steps)
-    bounds = np.maximum(bounds, np.maximum(LADDER_BOUND, rounding)).reshape(-1, len(every))
+    bounds = np.maximum(bounds, np.maximum(LADDER_BOUND, rounding)).reshape(-1, len(all_variants))
     errors = errors.reshape(bounds.shape)
-    worst = np.argmax(errors / bounds, axis=0)
-    return errors[worst, every], bounds[worst, every]
+    nearest_bound = np.argmax(errors / bounds, axis=0)
+    return errors[nearest_bound, all_variants], bounds[nearest_bound, all_variants]
 
 
 def _derivative_errors(
@@ -267,33 +277,41 @@ def _derivative_errors(
     """
     joints = len(dynamics.robot.joints)
     durations = np.array([dynamics.trajectories[variant].duration for variant in variants])
-    everywhere = np.ones(len(variants), dtype=bool)
+    compared_throughout = np.ones(len(variants), dtype=bool)
     differences = [DifferenceErrors(steps, LADDER_BOUND, NOISE_GAIN) for _ in (*RUNGS, "energy")]
-    together = max(1, usual_block(joints) // (len(steps) * len(OFFSETS) * len(variants)))
-    for start in range(0, len(times), together):
-        part = slice(start, start + together)
-        grid = times[part] + steps[:, None, part] * OFFSETS[:, None, None]
+    times_per_block = max(1, usual_block(joints) // (len(steps) * len(OFFSETS) * len(variants)))
+    for start in range(0, len(times), times_per_block):
+        time_slice = slice(start, start + times_per_block)
+        grid = times[time_slice] + steps[:, None, time_slice] * OFFSETS[:, None, None]
         variant = np.broadcast_to(variants, grid.shape).ravel()
         block = dynamics.at(grid.ravel(), variant)
         robot = dynamics.variants.robot_with_rows(variant)
         smooth = _motors_move_smoothly(block, grid.shape)
-        everywhere &= np.all(np.any(smooth, axis=0), axis=(0, 2))
-        for rung, of_rung in zip(RUNGS, differences, strict=False):
+        compared_throughout &= np.all(np.any(smooth, axis=0), axis=(0, 2))
+        for rung, rung_errors in zip(RUNGS, differences, strict=False):
             value, derivative, whole = (
                 _variable_on_grid(dynamics.robot, block, name, grid.shape)
                 for name in (rung.value, rung.derivative, rung.whole)
             )
             compared = np.ones_like(smooth) if rung.value.endswith("tau_e") else smooth
-            slowest = np.abs(whole[0, MIDDLE]) / durations[:, None, None] ** rung.order
-            of_rung.add(value, derivative, compared, np.maximum(np.abs(derivative[0, MIDDLE]), slowest))
-        energy, power, size, grain = (
-            each.reshape(*grid.shape, -1, 1) for each in _energy_balances(dynamics, robot, block)
+            lower_scale = np.abs(whole[0, MIDDLE]) / durations[:, None, None] ** rung.order
+            rung_errors.add(
+                value, derivative, compared, np.maximum(np.abs(derivative[0, MIDDLE]), lower_scale)
+            )
+        energy, power, scale, grain = (
+            array.reshape(*grid.shape, -1, 1) for array in _energy_balances(dynamics, robot, block)
         )
         compared = np.concatenate((smooth, np.ones_like(smooth[..., :1])), axis=-1)
-        slowest = np.abs(energy[0, MIDDLE]) / durations[:, None, None]
-        differences[-1].add(energy, power, compared, np.maximum(size[0, MIDDLE], slowest), grain[:, MIDDLE])
-    relative = [each.relative() for each in differences]
-    return np.stack([error for error, _ in relative]), np.stack([bound for _, bound in relative]), everywhere
+        lower_scale = np.abs(energy[0, MIDDLE]) / durations[:, None, None]
+        differences[-1].add(
+            energy, power, compared, np.maximum(scale[0, MIDDLE], lower_scale), grain[:, MIDDLE]
+        )
+    relative = [array.relative() for array in differences]
+    return (
+        np.stack([error for error, _ in relative]),
+        np.stack([bound for _, bound in relative]),
+        compared_throughout,
+    )
 
 
 def _energy_balances(dynamics: RunDynamics, robot: Robot, block: Block) -> Iterator[FloatArray]:
@@ -312,8 +330,8 @@ def _energy_balances(dynamics: RunDynamics, robot: Robot, block: Block) -> Itera
     yield np.stack([np.sum(terms, axis=0) for terms in powers], axis=-1)
     yield np.stack([np.sum(np.abs(terms), axis=0) for terms in powers], axis=-1)
     grains = [np.finfo(float).eps * np.nan_to_num(of_joint.stiffness) for of_joint in of_joints]
-    turns = [1.0 if joint.is_revolute else of_joint.q**2 for joint, of_joint in pairs]
-    yield np.stack([*map(np.multiply, grains, turns), 0 * block.time], axis=-1)
+    squared_radii = [1.0 if joint.is_revolute else of_joint.q**2 for joint, of_joint in pairs]
+    yield np.stack([*map(np.multiply, grains, squared_radii), 0 * block.time], axis=-1)
 
 
 def _variable_on_grid(robot: Robot, block: Block, name: str, shape: tuple[int, ...]) -> FloatArray:
@@ -334,8 +352,10 @@ def _motors_move_smoothly(block: Block, shape: tuple[int, ...]) -> BoolArray:
     No sample is infeasible, singular or near-singular, and the margin changes by less than a tenth: motor
     motion has features as short as the distance to the end of the attainable range.
     """
-    troubled = has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(*shape, -1)
-    gap = margin(block.stiffness, block.stiffness_min, block.stiffness_max).reshape(*shape, -1)
-    hasty = np.ptp(gap, axis=1) > gap[:, MIDDLE] / 10
-    smooth: BoolArray = ~(np.any(troubled, axis=1) | hasty)
+    is_troubled = has_flag(block.flags, Flag.INFEASIBLE | Flag.SINGULAR | Flag.NEAR_SINGULAR).reshape(
+        *shape, -1
+    )
+    margins = margin(block.stiffness, block.stiffness_min, block.stiffness_max).reshape(*shape, -1)
+    changes_fast = np.ptp(margins, axis=1) > margins[:, MIDDLE] / 10
+    smooth: BoolArray = ~(np.any(is_troubled, axis=1) | changes_fast)
     return smooth

@@ -14,7 +14,7 @@ from vsacli.base.units import LINEAR_STIFFNESS, time_text
 from vsacli.dynamics.limits import Finding
 
 NO_DIRECTION = (math.nan, math.nan, math.nan)
-OF_SOME_TOOLS = {"rigid?": "rigid", "required?": "required"}
+OPTIONAL_FIELDS = {"rigid?": "rigid", "required?": "required"}
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class ToolReport(Stored):
 
     shape: ClassVar = {
         **named("name", "samples", "first_time", "worst"),
-        "stiffness": {"min": "stiffness", **named("time", "direction"), **OF_SOME_TOOLS},
+        "stiffness": {"min": "stiffness", **named("time", "direction"), **OPTIONAL_FIELDS},
     }
 
     def shows(self, verdict: str) -> bool:

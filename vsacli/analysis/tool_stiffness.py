@@ -10,7 +10,7 @@ import numpy as np
 from vsacli.actuators.reach import LIMIT_ROUNDING
 from vsacli.analysis.tool_report import NO_DIRECTION, ToolReport
 from vsacli.base.arrays import AnyArray, BoolArray, FlagArray, FloatArray
-from vsacli.base.flags import Flag, SampleFlag, ToolFlag, has_flag, marked
+from vsacli.base.flags import Flag, SampleFlag, ToolFlag, flags_where, has_flag
 from vsacli.base.units import LINEAR_STIFFNESS
 from vsacli.base.variables import TIP_COMPLIANCE, Block
 from vsacli.base.wrench import Wrench, WrenchFrame
@@ -31,7 +31,7 @@ class ToolSummary:
 
     def __init__(self, tool: Tool) -> None:
         self._tool = tool
-        self._samples = dict.fromkeys(COUNTED_AT_TOOLS, 0)
+        self._sample_counts = dict.fromkeys(COUNTED_AT_TOOLS, 0)
         self._first_time: dict[str, float] = {}
         self._worst: dict[str, Finding] = {}
         self._rigid = False
@@ -49,30 +49,30 @@ class ToolSummary:
             unstable: Where the pose is statically unstable, (samples,).
         """
         required = self._tool.min_stiffness or 0.0
-        below = stiffness < (1 - LIMIT_ROUNDING) * required
+        is_below = stiffness < (1 - LIMIT_ROUNDING) * required
         self._rigid |= bool(np.isinf(stiffness).any())
         if np.isfinite(stiffness).any():
             self._keep_softest(time, stiffness, direction)
-        if below.any():
-            step = int(np.where(below, stiffness, np.inf).argmin())
-            self._keep(ToolFlag.TOOL_STIFFNESS_LIMIT, time[step], float(stiffness[step]), required)
+        if is_below.any():
+            sample = int(np.where(is_below, stiffness, np.inf).argmin())
+            self._keep_worse(ToolFlag.TOOL_STIFFNESS_LIMIT, time[sample], float(stiffness[sample]), required)
         if unstable.any():
-            self._keep(ToolFlag.STATIC_INSTABILITY, time[unstable.argmax()], math.nan, math.nan)
-        flags: FlagArray = marked(ToolFlag.STATIC_INSTABILITY, unstable)
-        flags |= marked(ToolFlag.TOOL_STIFFNESS_LIMIT, below)
+            self._keep_worse(ToolFlag.STATIC_INSTABILITY, time[unstable.argmax()], math.nan, math.nan)
+        flags: FlagArray = flags_where(ToolFlag.STATIC_INSTABILITY, unstable)
+        flags |= flags_where(ToolFlag.TOOL_STIFFNESS_LIMIT, is_below)
         for kind, bit in COUNTED_AT_TOOLS.items():
-            hit = has_flag(flags, bit)
-            self._samples[kind] += int(hit.sum())
-            if hit.any():
+            is_flagged = has_flag(flags, bit)
+            self._sample_counts[kind] += int(is_flagged.sum())
+            if is_flagged.any():
                 for name in (kind, bit.label):
-                    self._first_time.setdefault(name, float(time[hit.argmax()]))
+                    self._first_time.setdefault(name, float(time[is_flagged.argmax()]))
         return flags
 
     def report(self) -> ToolReport:
         """Return the report so far."""
         return ToolReport(
             self._tool.name,
-            dict(self._samples),
+            dict(self._sample_counts),
             dict(self._first_time),
             dict(self._worst),
             *self._softest,
@@ -81,12 +81,12 @@ class ToolSummary:
         )
 
     def _keep_softest(self, time: FloatArray, stiffness: FloatArray, direction: FloatArray) -> None:
-        step = int(np.nanargmin(stiffness))
-        if not self._softest[0] <= stiffness[step]:
-            x, y, z = direction[step].tolist()
-            self._softest = float(stiffness[step]), float(time[step]), (x, y, z)
+        sample = int(np.nanargmin(stiffness))
+        if not self._softest[0] <= stiffness[sample]:
+            x, y, z = direction[sample].tolist()
+            self._softest = float(stiffness[sample]), float(time[sample]), (x, y, z)
 
-    def _keep(self, flag: ToolFlag, time: float, value: float, bound: float) -> None:
+    def _keep_worse(self, flag: ToolFlag, time: float, value: float, bound: float) -> None:
         unit = LINEAR_STIFFNESS.unit("")
         finding = Finding(flag.label, float(time), value, bound, unit, tool=self._tool.name)
         keep_worse(self._worst, finding)
@@ -102,7 +102,7 @@ class ToolStiffness:
     """
 
     def __init__(self, robot: Robot, frame: WrenchFrame | None, *, stored: bool) -> None:
-        self._robot, self._frame, self._stored = robot, frame, stored
+        self._robot, self._frame, self._stores_compliance = robot, frame, stored
         self._summaries = [ToolSummary(tool) for tool in robot.end_effectors]
 
     def add(self, block: Block) -> dict[str, AnyArray]:
@@ -113,13 +113,13 @@ class ToolStiffness:
         compliances: list[FloatArray] = []
         for tool, (carrier, summary) in enumerate(zip(self._robot.tool_joints, self._summaries, strict=True)):
             compliance, unstable = pose.compliance(tool)
-            moving = list(self._robot.paths[carrier])
-            infeasible = has_flag(block.flags[:, moving], Flag.INFEASIBLE).any(axis=1)
+            moving_joints = list(self._robot.paths[carrier])
+            infeasible = has_flag(block.flags[:, moving_joints], Flag.INFEASIBLE).any(axis=1)
             compliance[infeasible] = np.nan
             flags.append(summary.add(block.time, *softest_direction(compliance), unstable & ~infeasible))
             compliances.append(compliance)
-        asked = {TIP_COMPLIANCE: np.stack(compliances, axis=1)} if self._stored else {}
-        return {"tool_flags": np.stack(flags, axis=1), **asked}
+        requested = {TIP_COMPLIANCE: np.stack(compliances, axis=1)} if self._stores_compliance else {}
+        return {"tool_flags": np.stack(flags, axis=1), **requested}
 
     def reports(self) -> tuple[ToolReport, ...]:
         """Return the report of each tool so far."""

@@ -31,7 +31,7 @@ DIFFERENT_PEAK = 1.1
 NOT_DETERMINED = "is not determined by the record"
 """Words of warnings of fits on derivatives that a recording leaves undetermined."""
 
-MOST_IN_FULL = 3
+MAX_SENTENCES_PER_KIND = 3
 """Joints with a full sentence on a kind of problem, where more than one more have it."""
 
 MOST_SENTENCES = 12
@@ -48,7 +48,14 @@ FAILURES = {
 }
 """Verdicts that joints are counted for in the first line of a report, and their words there."""
 
-GRAVEST = ("not_finite", "infeasible", "internal_instability", "static_instability", "singular", OFF_TARGET)
+GRAVEST_KINDS = (
+    "not_finite",
+    "infeasible",
+    "internal_instability",
+    "static_instability",
+    "singular",
+    OFF_TARGET,
+)
 """Kinds of problems that come first; limits follow, and warnings come last."""
 
 COUNTED_AS = {
@@ -63,13 +70,19 @@ def uncertainty_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield what the uncertainty of recorded motions leaves undetermined or undecided."""
     for joint in joints:
         if joint.uncertainty is not None:
-            yield from (f"{joint.name}: {sentence}" for sentence in _sentences(joint, joint.uncertainty))
+            yield from (
+                f"{joint.name}: {sentence}" for sentence in _uncertainty_sentences(joint, joint.uncertainty)
+            )
 
 
 def spread_lines(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield the standard deviations of motor torques of recorded motions."""
     uncertain = [(joint.name, joint.uncertainty) for joint in joints if joint.uncertainty is not None]
-    torques = [(name, each.variables[JUDGED]) for name, each in uncertain if JUDGED in each.variables]
+    torques = [
+        (name, uncertainty.variables[JUDGED])
+        for name, uncertainty in uncertain
+        if JUDGED in uncertainty.variables
+    ]
     if torques:
         yield wrap_joint_entries(
             "standard deviation of motor torque, random noise only: ",
@@ -80,22 +93,22 @@ def spread_lines(joints: Sequence[JointReport]) -> Iterator[str]:
 def little_effect(joints: Sequence[JointReport]) -> Iterator[str]:
     """Yield that motor torques hardly depend on undetermined derivatives, if they are determined."""
     torques = [joint.uncertainty.variables.get(JUDGED) for joint in joints if joint.uncertainty is not None]
-    if torques and all(each is not None and each.determined for each in torques):
-        largest = max(each.bound for each in torques if each is not None)
+    if torques and all(spread is not None and spread.determined for spread in torques):
+        largest = max(spread.bound for spread in torques if spread is not None)
         yield (
             f"motor torques depend little on it: their error may reach {short_percent(largest)} of their "
             f"root mean square; {100 * DETERMINED:.0f} % is allowed"
         )
 
 
-def _sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[str]:
+def _uncertainty_sentences(joint: JointReport, uncertainty: JointUncertainty) -> Iterator[str]:
     yield from map(undetermined_text, uncertainty.undetermined)
     for kind, samples in uncertainty.samples.items():
         if samples:
-            of_samples = counted(joint.samples[kind], "sample")
-            yield f"{samples} of {of_samples} that are {kind} may not be: uncertainty decides"
-    for worst in uncertainty.limits.values():
-        yield f"{worst.text}, but by less than its uncertainty, so it does not count"
+            flagged_text = counted(joint.samples[kind], "sample")
+            yield f"{samples} of {flagged_text} that are {kind} may not be: uncertainty decides"
+    for finding in uncertainty.limits.values():
+        yield f"{finding.text}, but by less than its uncertainty, so it does not count"
     if JUDGED in uncertainty.variables:
         yield from _peak_at_an_end(joint, uncertainty.variables[JUDGED])
 
@@ -110,8 +123,8 @@ def _peak_at_an_end(joint: JointReport, spread: Spread) -> Iterator[str]:
 def _spread_text(name: str, spread: Spread) -> str:
     if not math.isnan(spread.rms):
         return f"{name} +- {spread.rms:.2g} {spread.unit} ({short_percent(spread.share)})"
-    within = "" if math.isnan(spread.bound) else f", wrong by at most {short_percent(spread.bound)}"
-    return f"{name} +- unknown{within}"
+    bound_text = "" if math.isnan(spread.bound) else f", wrong by at most {short_percent(spread.bound)}"
+    return f"{name} +- unknown{bound_text}"
 
 
 def undetermined_text(spread: Spread) -> str:
@@ -129,19 +142,24 @@ def failing_joints_line(joints: Sequence[JointReport], tools: Sequence[ToolRepor
     """Return how many joints and tools fail which requirement; empty if none does, or there is only one."""
     sentences = []
     for members, reports in (("joints", joints), ("tools", tools)):
-        failing = {words: sum(each.shows(verdict) for each in reports) for verdict, words in FAILURES.items()}
+        failing = {
+            words: sum(report.shows(verdict) for report in reports) for verdict, words in FAILURES.items()
+        }
         sentences.append(of_all_joints(failing, len(reports), members))
     return ", ".join(filter(None, sentences))
 
 
 def of_all_joints(failing: Mapping[str, int], total: int, members: str = "joints") -> str:
     """Return numbers of joints and what they fail; empty if none does, or there is only one joint."""
-    failed = [(words, number) for words, number in failing.items() if number]
-    if total == 1 or not failed:
+    failure_counts = [(words, count) for words, count in failing.items() if count]
+    if total == 1 or not failure_counts:
         return ""
-    (words, first), *further = failed
+    (words, first_count), *further_counts = failure_counts
     return ", ".join(
-        [f"{first} of {total} {members} {words}", *(f"{each} {words}" for words, each in further)]
+        [
+            f"{first_count} of {total} {members} {words}",
+            *(f"{count_of_words} {words}" for words, count_of_words in further_counts),
+        ]
     )
 
 
@@ -180,30 +198,41 @@ def group_findings(
         names: names of the joints, in the order of the robot file.
         words: words for each of them; of equally bad ones, the finding at more samples comes first.
     """
-    kinds: dict[str, list[tuple[int, Finding]]] = {}
+    findings_by_kind: dict[str, list[tuple[int, Finding]]] = {}
     for index, finding in findings:
-        kinds.setdefault(finding.kind, []).append((index, finding))
-    in_full = {
-        kind: len(of_kind) if len(of_kind) <= MOST_IN_FULL + 1 else MOST_IN_FULL
-        for kind, of_kind in kinds.items()
+        findings_by_kind.setdefault(finding.kind, []).append((index, finding))
+    sentence_counts = {
+        kind: len(kind_findings)
+        if len(kind_findings) <= MAX_SENTENCES_PER_KIND + 1
+        else MAX_SENTENCES_PER_KIND
+        for kind, kind_findings in findings_by_kind.items()
     }
-    if sum(in_full.values()) > MOST_SENTENCES:
-        in_full = dict.fromkeys(kinds, 1)
-    for kind in sorted(kinds, key=_rank):
-        of_kind = [(finding.share, *words(index, finding), index, finding) for index, finding in kinds[kind]]
-        of_kind.sort(key=lambda entry: (entry[0], entry[3]), reverse=True)
-        yield from (f"{names[index]}: {sentence}" for _, sentence, _, _, index, _ in of_kind[: in_full[kind]])
-        in_list = {index: (brief, finding) for _, _, brief, _, index, finding in of_kind[in_full[kind] :]}
-        if in_list and len(kinds) > MOST_LISTS:
-            yield f"also {_kind_text(kind)}: {', '.join(names[index] for index in sorted(in_list))}"
-        elif in_list:
-            yield _further_joints_line(kind, dict(sorted(in_list.items())), names)
+    if sum(sentence_counts.values()) > MOST_SENTENCES:
+        sentence_counts = dict.fromkeys(findings_by_kind, 1)
+    for kind in sorted(findings_by_kind, key=_rank):
+        kind_findings = [
+            (finding.share, *words(index, finding), index, finding)
+            for index, finding in findings_by_kind[kind]
+        ]
+        kind_findings.sort(key=lambda entry: (entry[0], entry[3]), reverse=True)
+        yield from (
+            f"{names[index]}: {sentence}"
+            for _, sentence, _, _, index, _ in kind_findings[: sentence_counts[kind]]
+        )
+        listed = {
+            index: (brief, finding)
+            for _, _, brief, _, index, finding in kind_findings[sentence_counts[kind] :]
+        }
+        if listed and len(findings_by_kind) > MOST_LISTS:
+            yield f"also {_kind_text(kind)}: {', '.join(names[index] for index in sorted(listed))}"
+        elif listed:
+            yield _further_joints_line(kind, dict(sorted(listed.items())), names)
 
 
 def _further_joints_line(kind: str, briefs: Mapping[int, tuple[str, Finding]], names: Sequence[str]) -> str:
     """Return findings of one kind in a list, with their unit once if it is the same."""
-    values = kind.endswith("_limit") or kind == OFF_TARGET
-    units = {finding.unit if values else "" for _, finding in briefs.values()}
+    has_values = kind.endswith("_limit") or kind == OFF_TARGET
+    units = {finding.unit if has_values else "" for _, finding in briefs.values()}
     unit = "".join(f" ({unit})" for unit in units if unit) if len(units) == 1 else ""
     texts = {
         index: brief if len(units) == 1 else f"{brief} {finding.unit}"
@@ -217,14 +246,14 @@ def _finding_texts(joint: JointReport | ToolReport, worst: Finding, samples: int
     counted_as = COUNTED_AS.get(worst.kind, worst.kind)
     if counted_as not in joint.samples:
         return f"{worst.text} (first at {time_text(joint.first_time[worst.kind])})", worst.brief, 0
-    sentence = _SENTENCES[worst.kind](joint, worst, samples)
+    sentence = _SENTENCE_OF_KIND[worst.kind](joint, worst, samples)
     return sentence, f"({_occurrence_text(joint, counted_as, samples)})", joint.samples[counted_as]
 
 
 def _rank(kind: str) -> tuple[int, int]:
     """Return the place of a kind of problem in a report; limits in the order of their flags."""
-    if kind in GRAVEST:
-        return 0, GRAVEST.index(kind)
+    if kind in GRAVEST_KINDS:
+        return 0, GRAVEST_KINDS.index(kind)
     flag = labeled_flag(kind)
     return (2, 0) if flag is None or kind == "near_singular" else (1, flag.value)
 
@@ -236,17 +265,17 @@ def _kind_text(kind: str) -> str:
 
 def _occurrence_text(joint: JointReport | ToolReport, kind: str, samples: int) -> str:
     """Return in how many samples a joint has a kind of problem, and from when on."""
-    affected = joint.samples[kind]
-    if affected == samples:
+    sample_count = joint.samples[kind]
+    if sample_count == samples:
         return "all samples"
-    words = counted(affected, "sample")
-    return words if affected == 1 else f"{words}, from {time_text(joint.first_time[kind])}"
+    count_text = counted(sample_count, "sample")
+    return count_text if sample_count == 1 else f"{count_text}, from {time_text(joint.first_time[kind])}"
 
 
 def _infeasible_text(joint: JointReport, worst: Finding, samples: int) -> str:
     when, hints = (
         worst.when(closed=True),
-        f"({_occurrence_text(joint, 'infeasible', samples)}){_hints(joint)}",
+        f"({_occurrence_text(joint, 'infeasible', samples)}){_infeasible_hints(joint)}",
     )
     if math.isnan(worst.bound):
         return f"the springs cannot carry the elastic torque {when} at any stiffness; reduce the load {hints}"
@@ -261,28 +290,31 @@ def _infeasible_text(joint: JointReport, worst: Finding, samples: int) -> str:
     )
 
 
-def _hints(joint: JointReport) -> str:
-    count = joint.samples["slack"]
-    slack = f"; a tendon goes slack at {counted(count, 'sample')}" if count else ""
-    return slack + ("; the opposite branch reaches it" if joint.other_branch else "")
+def _infeasible_hints(joint: JointReport) -> str:
+    slack_count = joint.samples["slack"]
+    slack_text = f"; a tendon goes slack at {counted(slack_count, 'sample')}" if slack_count else ""
+    return slack_text + ("; the opposite branch reaches it" if joint.other_branch else "")
 
 
 def _singular_text(joint: JointReport, worst: Finding, samples: int) -> str:
-    when = _occurrence_text(joint, "singular", samples)
+    occurrence = _occurrence_text(joint, "singular", samples)
     if math.isnan(worst.bound):
-        return f"the spring is slack {worst.when()}, so that motor torques are undefined ({when})"
-    change = "decrease" if worst.bound == joint.attainable[1] else "increase"
+        return f"the spring is slack {worst.when()}, so that motor torques are undefined ({occurrence})"
+    advice = "decrease" if worst.bound == joint.attainable[1] else "increase"
     return (
         f"stiffness {significant(worst.value)} {worst.unit} {worst.when(closed=True)} is singular: motor "
-        f"torques are undefined at the end of the attainable range; {change} it ({when})"
+        f"torques are undefined at the end of the attainable range; {advice} it ({occurrence})"
     )
 
 
 def _near_singular_text(joint: JointReport, worst: Finding, samples: int) -> str:
-    gap, when = worst.excess / worst.value, _occurrence_text(joint, "near_singular", samples)
+    gap_ratio, occurrence = (
+        worst.excess / worst.value,
+        _occurrence_text(joint, "near_singular", samples),
+    )
     return (
         f"warning: stiffness {significant(worst.value)} {worst.unit} {worst.when(closed=True)} is "
-        f"{100 * gap:.2g} % from the singularity, where motor torques grow without bound ({when})"
+        f"{100 * gap_ratio:.2g} % from the singularity, where motor torques grow without bound ({occurrence})"
     )
 
 
@@ -308,7 +340,7 @@ def _buckling_text(tool: ToolReport, worst: Finding, samples: int) -> str:
     )
 
 
-_SENTENCES: Mapping[str, Callable[[Any, Finding, int], str]] = {
+_SENTENCE_OF_KIND: Mapping[str, Callable[[Any, Finding, int], str]] = {
     "not_finite": _not_finite_text,
     "infeasible": _infeasible_text,
     "singular": _singular_text,

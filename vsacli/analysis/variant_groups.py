@@ -38,7 +38,7 @@ BATCH_SAMPLES = 2**16
 """Largest number of samples in the batch of several runs, which are in memory together: 50 MB for three
 joints, 130 MB for seven. Half as many take 10 % longer."""
 
-NOT_ROWS = (ValueError, TypeError, AttributeError, NotImplementedError, IndexError)
+ROW_ERRORS = (ValueError, TypeError, AttributeError, NotImplementedError, IndexError)
 """Errors where an array is in the place of a single value."""
 
 
@@ -53,10 +53,10 @@ def numbers_as_rows(
         candidates: Numbers of the robot, limits included.
     """
     trajectory = adapt_trajectory(robot, trajectory)
-    return () if is_alone(robot, trajectory) else tuple(_with_rows(robot, trajectory, [], candidates))
+    return () if is_alone(robot, trajectory) else tuple(_extend_rows(robot, trajectory, [], candidates))
 
 
-def _with_rows(
+def _extend_rows(
     robot: Robot, trajectory: Trajectory, rows: Sequence[Parameter], candidates: Sequence[Parameter]
 ) -> Sequence[Parameter]:
     """Return rows and those of the candidates that can be rows with them, found by halving."""
@@ -64,39 +64,43 @@ def _with_rows(
         return [*rows, *candidates]
     if len(candidates) == 1:
         return rows
-    for half in (candidates[: len(candidates) // 2], candidates[len(candidates) // 2 :]):
-        rows = _with_rows(robot, trajectory, rows, half)
+    for candidates_half in (candidates[: len(candidates) // 2], candidates[len(candidates) // 2 :]):
+        rows = _extend_rows(robot, trajectory, rows, candidates_half)
     return rows
 
 
 def _can_be_rows(robot: Robot, trajectory: Trajectory, numbers: Sequence[Parameter]) -> bool:
     """Return whether results with these numbers as rows agree with those of constants."""
-    with suppress(*NOT_ROWS), np.errstate(all="ignore"):
+    with suppress(*ROW_ERRORS), np.errstate(all="ignore"):
         robots = tuple(
             with_numbers(
-                robot, numbers, [each.value * (1 + change) if each.value else change for each in numbers]
+                robot,
+                numbers,
+                [number.value * (1 + change) if number.value else change for number in numbers],
             )
             for change in (CHANGE, 2 * CHANGE)
         )
         rows = _at_trial_times(Variants(robots, robots[0], tuple(numbers)), trajectory)
-        constants = [_at_trial_times(Variants.of_one(each), trajectory) for each in robots]
-        return all(_agree(rows.taken(slice(place, None, 2)), each) for place, each in enumerate(constants))
+        constants = [_at_trial_times(Variants.of_one(variant), trajectory) for variant in robots]
+        return all(
+            _blocks_agree(rows.taken(slice(index, None, 2)), block) for index, block in enumerate(constants)
+        )
     return False
 
 
 def _at_trial_times(variants: Variants, trajectory: Trajectory) -> Block:
     """Return the variables of variants at some times of a trajectory, the variants at each time in turn."""
-    count = len(variants)
+    variant_count = len(variants)
     times = trajectory.start + trajectory.duration * (np.arange(TRIAL_TIMES) + 0.5) / TRIAL_TIMES
-    dynamics = RunDynamics(variants, [trajectory] * count)
-    return dynamics.at(np.repeat(times, count), np.tile(np.arange(count), TRIAL_TIMES))
+    dynamics = RunDynamics(variants, [trajectory] * variant_count)
+    return dynamics.at(np.repeat(times, variant_count), np.tile(np.arange(variant_count), TRIAL_TIMES))
 
 
-def _agree(one: Block, other: Block) -> bool:
+def _blocks_agree(block: Block, other_block: Block) -> bool:
     """Return whether the variables of two blocks differ by less than `AGREEMENT` of their peaks."""
     return all(
-        np.allclose(array, getattr(other, name), rtol=0, atol=AGREEMENT * _peak(array), equal_nan=True)
-        for name, array in one.arrays().items()
+        np.allclose(array, getattr(other_block, name), rtol=0, atol=AGREEMENT * _peak(array), equal_nan=True)
+        for name, array in block.arrays().items()
     )
 
 
@@ -123,15 +127,18 @@ def batches(runs: Sequence[PreparedRun], varied: Sequence[Parameter]) -> Iterato
     """
     groups: dict[tuple[Robot, tuple[Parameter, ...], Hashable, int | None], list[int]] = {}
     for index, run in enumerate(runs):
-        shared = None if is_alone(*run) else shared_structure(run.robot, varied)
-        structure, rows = shared or (run.robot, ())
-        key = structure, rows, _motion_key(run.trajectory), index if shared is None else None
+        structure_and_rows = None if is_alone(*run) else shared_structure(run.robot, varied)
+        structure, rows = structure_and_rows or (run.robot, ())
+        key = structure, rows, _motion_key(run.trajectory), index if structure_and_rows is None else None
         groups.setdefault(key, []).append(index)
-    for (structure, rows, *_), members in groups.items():
-        together = max(1, BATCH_SAMPLES // runs[members[0]].trajectory.samples)
-        for first in range(0, len(members), together):
-            chosen = members[first : first + together]
-            yield Variants(tuple(runs[index].robot for index in chosen), structure, rows), chosen
+    for (structure, rows, *_), run_indices in groups.items():
+        runs_per_batch = max(1, BATCH_SAMPLES // runs[run_indices[0]].trajectory.samples)
+        for start in range(0, len(run_indices), runs_per_batch):
+            batch_indices = run_indices[start : start + runs_per_batch]
+            yield (
+                Variants(tuple(runs[index].robot for index in batch_indices), structure, rows),
+                batch_indices,
+            )
 
 
 def _motion_key(trajectory: Trajectory) -> Hashable:

@@ -60,11 +60,13 @@ def check_type(argument: str, value: object, expected: type, advice: str) -> Non
     """
     if isinstance(value, expected):
         return
-    path, given = f"{argument}.yaml", _described(value)
+    path, value_text = f"{argument}.yaml", _describe_value(value)
     if isinstance(value, str | os.PathLike):
         path = os.fspath(value)
-        given = f"the path {path!r}"
-    raise TypeError(f"{argument} must be a {expected.__name__}, not {given}; {advice.format(repr(path))}")
+        value_text = f"the path {path!r}"
+    raise TypeError(
+        f"{argument} must be a {expected.__name__}, not {value_text}; {advice.format(repr(path))}"
+    )
 
 
 def check_path(value: object, call: str) -> None:
@@ -74,17 +76,17 @@ def check_path(value: object, call: str) -> None:
         TypeError: with a valid call.
     """
     if not isinstance(value, str | os.PathLike):
-        raise TypeError(f"path must be a path, not {_described(value)}; call {call}")
+        raise TypeError(f"path must be a path, not {_describe_value(value)}; call {call}")
 
 
-def _described(value: object) -> str:
+def _describe_value(value: object) -> str:
     if value is None:
         return "None"
     if isinstance(value, type):
         return f"the class {value.__name__} itself"
-    kind = type(value)
-    room = kind.__module__.partition(".")[0]
-    name = kind.__name__ if room in ("builtins", "vsacli") else f"{room}.{kind.__name__}"
+    value_type = type(value)
+    package = value_type.__module__.partition(".")[0]
+    name = value_type.__name__ if package in ("builtins", "vsacli") else f"{package}.{value_type.__name__}"
     return f"{'an' if name[0] in 'AEIOUaeio' else 'a'} {name}"
 
 
@@ -109,23 +111,23 @@ class FieldProblem(NamedTuple):
 
     def in_file(self, joints: Sequence[str]) -> str:
         """Return the sentence with joint names; list indices are omitted, since the line is known."""
-        keys = (step for step in self.path if isinstance(step, str))
+        keys = (key for key in self.path if isinstance(key, str))
         return self._sentence(keys, None if self.joint is None else joints[self.joint])
 
     def _sentence(self, path: Iterable[str], joint: str | None) -> str:
-        where = " of joint ".join(filter(None, [".".join(path), joint]))
+        field_text = " of joint ".join(filter(None, [".".join(path), joint]))
         message = self.message.format(*self.quantities) if self.quantities else self.message
-        return f"{where}: {message}" if where else message
+        return f"{field_text}: {message}" if field_text else message
 
     def in_units(self, variant: str | None) -> FieldProblem:
         """Return the problem with the units of a joint type; None is an unknown one."""
-        units = [each if variant is None else each.unit(variant) for each in self.quantities]
+        units = [quantity if variant is None else quantity.unit(variant) for quantity in self.quantities]
         message = self.message.format(*units) if units else self.message
         return self._replace(message=message, quantities=())
 
-    def inside(self, *outer: str | int) -> FieldProblem:
-        """Return the same problem seen from an enclosing record; `outer` is the path from there."""
-        return self._replace(path=(*outer, *self.path))
+    def inside(self, *outer_path: str | int) -> FieldProblem:
+        """Return the same problem seen from an enclosing record; `outer_path` is the path from there."""
+        return self._replace(path=(*outer_path, *self.path))
 
 
 class InvalidRecordError(InputError):

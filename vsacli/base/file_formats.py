@@ -12,7 +12,7 @@ COLUMNS = "vsacli-columns/1"
 RESULT = "vsacli-result/2"
 SIMULATION = "vsacli-simulation/2"
 SENSITIVITY = "vsacli-sensitivity/2"
-OF_TREES = {
+TREE_FORMATS = {
     RESULT: "vsacli-result/3",
     SIMULATION: "vsacli-simulation/3",
     SENSITIVITY: "vsacli-sensitivity/3",

@@ -19,7 +19,7 @@ INDENT = "  "
 WIDEST_INDENT = 3
 """Inverse of the largest share of the width by which continuation lines are indented below a label."""
 
-TOGETHER = re.compile(
+UNBREAKABLE_BLANKS = re.compile(
     r"(?<=\d) (?=[A-Za-z%])|(?<=\bN) (?=m\b)| (?=[+-]\d)| (?=[<>] )|(?<=[<>]) | (?=[\d.e+-]+ [<>] )"
 )
 """Blanks at which a line is not broken: between a number and its unit, within newton meters, within a
@@ -51,40 +51,44 @@ def fitted(text: str, width: int) -> str:
     width = max(width, LEAST_WIDTH)
     if all(len(line) <= width for line in text.split("\n")):
         return text
-    headline, *lines = _joined(text.split("\n"))
-    broken = [headline]
+    headline, *lines = _join_continuations(text.split("\n"))
+    output_lines = [headline]
     if len(headline) > width:
-        broken = _wrapped(TOGETHER.sub(HARD_BLANK, headline), INDENT, width)
-    for is_table, group in groupby(zip(lines, _in_tables(lines), strict=True), key=itemgetter(1)):
-        several = [line for line, _ in group]
-        fits = all(len(line) <= width for line in several)
-        if is_table and len(several) > 1 and not fits:
-            broken += _parts_of_table(several, width)
+        output_lines = _wrap_line(UNBREAKABLE_BLANKS.sub(HARD_BLANK, headline), INDENT, width)
+    for is_table, group in groupby(zip(lines, _table_mask(lines), strict=True), key=itemgetter(1)):
+        group_lines = [line for line, _ in group]
+        is_fitting = all(len(line) <= width for line in group_lines)
+        if is_table and len(group_lines) > 1 and not is_fitting:
+            output_lines += _table_parts(group_lines, width)
         else:
-            broken += [part for line in several for part in _broken(line, width)]
-    return "\n".join(broken)
+            output_lines += [part for line in group_lines for part in _broken_line(line, width)]
+    return "\n".join(output_lines)
 
 
-def _in_tables(lines: Sequence[str]) -> list[bool]:
+def _table_mask(lines: Sequence[str]) -> list[bool]:
     """Return which lines belong to tables: those with several cells, and some between them with one.
 
     These are lines of a header with the unit of one column, blank in front, and names above groups of rows,
     not wider than the first column.
     """
-    found = [False]
+    in_table = [False]
     for line, below in zip(lines, [*lines[1:], ""], strict=False):
-        first = FIRST_COLUMN.match(below)
-        is_name = bool(first) and _has_cells(below) and len(line) <= len(first[0] if first else "")
-        alone = found[-1] and bool(line.strip()) and (line.startswith(BETWEEN_CELLS) or is_name)
-        found.append(_has_cells(line) or alone)
-    return found[1:]
+        first_column = FIRST_COLUMN.match(below)
+        is_name = (
+            bool(first_column)
+            and _has_cells(below)
+            and len(line) <= len(first_column[0] if first_column else "")
+        )
+        is_lone_cell = in_table[-1] and bool(line.strip()) and (line.startswith(BETWEEN_CELLS) or is_name)
+        in_table.append(_has_cells(line) or is_lone_cell)
+    return in_table[1:]
 
 
 def _has_cells(line: str) -> bool:
     return BETWEEN_CELLS in line.strip()
 
 
-def _joined(lines: Sequence[str]) -> list[str]:
+def _join_continuations(lines: Sequence[str]) -> list[str]:
     """Return the lines, with continuation lines below a label joined to it."""
     joined: list[str] = []
     for line in lines:
@@ -95,21 +99,21 @@ def _joined(lines: Sequence[str]) -> list[str]:
     return joined
 
 
-def _broken(line: str, width: int) -> list[str]:
+def _broken_line(line: str, width: int) -> list[str]:
     """Return a line broken between words."""
     if len(line) <= width:
         return [line]
     if COMMAND.match(line):
-        *parts, last = _wrapped(
-            QUOTED.sub(lambda found: found[0].replace(" ", HARD_BLANK), line),
+        *parts, last = _wrap_line(
+            QUOTED.sub(lambda match: match[0].replace(" ", HARD_BLANK), line),
             _indent(line, width),
             width - len(CONTINUED),
         )
         return [*(part + CONTINUED for part in parts), last]
-    return _wrapped(TOGETHER.sub(HARD_BLANK, line), _indent(line, width), width)
+    return _wrap_line(UNBREAKABLE_BLANKS.sub(HARD_BLANK, line), _indent(line, width), width)
 
 
-def _wrapped(line: str, indent: str, width: int) -> list[str]:
+def _wrap_line(line: str, indent: str, width: int) -> list[str]:
     """Return a line, in which some blanks are marked as hard, broken at the others."""
     parts = textwrap.wrap(
         line,
@@ -124,32 +128,35 @@ def _wrapped(line: str, indent: str, width: int) -> list[str]:
 def _indent(line: str, width: int) -> str:
     """Return the indent of continuation lines: below the text after a label, if that leaves enough width."""
     label, colon, _ = line.partition(": ")
-    below = " " * len(label + colon)
-    if colon and len(below) * WIDEST_INDENT <= width:
-        return below
+    indent = " " * len(label + colon)
+    if colon and len(indent) * WIDEST_INDENT <= width:
+        return indent
     return " " * (len(line) - len(line.lstrip())) + INDENT
 
 
-def _parts_of_table(lines: Sequence[str], width: int) -> Iterator[str]:
+def _table_parts(lines: Sequence[str], width: int) -> Iterator[str]:
     """Yield the table in parts that fit, one below the other, each with the first column."""
-    first, *columns = _columns(lines)
+    first_column, *columns = _columns(lines)
     while columns:
-        taken, room = 1, width - len(first[0]) - len(BETWEEN_CELLS) - len(columns[0][0])
-        while taken < len(columns) and (room := room - len(BETWEEN_CELLS) - len(columns[taken][0])) >= 0:
-            taken += 1
-        for cells in zip(first, *columns[:taken], strict=True):
+        column_count, free_width = 1, width - len(first_column[0]) - len(BETWEEN_CELLS) - len(columns[0][0])
+        while (
+            column_count < len(columns)
+            and (free_width := free_width - len(BETWEEN_CELLS) - len(columns[column_count][0])) >= 0
+        ):
+            column_count += 1
+        for cells in zip(first_column, *columns[:column_count], strict=True):
             yield BETWEEN_CELLS.join(cells).rstrip()
-        columns = columns[taken:]
+        columns = columns[column_count:]
 
 
 def _columns(lines: Sequence[str]) -> list[list[str]]:
     """Return the cells of a table by column; three blanks or more in every line separate columns."""
     longest = max(map(len, lines))
     padded = [line.ljust(longest) for line in lines]
-    blank = [all(line[place] == " " for line in padded) for place in range(longest)]
+    blank = [all(line[position] == " " for line in padded) for position in range(longest)]
     bounds, start = [], 0
-    for is_blank, places in groupby(range(longest), key=blank.__getitem__):
-        span = list(places)
+    for is_blank, positions in groupby(range(longest), key=blank.__getitem__):
+        span = list(positions)
         if is_blank and len(span) >= len(BETWEEN_CELLS) and span[0] > 0:
             bounds.append((start, span[0]))
             start = span[-1] + 1

@@ -118,13 +118,13 @@ LIMITS = reduce(or_, (flag for flag in Flag if flag.quantity is not None))
 
 def has_flag(flags: FlagArray, bits: SampleFlag) -> BoolArray:
     """Return where any of the bits is set."""
-    hit: BoolArray = (flags & FLAG_TYPE(bits)) != 0
-    return hit
+    is_set: BoolArray = (flags & FLAG_TYPE(bits)) != 0
+    return is_set
 
 
-def marked(flag: SampleFlag, where: BoolArray) -> FlagArray:
+def flags_where(flag: SampleFlag, mask: BoolArray) -> FlagArray:
     """Return an array with the bit set where the condition holds, else 0."""
-    return where.astype(FLAG_TYPE) * FLAG_TYPE(flag)
+    return mask.astype(FLAG_TYPE) * FLAG_TYPE(flag)
 
 
 def finite(arrays: Iterable[FloatArray]) -> BoolArray:
@@ -132,9 +132,9 @@ def finite(arrays: Iterable[FloatArray]) -> BoolArray:
     return reduce(and_, map(np.isfinite, arrays))
 
 
-def not_finite_flags(where: BoolArray) -> FlagArray:
+def not_finite_flags(mask: BoolArray) -> FlagArray:
     """Set NOT_FINITE with INFEASIBLE, so that code that checks only INFEASIBLE also stops there."""
-    return marked(Flag.NOT_FINITE | Flag.INFEASIBLE, where)
+    return flags_where(Flag.NOT_FINITE | Flag.INFEASIBLE, mask)
 
 
 def check_min_margin(min_margin: float) -> None:

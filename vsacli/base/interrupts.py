@@ -10,10 +10,12 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+ENDING_SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+)
 """Signals of Ctrl-C, of the end or preemption of a batch job, and of a closed terminal."""
 
-AGAIN = 0.01
+RESEND_DELAY = 0.01
 """Delay (s) before a signal is sent again that arrived where an exception cannot propagate."""
 
 
@@ -36,26 +38,28 @@ def unwinding_when_ended() -> Iterator[None]:
     A signal that the parent process ignores, as with `nohup`, stays ignored, and so do signals that arrive
     after all output is written (`Deferred.disregard`).
     """
-    for number in ENDING:
+    for number in ENDING_SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _unwind)
-    otherwise = sys.unraisablehook
+            signal.signal(number, _raise_interrupted)
+    previous_hook = sys.unraisablehook
 
-    def unraisable(what: sys.UnraisableHookArgs) -> None:
-        if isinstance(what.exc_value, Interrupted):  # in a callback of the interpreter, as of an import lock
-            ended = threading.Timer(AGAIN, os.kill, (os.getpid(), what.exc_value.number))
+    def unraisable(unraisable_error: sys.UnraisableHookArgs) -> None:
+        if isinstance(
+            unraisable_error.exc_value, Interrupted
+        ):  # in a callback of the interpreter, as of an import lock
+            ended = threading.Timer(RESEND_DELAY, os.kill, (os.getpid(), unraisable_error.exc_value.number))
             ended.daemon = True
             ended.start()
         else:
-            otherwise(what)
+            previous_hook(unraisable_error)
 
     sys.unraisablehook = unraisable
     try:
         yield
     finally:
-        sys.unraisablehook = otherwise
-        for number in ENDING:
-            if signal.getsignal(number) is _unwind:
+        sys.unraisablehook = previous_hook
+        for number in ENDING_SIGNALS:
+            if signal.getsignal(number) is _raise_interrupted:
                 signal.signal(number, signal.SIG_DFL)
 
 
@@ -77,14 +81,14 @@ def starting_worker() -> Iterator[None]:
         from multiprocessing import resource_tracker
 
         resource_tracker.ensure_running()  # it ends with unblocking Ctrl-C
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield
         finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
-def _unwind(number: int, _frame: object) -> None:
+def _raise_interrupted(number: int, _frame: object) -> None:
     raise Interrupted(number)
 
 
@@ -97,16 +101,18 @@ class Deferred:
     """
 
     def __init__(self) -> None:
-        handlers = {number: signal.getsignal(number) for number in ENDING}
-        self.handlers: dict[int, Any] = {each: how for each, how in handlers.items() if callable(how)}
+        handlers = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
+        self.handlers: dict[int, Any] = {
+            each: handler for each, handler in handlers.items() if callable(handler)
+        }
         self.arrived: list[int] = []
 
     def disregard(self) -> None:
         """Ignore signals that would interrupt the run, now and later: its work is done."""
         for number, handler in self.handlers.items():
-            if handler is _unwind:
+            if handler is _raise_interrupted:
                 self.handlers[number] = signal.SIG_IGN
-                self.arrived = [each for each in self.arrived if each != number]
+                self.arrived = [signal_number for signal_number in self.arrived if signal_number != number]
 
 
 @contextlib.contextmanager
@@ -121,7 +127,7 @@ def interrupts_deferred() -> Iterator[Deferred]:
         return
     try:
         for number in deferred.handlers:
-            signal.signal(number, lambda came, _: deferred.arrived.append(came))
+            signal.signal(number, lambda arrived_signal, _: deferred.arrived.append(arrived_signal))
         yield deferred
     finally:
         for number, handler in deferred.handlers.items():

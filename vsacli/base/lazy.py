@@ -36,8 +36,8 @@ class LazyRegistry(Mapping[str, Any]):
             KeyError: the class is not registered.
         """
         home = f"{cls.__module__}:{cls.__qualname__}"
-        for name, other in self.homes.items():
-            if other == home:
+        for name, registered_home in self.homes.items():
+            if registered_home == home:
                 return name
         raise KeyError(home)
 
@@ -82,13 +82,13 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
     def homes() -> dict[str, str]:
         path = sys.modules[package].__file__
         assert path is not None
-        return dict(_imported_for_types(path))
+        return dict(_type_checking_imports(path))
 
     def get(name: str) -> Any:
-        listed = vars(sys.modules[package]).get("__all__")
+        exported = vars(sys.modules[package]).get("__all__")
         if name == "__all__":
             return sorted(homes())
-        if name not in (homes() if listed is None else listed):
+        if name not in (homes() if exported is None else exported):
             raise _MissingNameError(package, name)
         home = homes()[name]
         if home == package:  # a submodule
@@ -98,7 +98,7 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
     return get, lambda: sorted(homes())
 
 
-def _imported_for_types(path: str) -> Iterator[tuple[str, str]]:
+def _type_checking_imports(path: str) -> Iterator[tuple[str, str]]:
     """Yield each name that a module imports under `if TYPE_CHECKING:`, with the module it comes from."""
     with open(path, encoding="utf-8") as file:
         statements = ast.parse(file.read()).body

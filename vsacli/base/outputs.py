@@ -41,8 +41,10 @@ class Staged:
     @contextlib.contextmanager
     def opened(self, *, binary: bool = False) -> Iterator[Any]:
         """Open for bytes, or for text without translation of line ends."""
-        how: dict[str, Any] = {"mode": "wb"} if binary else {"mode": "w", "encoding": "utf-8", "newline": ""}
-        with reporting_storage_errors(self.path), self.temporary.open(**how) as stream:
+        open_options: dict[str, Any] = (
+            {"mode": "wb"} if binary else {"mode": "w", "encoding": "utf-8", "newline": ""}
+        )
+        with reporting_storage_errors(self.path), self.temporary.open(**open_options) as stream:
             yield stream
 
     def write_text(self, text: str) -> None:
@@ -89,7 +91,7 @@ class Outputs:
             InputError: the command reads the file, or already writes one of this name.
         """
         target = self.check(path)
-        staged = self._in_new_folder(target) or self._staging(target)
+        staged = self._path_in_new_folder(target) or self._new_staging_path(target)
         with reporting_storage_errors(path):
             staged.open("xb").close()
         self._files.append(Staged(Path(path), target, staged))
@@ -105,11 +107,11 @@ class Outputs:
             raise InputError.one("standard output cannot hold this; name a file", path)
         with reporting_storage_errors(path):
             target = Path(os.path.realpath(path))
-        if any(target == each.target for each in self._files):
+        if any(target == file.target for file in self._files):
             raise InputError.one("would be written twice by this command; choose different names", path)
-        if self._in_new_folder(target) is None:
-            there = [each for each in self._inputs if os.path.exists(each)]
-            if os.path.exists(path) and any(os.path.samefile(path, each) for each in there):
+        if self._path_in_new_folder(target) is None:
+            existing_inputs = [file for file in self._inputs if os.path.exists(file)]
+            if os.path.exists(path) and any(os.path.samefile(path, file) for file in existing_inputs):
                 message = "is an input of this command; choose another name for the output"
                 raise InputError.one(message, path)
             with reporting_storage_errors(path):
@@ -126,15 +128,17 @@ class Outputs:
             target = Path(os.path.realpath(path))
             if target.is_dir():
                 return
-            staged = self._in_new_folder(target)
+            staged = self._path_in_new_folder(target)
             if staged is None:
-                above = itertools.pairwise([target, *target.parents])
-                first = next(each for each, parent in above if parent.is_dir())
-                if first.exists():
-                    what = "is a file" if first == target else f"{first.name} is a file"
-                    raise StorageError(path, f"{what}; name a folder")
-                self._folders[first] = Staged(Path(path), first, self._staging(first))
-                staged = self._folders[first].temporary / target.relative_to(first)
+                folders_with_parents = itertools.pairwise([target, *target.parents])
+                outermost_new = next(folder for folder, parent in folders_with_parents if parent.is_dir())
+                if outermost_new.exists():
+                    finding = "is a file" if outermost_new == target else f"{outermost_new.name} is a file"
+                    raise StorageError(path, f"{finding}; name a folder")
+                self._folders[outermost_new] = Staged(
+                    Path(path), outermost_new, self._new_staging_path(outermost_new)
+                )
+                staged = self._folders[outermost_new].temporary / target.relative_to(outermost_new)
             staged.mkdir(parents=True, exist_ok=True)
 
     @property
@@ -142,25 +146,28 @@ class Outputs:
         """Paths of the files, in the order in which they were named."""
         return tuple(file.path for file in self._files)
 
-    def _in_new_folder(self, target: Path) -> Path | None:
+    def _path_in_new_folder(self, target: Path) -> Path | None:
         """Return the place of a file or folder in a new folder that is staged; None if it belongs to none."""
         for folder in self._folders.values():
             if target.is_relative_to(folder.target):
                 return folder.temporary / target.relative_to(folder.target)
         return None
 
-    def _staging(self, target: Path) -> Path:
+    def _new_staging_path(self, target: Path) -> Path:
         """Return a temporary name next to a target; remove leftovers of earlier runs from that folder."""
-        if all(target.parent != each.parent for each in self._temporaries):
+        if all(target.parent != temporary.parent for temporary in self._temporaries):
             sweep(target.parent)
         self._temporaries.append(target.with_name(staging_name()))
         return self._temporaries[-1]
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+        self,
+        error_type: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
     ) -> None:
         try:
-            if kind is None:
+            if error_type is None:
                 self._publish()
         finally:
             for path in self._temporaries:
@@ -179,7 +186,7 @@ class Outputs:
             for file in self._files:
                 if file.temporary in self._temporaries:
                     with reporting_storage_errors(file.path):
-                        self._name(file, undo)
+                        self._publish_file(file, undo)
             undo.pop_all()
             if self._files:
                 interrupts.disregard()
@@ -187,18 +194,18 @@ class Outputs:
             with contextlib.suppress(OSError):  # some file systems cannot sync a folder
                 _sync(parent, os.O_RDONLY)
 
-    def _name(self, file: Staged, undo: contextlib.ExitStack) -> None:
+    def _publish_file(self, file: Staged, undo: contextlib.ExitStack) -> None:
         if self._overwrite and file.target.exists():
-            kept = self._staging(file.target)
+            backup = self._new_staging_path(file.target)
             try:
-                os.link(file.target, kept)
+                os.link(file.target, backup)
             except OSError:  # no hard links here (exFAT, some network shares)
                 import shutil
 
-                shutil.copy2(file.target, kept)
+                shutil.copy2(file.target, backup)
             _take_permissions(file.temporary, file.target.stat())
             file.temporary.replace(file.target)
-            undo.callback(kept.replace, file.target)
+            undo.callback(backup.replace, file.target)
         else:
             _name_without_replacing(file, optional=self._overwrite is not None)
             undo.callback(file.target.unlink)
@@ -215,7 +222,7 @@ def _check_target(path: str | Path, target: Path, *, overwrite: bool | None) -> 
     if not target.is_file():
         raise StorageError(path, "is not a regular file and cannot be replaced")
     if not overwrite:
-        raise _already_there(path, optional=overwrite is not None)
+        raise _existing_file_error(path, optional=overwrite is not None)
     if target.stat().st_nlink > 1:
         sweep(target.parent)  # a run that was killed while it named this file has left it a second name
         if (names := target.stat().st_nlink) > 1:  # the others would keep the old content
@@ -226,28 +233,30 @@ def _check_target(path: str | Path, target: Path, *, overwrite: bool | None) -> 
             )
 
 
-def _already_there(path: str | Path, *, optional: bool) -> StorageError:
+def _existing_file_error(path: str | Path, *, optional: bool) -> StorageError:
     """Return the error for an existing file; the advice depends on whether the command can replace it."""
     advice = "replace it with --overwrite" if optional else "remove it first"
     return StorageError(path, f"exists already; choose another name, or {advice}")
 
 
-def _take_permissions(path: Path, replaced: os.stat_result) -> None:
+def _take_permissions(path: Path, replaced_status: os.stat_result) -> None:
     """Give a file the owner, group and mode of the file that it replaces, as far as the system permits.
 
     If the group cannot be set, members of the file's own group are strangers: they get no more rights than
     others have.
     """
-    mode, new = stat.S_IMODE(replaced.st_mode), path.stat()
+    mode, status = stat.S_IMODE(replaced_status.st_mode), path.stat()
     if hasattr(os, "chown"):
-        if replaced.st_gid != new.st_gid and not _permitted(os.chown, path, -1, replaced.st_gid):
+        if replaced_status.st_gid != status.st_gid and not _try_change(
+            os.chown, path, -1, replaced_status.st_gid
+        ):
             mode &= ~stat.S_IRWXG | (mode & stat.S_IRWXO) << 3
-        if replaced.st_uid != new.st_uid:
-            _permitted(os.chown, path, replaced.st_uid, -1)
-    _permitted(path.chmod, mode)  # last, since a change of owner clears the setuid bit
+        if replaced_status.st_uid != status.st_uid:
+            _try_change(os.chown, path, replaced_status.st_uid, -1)
+    _try_change(path.chmod, mode)  # last, since a change of owner clears the setuid bit
 
 
-def _permitted(change: Callable[..., None], *arguments: object) -> bool:
+def _try_change(change: Callable[..., None], *arguments: object) -> bool:
     try:
         change(*arguments)
     except OSError:  # no permission, or a file system without owners
@@ -260,10 +269,10 @@ def _name_without_replacing(file: Staged, *, optional: bool) -> None:
     try:
         os.link(file.temporary, file.target)
     except FileExistsError as error:
-        raise _already_there(file.path, optional=optional) from error
+        raise _existing_file_error(file.path, optional=optional) from error
     except OSError as error:  # no hard links here
         if file.target.exists():
-            raise _already_there(file.path, optional=optional) from error
+            raise _existing_file_error(file.path, optional=optional) from error
         file.temporary.replace(file.target)
 
 

@@ -30,7 +30,7 @@ BYTES_PER_READ = 2**20
 UNCHECKED_BYTES = 2**24
 """Size (bytes) below which free space is not checked, since writing such a file takes less time."""
 
-_REASON = {
+_REASON_BY_ERRNO = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "the disk quota is exhausted",
     errno.EFBIG: "the file would exceed the largest file size allowed here",
@@ -70,7 +70,7 @@ def reason(error: OSError) -> str:
     """Return an operating system error as a clause."""
     if isinstance(error, FileNotFoundError) and error.filename is not None:  # else from `tempfile`
         return "no such file or folder"
-    return _REASON.get(error.errno or 0, error.strerror or str(error))
+    return _REASON_BY_ERRNO.get(error.errno or 0, error.strerror or str(error))
 
 
 def check_free_space(path: str | Path, size: int) -> None:
@@ -93,7 +93,9 @@ def check_free_space(path: str | Path, size: int) -> None:
         ) from OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-_NAME = re.compile(r"\.vsacli-(?P<host>[0-9a-f]{12})-(?P<process>\d+)-(?P<start>\d+)-[0-9a-f]{16}\.tmp")
+_STAGING_NAME = re.compile(
+    r"\.vsacli-(?P<host>[0-9a-f]{12})-(?P<process>\d+)-(?P<start>\d+)-[0-9a-f]{16}\.tmp"
+)
 
 UNKNOWN_START = 0
 """Start time of a process on systems that do not report it."""
@@ -124,7 +126,7 @@ class Unfinished(NamedTuple):
 def staging_name() -> str:
     """Return a unique hidden name that identifies host, process, and start time of the process."""
     process = os.getpid()
-    return f".vsacli-{_host()}-{process}-{_start(process)}-{os.urandom(8).hex()}.tmp"
+    return f".vsacli-{_host_digest()}-{process}-{_process_start(process)}-{os.urandom(8).hex()}.tmp"
 
 
 def sweep(folder: Path) -> None:
@@ -133,17 +135,17 @@ def sweep(folder: Path) -> None:
     Files of running processes stay, and so do files from other hosts, whose processes cannot be seen from
     here: the folder may be on a network share.
     """
-    for path, owner in _staged(folder):
+    for path, owner in _staged_files(folder):
         if owner is Owner.ENDED:
             remove(path)
 
 
 def unfinished(folder: Path) -> list[Unfinished]:
     """Return the unfinished files of a folder, including those of killed processes."""
-    return [Unfinished(path, owner, size_of(path)) for path, owner in sorted(_staged(folder))]
+    return [Unfinished(path, owner, size_of(path)) for path, owner in sorted(_staged_files(folder))]
 
 
-def _staged(folder: Path) -> list[tuple[Path, Owner]]:
+def _staged_files(folder: Path) -> list[tuple[Path, Owner]]:
     """Return each staged file of a folder with its owner; nothing if the folder cannot be read."""
     with contextlib.suppress(OSError):
         owners = ((path, owner_of(path.name)) for path in folder.iterdir())
@@ -153,20 +155,20 @@ def _staged(folder: Path) -> list[tuple[Path, Owner]]:
 
 def owner_of(name: str) -> Owner | None:
     """Return the owner of a staged file by its name; None if it is not the name of one."""
-    found = _NAME.fullmatch(name)
-    if found is None:
+    match = _STAGING_NAME.fullmatch(name)
+    if match is None:
         return None
-    if found["host"] != _host():
+    if match["host"] != _host_digest():
         return Owner.ELSEWHERE
-    process = int(found["process"])
+    process = int(match["process"])
     try:
         os.kill(process, 0)  # signal 0 only tests whether the process exists
     except ProcessLookupError:
         return Owner.ENDED
     except OSError:
         return Owner.RUNNING  # exists, but belongs to another user
-    same = _start(process) == int(found["start"])
-    return Owner.RUNNING if same else Owner.ENDED  # numbers of ended processes are reused
+    is_same_process = _process_start(process) == int(match["start"])
+    return Owner.RUNNING if is_same_process else Owner.ENDED  # numbers of ended processes are reused
 
 
 def size_of(path: Path) -> int:
@@ -194,7 +196,7 @@ def remove(path: Path) -> None:
 
 
 @cache
-def _host() -> str:
+def _host_digest() -> str:
     """Return a digest of the host and its process namespace: containers may share a host name."""
     import hashlib
 
@@ -205,7 +207,7 @@ def _host() -> str:
     return hashlib.sha256(f"{platform.node()} {namespace}".encode()).hexdigest()[:12]
 
 
-def _start(process: int) -> int:
+def _process_start(process: int) -> int:
     """Return the start time of a process, in clock ticks since boot (proc(5))."""
     try:
         status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8", errors="replace")
@@ -227,9 +229,9 @@ def temporary_folder() -> Iterator[Path]:
     from tempfile import gettempdir
 
     with reporting_temporary_errors():
-        place = Path(gettempdir())
-    sweep(place)
-    folder = place / staging_name()
+        parent = Path(gettempdir())
+    sweep(parent)
+    folder = parent / staging_name()
     try:
         with reporting_temporary_errors():
             folder.mkdir(mode=0o700)
@@ -244,7 +246,7 @@ def temporary_folder() -> Iterator[Path]:
         remove(folder)
 
 
-_copies: ContextVar[Mapping[str, str]] = ContextVar("copies", default={})  # noqa: B039 - never changed
+_copy_paths: ContextVar[Mapping[str, str]] = ContextVar("copies", default={})  # noqa: B039 - never changed
 
 
 def place_of(path: str | os.PathLike[str]) -> str:
@@ -257,7 +259,7 @@ def place_of(path: str | os.PathLike[str]) -> str:
         StorageError: the disk has no room for the copy.
     """
     name = os.fspath(path)
-    copies = _copies.get()
+    copies = _copy_paths.get()
     if name in copies:
         return copies[name]
     return _standard_input() if name == STANDARD else name
@@ -266,11 +268,11 @@ def place_of(path: str | os.PathLike[str]) -> str:
 @contextlib.contextmanager
 def reading_copies(copies: Mapping[str, str]) -> Iterator[None]:
     """Read files of these paths from copies within this context."""
-    token = _copies.set(copies)
+    token = _copy_paths.set(copies)
     try:
         yield
     finally:
-        _copies.reset(token)
+        _copy_paths.reset(token)
 
 
 @cache
@@ -278,12 +280,12 @@ def _standard_input() -> str:
     """Copy standard input to a file, removed at exit: inputs are read more than once, to name lines."""
     if sys.stdin is None:
         raise OSError(0, "standard input is closed")
-    kept = contextlib.ExitStack()
-    atexit.register(kept.close)
-    copy = kept.enter_context(temporary_folder()) / "stdin"
+    cleanup = contextlib.ExitStack()
+    atexit.register(cleanup.close)
+    copy = cleanup.enter_context(temporary_folder()) / "stdin"
     with reporting_temporary_errors():
-        file = kept.enter_context(copy.open("wb", buffering=0))
-    while piece := sys.stdin.buffer.read(BYTES_PER_READ):
+        file = cleanup.enter_context(copy.open("wb", buffering=0))
+    while chunk := sys.stdin.buffer.read(BYTES_PER_READ):
         with reporting_temporary_errors():
-            file.write(piece)
+            file.write(chunk)
     return str(copy)

@@ -79,13 +79,13 @@ class ComplianceQuantity(WrenchQuantity):
     @property
     def attributes(self) -> dict[str, str]:
         """See `WrenchQuantity.attributes`."""
-        corners = {
+        entry_by_name = {
             "translation_force": 0,
             "translation_moment": 3,
             "rotation_force": 18,
             "rotation_moment": 21,
         }
-        units = {f"units_{name}": self.of_axis(axis) for name, axis in corners.items()}
+        units = {f"units_{name}": self.of_axis(axis) for name, axis in entry_by_name.items()}
         return {"units": "see displacement_axis and wrench_axis", **units}
 
     def __str__(self) -> str:

@@ -18,7 +18,7 @@ from vsacli.base.units import Quantity
 from vsacli.base.wrench import DISPLACEMENT_AXES, WRENCH_AXES, wrench_columns
 
 MOTORS = (1, 2)
-_WRENCH = ("wrench_axis",)
+_WRENCH_DIMS = ("wrench_axis",)
 """Dimensions of the wrench on one tool."""
 
 SPRINGS = "springs"
@@ -74,45 +74,51 @@ class Variable(NamedTuple):
     geared: int = 0
 
 
-def _of_signal(signal: Signal, dim: str, requires: str | None = None) -> Iterator[Variable]:
+def _signal_variables(signal: Signal, dim: str, requires: str | None = None) -> Iterator[Variable]:
     for name, quantity, long_name in zip(signal.names, signal.quantities, signal.long_names, strict=True):
         yield Variable(name, (dim,), quantity, long_name, "given", requires)
 
 
-def _given() -> Iterator[Variable]:
+def _given_variables() -> Iterator[Variable]:
     yield Variable("time", (), units.TIME, "time", "given")
-    yield from _of_signal(POSITION, "joint")
+    yield from _signal_variables(POSITION, "joint")
     for signal in COMMANDED.values():
         # joints with springs have a stiffness even if it is not commanded
-        yield from _of_signal(signal, "joint", SPRINGS if signal is STIFFNESS else signal.key)
-    yield from _of_signal(WRENCH, *_WRENCH)
+        yield from _signal_variables(signal, "joint", SPRINGS if signal is STIFFNESS else signal.key)
+    yield from _signal_variables(WRENCH, *_WRENCH_DIMS)
 
 
-_JOINT, _MOTOR = ("joint",), ("joint", "motor")
+_JOINT_DIMS, _MOTOR_DIMS = ("joint",), ("joint", "motor")
 
-_COMPUTED = (
-    Variable("tau_e", _JOINT, units.TORQUE, "total elastic torque", "(58)"),
-    Variable("dtau_e", _JOINT, units.TORQUE_RATE, "rate of the elastic torque", "(59)"),
-    Variable("ddtau_e", _JOINT, units.TORQUE_ACCELERATION, "second derivative of the elastic torque", "(60)"),
-    Variable("phi", _MOTOR, units.POSITION, "deflection theta - q of each transmission", "(61)"),
-    Variable("dphi", _MOTOR, units.VELOCITY, "deflection rate", "(68)"),
-    Variable("theta", _MOTOR, units.POSITION, "motor position, joint side of the gear", "(69)", geared=1),
-    Variable("dtheta", _MOTOR, units.VELOCITY, "motor velocity, joint side of the gear", "(69)", geared=1),
+_COMPUTED_VARIABLES = (
+    Variable("tau_e", _JOINT_DIMS, units.TORQUE, "total elastic torque", "(58)"),
+    Variable("dtau_e", _JOINT_DIMS, units.TORQUE_RATE, "rate of the elastic torque", "(59)"),
+    Variable(
+        "ddtau_e", _JOINT_DIMS, units.TORQUE_ACCELERATION, "second derivative of the elastic torque", "(60)"
+    ),
+    Variable("phi", _MOTOR_DIMS, units.POSITION, "deflection theta - q of each transmission", "(61)"),
+    Variable("dphi", _MOTOR_DIMS, units.VELOCITY, "deflection rate", "(68)"),
+    Variable(
+        "theta", _MOTOR_DIMS, units.POSITION, "motor position, joint side of the gear", "(69)", geared=1
+    ),
+    Variable(
+        "dtheta", _MOTOR_DIMS, units.VELOCITY, "motor velocity, joint side of the gear", "(69)", geared=1
+    ),
     Variable(
         "ddtheta",
-        _MOTOR,
+        _MOTOR_DIMS,
         units.JOINT_ACCELERATION,
         "motor acceleration, joint side of the gear",
         "(72)",
         geared=1,
     ),
-    Variable("tau_transmission", _MOTOR, units.TORQUE, "flexible torque of each transmission", "(62)"),
+    Variable("tau_transmission", _MOTOR_DIMS, units.TORQUE, "flexible torque of each transmission", "(62)"),
     Variable(
-        "tau_motor", _MOTOR, units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)", geared=-1
+        "tau_motor", _MOTOR_DIMS, units.TORQUE, "motor torque, joint side of the gear", "(73)-(74)", geared=-1
     ),
     Variable(
         "tau_damper",
-        _JOINT,
+        _JOINT_DIMS,
         units.TORQUE,
         "torque of the joint's damper, part of tau_e",
         "damping * velocity of the damper",
@@ -120,22 +126,22 @@ _COMPUTED = (
     ),
     Variable(
         "elastic_energy",
-        _JOINT,
+        _JOINT_DIMS,
         units.ENERGY,
         "elastic energy of the springs of the joint",
         "integral of (62)",
     ),
-    Variable("motor_power", _MOTOR, units.POWER, "mechanical power of the motor", "tau_motor * dtheta"),
+    Variable("motor_power", _MOTOR_DIMS, units.POWER, "mechanical power of the motor", "tau_motor * dtheta"),
     Variable(
         "motor_energy",
-        _MOTOR,
+        _MOTOR_DIMS,
         units.ENERGY,
         "mechanical work of the motor since the first sample",
         "integral of motor_power",
     ),
     Variable(
         "dissipated_power",
-        _JOINT,
+        _JOINT_DIMS,
         units.POWER,
         "power dissipated by friction and damping of the joint and its motors",
         "friction times velocity",
@@ -143,7 +149,7 @@ _COMPUTED = (
     ),
     Variable(
         "current",
-        _MOTOR,
+        _MOTOR_DIMS,
         units.CURRENT,
         "current of the motor",
         "tau_motor/(gear_ratio * torque_constant)",
@@ -151,7 +157,7 @@ _COMPUTED = (
     ),
     Variable(
         "voltage",
-        _MOTOR,
+        _MOTOR_DIMS,
         units.VOLTAGE,
         "voltage of the motor",
         "resistance * current + torque_constant * gear_ratio * dtheta",
@@ -159,7 +165,7 @@ _COMPUTED = (
     ),
     Variable(
         "copper_loss",
-        _MOTOR,
+        _MOTOR_DIMS,
         units.POWER,
         "copper loss in the windings of the motor",
         "resistance * current^2",
@@ -167,7 +173,7 @@ _COMPUTED = (
     ),
     Variable(
         "det_A",
-        _JOINT,
+        _JOINT_DIMS,
         units.DECOUPLING,
         "determinant of the decoupling block of the joint",
         "(67)",
@@ -175,7 +181,7 @@ _COMPUTED = (
     ),
     Variable(
         "stiffness_min",
-        _JOINT,
+        _JOINT_DIMS,
         units.STIFFNESS,
         "minimum attainable stiffness at this elastic torque on the joint's branch",
         "(14)",
@@ -183,7 +189,7 @@ _COMPUTED = (
     ),
     Variable(
         "stiffness_max",
-        _JOINT,
+        _JOINT_DIMS,
         units.STIFFNESS,
         "maximum attainable stiffness at this elastic torque on the joint's branch",
         "(14)",
@@ -191,7 +197,7 @@ _COMPUTED = (
     ),
     Variable(
         "flags",
-        _JOINT,
+        _JOINT_DIMS,
         units.DIMENSIONLESS,
         "flags of this sample of the joint; 0 if there is no finding",
         "margins of (14)",
@@ -233,20 +239,25 @@ def deviation(name: str) -> str:
     return f"{name}_std"
 
 
-def _deviations(declared: Iterable[Variable]) -> Iterator[Variable]:
+def _deviation_variables(declared: Iterable[Variable]) -> Iterator[Variable]:
     for variable in declared:
         if variable.name in UNCERTAIN:
-            words = variable.long_name.replace("commanded ", "")
-            source = "covariance of the fit" if variable.equation == "given" else "first order"
+            long_name = variable.long_name.replace("commanded ", "")
+            equation = "covariance of the fit" if variable.equation == "given" else "first order"
             yield variable._replace(
                 name=deviation(variable.name),
-                long_name=f"standard deviation of the {words}",
-                equation=source,
+                long_name=f"standard deviation of the {long_name}",
+                equation=equation,
             )
 
 
 VARIABLES: dict[str, Variable] = {
-    variable.name: variable for variable in (*_given(), *_COMPUTED, *_deviations((*_given(), *_COMPUTED)))
+    variable.name: variable
+    for variable in (
+        *_given_variables(),
+        *_COMPUTED_VARIABLES,
+        *_deviation_variables((*_given_variables(), *_COMPUTED_VARIABLES)),
+    )
 }
 """All variables by name, `time` first."""
 
@@ -292,9 +303,9 @@ class Block:
         """Return the variables present, by name."""
         return {name: vars(self)[name] for name in self.declared if name in vars(self)}
 
-    def taken(self, steps: int | slice | AnyArray) -> Self:
+    def taken(self, selection: int | slice | AnyArray) -> Self:
         """Return a block of the selected samples; a single number removes the axis of samples."""
-        return type(self)(**{name: array[steps] for name, array in self.arrays().items()})
+        return type(self)(**{name: array[selection] for name, array in self.arrays().items()})
 
     def divided(self, parts: int) -> Iterator[Self]:
         """Yield blocks of equal numbers of consecutive samples."""
@@ -353,7 +364,7 @@ def variables_by_tool(declared: Mapping[str, Variable], tools: int) -> Mapping[s
     if tools < 2:
         return declared
     return {
-        name: _of_each_tool(variable) if variable.dims == _WRENCH else variable
+        name: _of_each_tool(variable) if variable.dims == _WRENCH_DIMS else variable
         for name, variable in declared.items()
     }
 
@@ -380,7 +391,7 @@ def column_names(variable: Variable, labels: Labels) -> list[str]:
     """
     owned = variable.dims[0] in ("joint", "tool")
     owners = [f"{owner}." for owner in labels[variable.dims[0]]] if owned else [""]
-    if variable.dims[owned:] == _WRENCH:
+    if variable.dims[owned:] == _WRENCH_DIMS:
         columns = wrench_columns(variable.name)
     else:
         endings = product(*(labels[dim] for dim in variable.dims[owned:]))

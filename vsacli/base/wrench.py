@@ -77,14 +77,14 @@ def wrench_components(frame: WrenchFrame) -> int:
     return len(WRENCH_AXES) * len(frames_by_tool(frame))
 
 
-def check_frame(frame: str, of: str = "wrench") -> None:
-    """Refuse an unknown frame of a wrench, or of a similar quantity `of`.
+def check_frame(frame: str, quantity: str = "wrench") -> None:
+    """Refuse an unknown frame of a wrench, or of a similar quantity `quantity`.
 
     Raises:
         InputError: with the nearest valid frame.
     """
     if frame not in WRENCH_FRAMES:
-        raise InputError.one(f"unknown frame {frame!r} of the {of}{did_you_mean(frame, WRENCH_FRAMES)}")
+        raise InputError.one(f"unknown frame {frame!r} of the {quantity}{did_you_mean(frame, WRENCH_FRAMES)}")
 
 
 def check_wrench(value: object, tools: Sequence[str]) -> None:
@@ -109,10 +109,12 @@ def check_wrench_frame(frame: WrenchFrame, tools: Sequence[str]) -> None:
     """
     count = len(frames_by_tool(frame))
     if count != len(tools):
-        of_robot = f"{len(tools)}: {', '.join(tools)}" if tools else "none: name them by `tools` in its file"
+        tools_text = (
+            f"{len(tools)}: {', '.join(tools)}" if tools else "none: name them by `tools` in its file"
+        )
         advice = "for several tools give a tuple as frame, None for a tool on which nothing acts"
         raise InputError.one(
-            f"the wrench is for {counted(count, 'tool')}, the robot has {of_robot}; {advice}"
+            f"the wrench is for {counted(count, 'tool')}, the robot has {tools_text}; {advice}"
         )
 
 

@@ -39,7 +39,7 @@ def _wrench_frame(robot: Robot, wrenches: Sequence[str]) -> WrenchFrame | None:
         InputError: there is no such tool, which one is not said, or one has two frames.
     """
     frames: list[str | None] = [None] * len(robot.tool_names)
-    for tool, _, frame in (each.rpartition(":") for each in wrenches):
+    for tool, _, frame in (wrench.rpartition(":") for wrench in wrenches):
         index = robot.end_effector(tool or None)
         if frames[index] is not None:
             raise InputError.one(f"the tool {robot.tool_names[index]} has two frames; give one")
@@ -102,13 +102,13 @@ def codegen(
     from vsacli.control.codegen.project import generate, write
     from vsacli.robot.parameters import parameters
 
-    arm = read_robot(robot)
+    robot_model = read_robot(robot)
     with naming_option("--parameters"):
-        parameters(arm, patterns)
+        parameters(robot_model, patterns)
     with naming_option("--wrench"):
-        frame = _wrench_frame(arm, wrenches)
-    project = generate(arm, precision, frame, patterns, loops=not no_loops)
-    with Outputs(overwrite=overwrite, inputs=[source.path for source in arm.sources]) as outputs:
+        frame = _wrench_frame(robot_model, wrenches)
+    project = generate(robot_model, precision, frame, patterns, loops=not no_loops)
+    with Outputs(overwrite=overwrite, inputs=[source.path for source in robot_model.sources]) as outputs:
         write(project, output, outputs)
     talk.wrote(outputs)
     for reason in project.omitted:

@@ -121,14 +121,14 @@ def engine_options(command: Callable[..., Any]) -> Callable[..., Any]:
             raise click.UsageError("--threads needs --engine c or auto; NumPy uses one thread")
         return command(*args, engine=engine, threads=threads, **kwargs)
 
-    threads = click.option(
+    threads_option = click.option(
         "--threads",
         type=Whole("a number of threads, e.g. 4", least=1),
         metavar="N",
         help="Number of threads of the compiled code.",
         show_default="number of CPU cores",
     )
-    return engine_option(threads(checked))
+    return engine_option(threads_option(checked))
 
 
 class Inputs(NamedTuple):
@@ -164,12 +164,12 @@ def load_inputs(
             made.
     """
     if robot_path == trajectory_path == STANDARD:
-        twice = "ROBOT and TRAJECTORY are both '-', but standard input can be read only once"
-        raise InputError.one(f"{twice}; give a file name for one of them")
+        reason = "ROBOT and TRAJECTORY are both '-', but standard input can be read only once"
+        raise InputError.one(f"{reason}; give a file name for one of them")
     with naming_changes(other_options):
-        of_robot, of_trajectory = _divided(changes)
-        robot = read_robot(robot_path, of_robot)
-        trajectory = read_trajectory(trajectory_path, robot, of_trajectory, talk)
+        robot_changes, trajectory_changes = _divide_changes(changes)
+        robot = read_robot(robot_path, robot_changes)
+        trajectory = read_trajectory(trajectory_path, robot, trajectory_changes, talk)
     talk.detail(
         f"{robot.name}: {len(robot.joints)} joints; {trajectory.name}: {trajectory.samples} samples over "
         f"{trajectory.duration:g} s"
@@ -201,7 +201,7 @@ def read_trajectory(path: str, robot: Robot, changes: Changes | None, talk: Talk
         return load_trajectory(path, robot, changes or {}, progress=talk.fitting)
 
 
-def _divided(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
+def _divide_changes(changes: tuple[str, ...]) -> tuple[Changes, Changes]:
     """Return the changes that concern the robot, and those that concern the trajectory."""
     if not changes:
         return {}, {}
@@ -279,7 +279,12 @@ def _hint(report: Report, files: tuple[str, str], changes: Sequence[str], option
     """Return how to list fixes of a motion that cannot be executed; empty if it can."""
     if report.verdict not in FIXABLE or STANDARD in files:
         return ""  # standard input has been read, and cannot be read again
-    shown = changes if len(changes) <= MOST_CHANGES else ()
-    words = [*files, *(word for change in shown for word in ("--set", change)), *options, "--fixes"]
-    others = "" if shown == changes else ", with the same --set options"
-    return f"to list fixes{others}: vsacli check-feasibility {shlex.join(words)}"
+    repeated_changes = changes if len(changes) <= MOST_CHANGES else ()
+    arguments = [
+        *files,
+        *(word for change in repeated_changes for word in ("--set", change)),
+        *options,
+        "--fixes",
+    ]
+    other_changes = "" if repeated_changes == changes else ", with the same --set options"
+    return f"to list fixes{other_changes}: vsacli check-feasibility {shlex.join(arguments)}"

@@ -84,7 +84,11 @@ def compare(
             ):
                 comparison = compared(stored, recording, time_offset, columns)
             if page is not None:
-                page.write_text(comparison_page(comparison, [input_text(each) for each in stored.inputs()]))
+                page.write_text(
+                    comparison_page(
+                        comparison, [input_text(stored_input) for stored_input in stored.inputs()]
+                    )
+                )
         if page is None and figures is not None:
             draw_comparison(comparison, stem, figures, outputs)
     say(comparison, as_json)
@@ -92,19 +96,21 @@ def compare(
     return Exit.VERDICT if comparison.warnings else Exit.OK
 
 
-def _compare_results(result: str, other: str, for_recordings: Mapping[str, object], as_json: bool) -> Exit:
+def _compare_results(
+    result: str, other_result: str, for_recordings: Mapping[str, object], as_json: bool
+) -> Exit:
     """Compare two results.
 
     Raises:
         click.UsageError: an option is given that is for recordings.
     """
     if option := next((name for name, content in for_recordings.items() if content is not None), None):
-        to_draw = f"to draw both, run vsacli plot {result} {other}"
-        raise click.UsageError(f"{option} is for recordings, but {other} is a result; {to_draw}")
+        drawing_hint = f"to draw both, run vsacli plot {result} {other_result}"
+        raise click.UsageError(f"{option} is for recordings, but {other_result} is a result; {drawing_hint}")
     from vsacli.results.store.reader import open_stored
     from vsacli.studies.measured import compare_results
 
     kinds = naming_kind("RESULT", result, ("result", "simulation"))
-    with kinds, open_stored(result) as first, open_stored(other) as second:
+    with kinds, open_stored(result) as first, open_stored(other_result) as second:
         say(compare_results(first, second), as_json)
     return Exit.OK

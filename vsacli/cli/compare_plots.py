@@ -23,19 +23,22 @@ overflows."""
 
 def draw_comparison(comparison: Comparison, stem: str, target: FigureTarget, outputs: Outputs) -> None:
     """Draw a figure for each measured variable."""
-    curves = _curves(comparison)
+    curves = _measured_curves(comparison)
     files = target.files(curves, stem, outputs)
     recording, result = (Path(path).stem for path in (comparison.recording, comparison.result))
     title = f"comparison of recording {recording} with {result}"
     files.save(
-        {variable: measured_sheet(of_it, f"{title}: {variable}") for variable, of_it in curves.items()}
+        {
+            variable: measured_sheet(variable_curves, f"{title}: {variable}")
+            for variable, variable_curves in curves.items()
+        }
     )
 
 
 def comparison_page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
     """Return an HTML page with the report and all variables."""
     report = printable(comparison.as_text())
-    facts = PageTexts(
+    texts = PageTexts(
         title=report.headline,
         label=one_line(f"{comparison.result}, {comparison.recording}"),
         verdict="",
@@ -44,15 +47,17 @@ def comparison_page(comparison: Comparison, inputs: Sequence[InputText]) -> str:
         provenance=[("vsacli version", __version__), ("result", one_line(comparison.result))],
         inputs=[*inputs, *map(source_text, comparison.sources)],
     )
-    return measured_page(facts, _curves(comparison))
+    return measured_page(texts, _measured_curves(comparison))
 
 
-def _curves(comparison: Comparison) -> dict[str, list[MeasuredCurve]]:
+def _measured_curves(comparison: Comparison) -> dict[str, list[MeasuredCurve]]:
     """Return the compared signals, by variable."""
     curves: dict[str, list[MeasuredCurve]] = {}
-    for each in comparison.signals:
-        if each.samples:
-            drawn = np.clip(each.measured, -LARGEST_DRAWN, LARGEST_DRAWN)
-            curve = MeasuredCurve(each.column, each.unit, each.rms, each.time, each.computed, drawn)
-            curves.setdefault(each.variable, []).append(curve)
+    for signal in comparison.signals:
+        if signal.samples:
+            measured = np.clip(signal.measured, -LARGEST_DRAWN, LARGEST_DRAWN)
+            curve = MeasuredCurve(
+                signal.column, signal.unit, signal.rms, signal.time, signal.computed, measured
+            )
+            curves.setdefault(signal.variable, []).append(curve)
     return curves

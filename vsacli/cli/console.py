@@ -104,17 +104,17 @@ class Reported(Protocol):
         """Return JSON values."""
 
 
-def say(found: Reported, as_json: bool, text: object = None) -> None:
+def say(findings: Reported, as_json: bool, text: object = None) -> None:
     """Print the findings of a command, as JSON or as text."""
     if as_json:
-        say_json(found.as_json())
+        say_json(findings.as_json())
     else:
-        say_text(str(found if text is None else text), getattr(found, "verdict", ""))
+        say_text(str(findings if text is None else text), getattr(findings, "verdict", ""))
 
 
 def say_json(content: Mapping[str, Any]) -> None:
     """Print JSON."""
-    with _read_enough():
+    with _ignoring_closed_reader():
         click.echo(json.dumps(content, indent=1))
 
 
@@ -122,8 +122,8 @@ def say_text(text: str, verdict: str = "") -> None:
     """Print a text: on a terminal fitted to its width, the verdict at its beginning in color."""
     text = for_width(text)
     place = verdict_place(text, verdict)
-    with _read_enough():
-        if place is not None and isinstance(sys.stdout, _CheckedOutput) and _colored():
+    with _ignoring_closed_reader():
+        if place is not None and isinstance(sys.stdout, _CheckedOutput) and _shows_color():
             sys.stdout.write_colored(text, place, COLORS.get(verdict, RED))
             sys.stdout.flush()
         else:
@@ -139,7 +139,7 @@ def for_width(text: str) -> str:
 
 
 @contextmanager
-def _read_enough() -> Iterator[None]:
+def _ignoring_closed_reader() -> Iterator[None]:
     """Ignore a closed reader of standard output within this context, so that the exit code is kept."""
     try:
         yield
@@ -163,10 +163,10 @@ def _terminal_width(stream: TextIO | None) -> int:
         return 0
 
 
-def _colored() -> bool:
+def _shows_color() -> bool:
     """Return whether standard output is a terminal whose user wants colors (no-color.org)."""
-    wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-    return wanted and sys.stdout.isatty()
+    wants_color = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    return wants_color and sys.stdout.isatty()
 
 
 class ProgressLines(NoBar):
@@ -179,16 +179,16 @@ class ProgressLines(NoBar):
 
     def __init__(self, length: int, label: str) -> None:
         self._length, self._label = length, label
-        self._start = self._told = time.monotonic()
+        self._start = self._last_line_time = time.monotonic()
 
     def update(self, steps: int, /) -> None:
         """Count steps that are done."""
         super().update(steps)
-        now = time.monotonic()
-        if now - self._told >= SECONDS_PER_LINE:
-            self._told = now
-            done = f"{self.pos} of {self._length} ({100 * self.pos / self._length:.0f} %)"
-            tell(f"{self._label}: {done} after {now - self._start:.0f} s")
+        time_now = time.monotonic()
+        if time_now - self._last_line_time >= SECONDS_PER_LINE:
+            self._last_line_time = time_now
+            done_text = f"{self.pos} of {self._length} ({100 * self.pos / self._length:.0f} %)"
+            tell(f"{self._label}: {done_text} after {time_now - self._start:.0f} s")
 
 
 @dataclass(frozen=True)
@@ -250,13 +250,13 @@ def talk_options(command: Callable[..., Any]) -> Callable[..., Any]:
         try:
             return command(*args, talk=talk, **kwargs)
         except InputError as error:
-            talk.detail(_origin(error))
+            talk.detail(_library_message(error))
             raise
 
     return talking
 
 
-def _origin(error: BaseException) -> str:
+def _library_message(error: BaseException) -> str:
     """Return the message of a library that an error stems from, on one line; empty if there is none."""
     while isinstance(error, VsacliError) and error.__cause__ is not None:
         error = error.__cause__
@@ -312,11 +312,11 @@ class _CheckedOutput:
 
     def write_colored(self, text: str, place: slice, color: str) -> None:
         """Write a line with one part in color; all other control characters are escaped."""
-        before, words, after = (
+        before_text, verdict_text, after_text = (
             for_terminal(part) for part in (text[: place.start], text[place], text[place.stop :])
         )
         with _raising_output_errors():
-            self._stream.write(f"{before}{color}{words}{PLAIN}{after}\n")
+            self._stream.write(f"{before_text}{color}{verdict_text}{PLAIN}{after_text}\n")
 
     def flush(self) -> None:
         with _raising_output_errors():

@@ -59,10 +59,10 @@ def has_recording(stored: StoredResult, talk: Talk) -> bool:
     if stored.kind != "result" or not stored.report_json.get("fits"):
         return False
     inputs, made_by = stored.inputs(), stored.provenance()["generated_by"]
-    if not inputs or any(each.content is None for each in inputs):
+    if not inputs or any(stored_input.content is None for stored_input in inputs):
         reason = "the result does not hold it"
-    elif made_by != (this := f"vsacli {__version__}"):
-        reason = f"the result was computed by {made_by}, and this is {this}"
+    elif made_by != (this_version := f"vsacli {__version__}"):
+        reason = f"the result was computed by {made_by}, and this is {this_version}"
     else:
         return True
     talk.note(f"{stored.path}: no figure of its recording: {reason}")
@@ -73,8 +73,8 @@ def compute_and_draw(run: Run, target: FigureTarget, stem: str, outputs: Outputs
     """Compute, and draw the figure from a temporary result file."""
     check_drawable([joint.actuator_type for joint in run.robot.joints])
     figures = target.files([FEASIBILITY], stem, outputs)
-    with temporary_folder() as place:
-        file = Staged.unnamed(place / "result.h5")
+    with temporary_folder() as folder:
+        file = Staged.unnamed(folder / "result.h5")
         report = compute(run, talk, ResultWriter(file, run.robot, run.trajectory, FEASIBILITY_VARIABLES))
         with StoredResult.open(file.temporary) as result:
             figures.save({FEASIBILITY: feasibility(StoredCharts([result]))})

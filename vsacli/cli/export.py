@@ -21,11 +21,11 @@ from vsacli.cli.command_parts import (
     variables_option,
 )
 from vsacli.cli.console import Exit, Talk, talk_options, tell
-from vsacli.cli.file_names import FILE, KNOWN, ending_of
+from vsacli.cli.file_names import FILE, KNOWN_ENDINGS, ending_of
 from vsacli.cli.input_errors import in_words, naming_kind, naming_option
 from vsacli.cli.option_types import RATE, Words
-from vsacli.results.exports import FORMATS as OF_RESULTS
-from vsacli.robot.models import FORMATS as OF_ROBOTS
+from vsacli.results.exports import FORMATS as RESULT_FORMATS
+from vsacli.robot.models import FORMATS as ROBOT_FORMATS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -44,10 +44,10 @@ ENDINGS = {
 }
 """File name endings of formats for which these are not the name of the format."""
 
-ONLY_OF_RESULTS = ("variables", "rate", "side", "allow_nan")
+RESULT_OPTIONS = ("variables", "rate", "side", "allow_nan")
 """Options that do not apply to robots."""
 
-_INSTEAD = {
+_ADVICE_BY_KIND = {
     "trajectory": "; compute it first: vsacli invdyn ROBOT {}",
     "table of a study": "; its columns are read with h5py or pandas",
 }
@@ -65,7 +65,7 @@ _INSTEAD = {
 @click.option(
     "--format",
     "form",
-    type=Words((*OF_RESULTS, *OF_ROBOTS)),
+    type=Words((*RESULT_FORMATS, *ROBOT_FORMATS)),
     help="Format. Results: CSV, MATLAB file, Parquet, or JointTrajectory of ROS 2. Robots: URDF, or "
     "MJCF, the XML format of MuJoCo.",
     show_default="extension of the output file, else csv",
@@ -128,46 +128,48 @@ def export(
     kind = recognize(file)
     output = None if output == STANDARD else output
     if kind is FileKind.ROBOT:
-        _check_options(ONLY_OF_RESULTS, "results")
-        name = _chosen(form, OF_ROBOTS, output, file, kind)
+        _check_options(RESULT_OPTIONS, "results")
+        name = _choose_format(form, ROBOT_FORMATS, output, file, kind)
         return _export_robot(file, output, name, start, overwrite, talk)
     if kind not in {FileKind.RESULT, FileKind.SIMULATION}:
         message = f"is {in_words(kind)}; export needs a result, a simulation or a robot"
-        raise InputError.one(message + _INSTEAD.get(kind, "").format(file), file)
+        raise InputError.one(message + _ADVICE_BY_KIND.get(kind, "").format(file), file)
     _check_options(("start",), "MJCF of a robot")
-    name = _chosen(form, OF_RESULTS, output, file, kind)
-    if OF_RESULTS[name].binary and output is None:
+    name = _choose_format(form, RESULT_FORMATS, output, file, kind)
+    if RESULT_FORMATS[name].binary and output is None:
         raise click.UsageError(f"--format {name} needs -o FILE: the file is binary")
     options = {**of_results, "progress": talk.writing}
-    return _export_result(file, output, OF_RESULTS[name], options, overwrite, talk)
+    return _export_result(file, output, RESULT_FORMATS[name], options, overwrite, talk)
 
 
 def _endings(form: str) -> tuple[str, ...]:
     return ENDINGS.get(form, (f".{form}",))
 
 
-def _chosen(form: str | None, formats: Any, output: str | None, file: str, kind: FileKind) -> str:
+def _choose_format(form: str | None, formats: Any, output: str | None, file: str, kind: FileKind) -> str:
     """Return the format named by --format or by the ending of the output; CSV without either."""
     words, name = joined(formats, "or"), output or ""
     if form is not None and form not in formats:
-        others = "robots" if formats is OF_RESULTS else "results"
-        raise InputError.one(f"--format {form} is for {others}; a {kind} is written as {words}", file)
-    able = [each for each in formats if ending_of(name) in _endings(each)]
-    if ending_of(name) and not able and (form is None or ending_of(name) in KNOWN):
-        endings = ", ".join(dict.fromkeys(ending for each in formats for ending in _endings(each)))
-        advice = "" if ending_of(name) in KNOWN else "; with --format the name may be any"
-        message = f"export of a {kind} writes {endings}, not {ending_of(name)}{advice}"
+        other_files = "robots" if formats is RESULT_FORMATS else "results"
+        raise InputError.one(f"--format {form} is for {other_files}; a {kind} is written as {words}", file)
+    matching = [form_name for form_name in formats if ending_of(name) in _endings(form_name)]
+    if ending_of(name) and not matching and (form is None or ending_of(name) in KNOWN_ENDINGS):
+        allowed_endings = ", ".join(
+            dict.fromkeys(ending for form_name in formats for ending in _endings(form_name))
+        )
+        advice = "" if ending_of(name) in KNOWN_ENDINGS else "; with --format the name may be any"
+        message = f"export of a {kind} writes {allowed_endings}, not {ending_of(name)}{advice}"
         raise InputError.one(message, name)
     if form is not None:
-        if able and form not in able:
-            named = f"name the file {_endings(form)[0]} or leave out --format"
-            message = f"--format {form} does not match the ending {ending_of(name)}; {named}"
+        if matching and form not in matching:
+            renaming_hint = f"name the file {_endings(form)[0]} or leave out --format"
+            message = f"--format {form} does not match the ending {ending_of(name)}; {renaming_hint}"
             raise InputError.one(message, name)
         return form
-    if len(able) != 1 and formats is not OF_RESULTS:
-        options = joined([f"--format {each}" for each in formats], "or")
+    if len(matching) != 1 and formats is not RESULT_FORMATS:
+        options = joined([f"--format {form_name}" for form_name in formats], "or")
         raise InputError.one(f"is a {kind}; choose its format: {options}", file)
-    return able[0] if able else "csv"
+    return matching[0] if matching else "csv"
 
 
 def _check_options(names: Iterable[str], subject: str) -> None:
@@ -187,13 +189,13 @@ def _export_robot(
     robot = load_robot(file)
     if form != "mjcf":
         _check_options(("start",), "--format mjcf")
-    model = OF_ROBOTS[form](robot, None if start is None else _read_start(start, robot))
+    model = ROBOT_FORMATS[form](robot, None if start is None else _read_start(start, robot))
     if output is None:
         if model.forces is not None:
             raise InputError.one("this model includes a Python file with forces; give -o FILE", file)
         click.echo(model.text.rstrip("\n"))
     else:
-        with Outputs(overwrite=overwrite, inputs=_inputs(robot, start)) as outputs:
+        with Outputs(overwrite=overwrite, inputs=_input_paths(robot, start)) as outputs:
             outputs.file(output).write_text(model.text)
             if model.forces is not None:
                 path = Path(output)
@@ -204,7 +206,7 @@ def _export_robot(
     return Exit.OK
 
 
-def _inputs(robot: Robot, start: str | None) -> list[str]:
+def _input_paths(robot: Robot, start: str | None) -> list[str]:
     sources = [source.path for source in robot.sources]
     return sources if start is None else [*sources, start]
 
@@ -246,7 +248,7 @@ def _export_result(
                 sys.stdout.flush()
             else:
                 with Outputs(overwrite=overwrite, inputs=[file]) as outputs:
-                    _write(stored, outputs.file(output), form, options)
+                    _write_result(stored, outputs.file(output), form, options)
                 talk.wrote(outputs)
     except UndefinedSamplesError as error:
         tell(str(error))
@@ -254,7 +256,7 @@ def _export_result(
     return Exit.OK
 
 
-def _write(stored: StoredResult, file: Staged, form: ResultFormat, options: dict[str, Any]) -> None:
+def _write_result(stored: StoredResult, file: Staged, form: ResultFormat, options: dict[str, Any]) -> None:
     from vsacli.results.exports.result_format import export_result
 
     with file.opened(binary=form.binary) as stream:

@@ -30,7 +30,7 @@ LENGTH, FONT, RESOLUTION = (
 )
 
 
-LOOK = ("style", "width", "height", "font_size", "dpi", "no_title")
+LOOK_OPTIONS = ("style", "width", "height", "font_size", "dpi", "no_title")
 """Parameters of the look."""
 
 
@@ -85,7 +85,7 @@ class PlaceType(NameType):
 
     def __init__(self, formats: Iterable[str]) -> None:
         super().__init__("folder", "dir")
-        self.endings = [f".{each}" for each in formats]
+        self.endings = [f".{file_format}" for file_format in formats]
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """See `click.ParamType.convert`."""
@@ -149,14 +149,14 @@ def figure_options(
         @click.option("--no-title", is_flag=True, help="Draw figures without a title.")
         @wraps(command)
         def drawing(*args: Any, place: str | None, file_format: str | None, **kwargs: Any) -> Any:
-            chosen = {name: kwargs.pop(name) for name in LOOK}
-            target = None if place is None else _target(place, file_format)
-            _refuse_unused(target, file_format, chosen)
+            look_options = {name: kwargs.pop(name) for name in LOOK_OPTIONS}
+            target = None if place is None else _figure_target(place, file_format)
+            _check_unused(target, file_format, look_options)
             if target is None:
                 return command(*args, figures=None, **kwargs)
             from vsacli.results.charts.look import drawing_with
 
-            with drawing_with(_look(**chosen)):
+            with drawing_with(_look(**look_options)):
                 return command(*args, figures=target, **kwargs)
 
         return drawing
@@ -164,7 +164,7 @@ def figure_options(
     return add
 
 
-def _target(place: str, file_format: str | None) -> FigureTarget:
+def _figure_target(place: str, file_format: str | None) -> FigureTarget:
     """Return where figures are written.
 
     Raises:
@@ -179,18 +179,20 @@ def _target(place: str, file_format: str | None) -> FigureTarget:
     return FigureTarget(Path(name.parent), name.stem, ending)
 
 
-def _refuse_unused(target: FigureTarget | None, file_format: str | None, chosen: dict[str, Any]) -> None:
+def _check_unused(target: FigureTarget | None, file_format: str | None, look_options: dict[str, Any]) -> None:
     """Refuse options that have no effect.
 
     Raises:
         click.UsageError: nothing is drawn, or a page, which has no such look.
     """
-    given = [f"--{name.replace('_', '-')}" for name, value in chosen.items() if value and value != "screen"]
-    if target is None and (file_format or given):
-        raise click.UsageError(f"{given[0] if given else '--format'} needs --plot")
-    if target is not None and target.file_format == PAGE and given:
-        raise click.UsageError(f"{given[0]} cannot be used with a page; leave it out")
-    if target is not None and target.file_format != "png" and chosen["dpi"]:
+    given_options = [
+        f"--{name.replace('_', '-')}" for name, value in look_options.items() if value and value != "screen"
+    ]
+    if target is None and (file_format or given_options):
+        raise click.UsageError(f"{given_options[0] if given_options else '--format'} needs --plot")
+    if target is not None and target.file_format == PAGE and given_options:
+        raise click.UsageError(f"{given_options[0]} cannot be used with a page; leave it out")
+    if target is not None and target.file_format != "png" and look_options["dpi"]:
         raise click.UsageError(f"--dpi is for png; {target.file_format} figures have no pixels, leave it out")
 
 
@@ -243,14 +245,14 @@ class DrawnPart(NamedTuple):
     @property
     def option(self) -> str:
         """Name of an option that selects something; empty if everything is to be drawn."""
-        first, last = (math.isfinite(end) for end in self.span)
-        given = {
+        has_first, has_last = (math.isfinite(end) for end in self.span)
+        selections = {
             "--variables": self.variables is not None,
             "--joints": self.joints,
-            "--from": first,
-            "--to": last,
+            "--from": has_first,
+            "--to": has_last,
         }
-        return next((option for option, chosen in given.items() if chosen), "")
+        return next((option for option, is_selected in selections.items() if is_selected), "")
 
 
 EVERYTHING = DrawnPart((), (-math.inf, math.inf), None)

@@ -48,7 +48,7 @@ ENDINGS = {
 }
 """Endings of file names, by content."""
 
-KNOWN = frozenset(ending for endings in ENDINGS.values() for ending in endings)
+KNOWN_ENDINGS = frozenset(ending for endings in ENDINGS.values() for ending in endings)
 
 
 def ending_of(name: str) -> str:
@@ -69,8 +69,10 @@ class OutputType(NameType):
         name = super().convert(value, param, ctx)
         ending = ending_of(name)
         if ending and ending not in ENDINGS[self.form]:
-            own, advice = ENDINGS[self.form][0], self.advice if ending == ".csv" else ""
-            self.fail(f"{name!r} does not end in {own}: the output is {self.form}{advice}", param, ctx)
+            expected_ending, advice = ENDINGS[self.form][0], self.advice if ending == ".csv" else ""
+            self.fail(
+                f"{name!r} does not end in {expected_ending}: the output is {self.form}{advice}", param, ctx
+            )
         return name
 
 
@@ -86,9 +88,11 @@ class FolderType(NameType):
         ending = ending_of(name)
         if ending and not Path(name).is_dir():
             option = param.opts[-1] if param is not None else ""
-            chosen = ctx is not None and any(each.name == "file_format" for each in ctx.command.params)
-            shown = f" --format {ending[1:]}" if chosen and ending in FIGURES else ""
-            advice = f"e.g. {option} {PurePath(name).with_suffix('')}{shown}"
+            has_format_option = ctx is not None and any(
+                parameter.name == "file_format" for parameter in ctx.command.params
+            )
+            format_option = f" --format {ending[1:]}" if has_format_option and ending in FIGURES else ""
+            advice = f"e.g. {option} {PurePath(name).with_suffix('')}{format_option}"
             self.fail(f"{name!r} looks like a file name, expected a folder; {advice}", param, ctx)
         return name
 

@@ -153,20 +153,22 @@ def identify(
             naming_kind("--columns", columns, ("columns",)),
         ):
             progress = partial(talk.progress, shown_from=0, label="identifying")
-            found = identified(loaded, recordings, fit or WORDS, bandwidth, columns, progress=progress)
+            identification = identified(
+                loaded, recordings, fit or WORDS, bandwidth, columns, progress=progress
+            )
         if file is not None:
-            file.write_text(fitted_text(loaded, found, Path(output or "").parent))
+            file.write_text(fitted_text(loaded, identification, Path(output or "").parent))
         if page is not None:
-            page.write_text(identification_page(found, columns))
+            page.write_text(identification_page(identification, columns))
         elif figures is not None:
-            draw_figures(found, robot, figures, outputs)
-    say(found, as_json, found.as_text(verbose=talk.verbose))
+            draw_figures(identification, robot, figures, outputs)
+    say(identification, as_json, identification.as_text(verbose=talk.verbose))
     talk.wrote(outputs)
-    return EXIT_OF_VERDICT[found.verdict]
+    return EXIT_OF_VERDICT[identification.verdict]
 
 
-def _check_options(given: dict[str, object], reason: str) -> None:
+def _check_options(option_values: dict[str, object], reason: str) -> None:
     """Refuse options that do not apply."""
-    for option, value in given.items():
+    for option, value in option_values.items():
         if value is not None:
             raise click.UsageError(f"{option} {reason}")

@@ -20,7 +20,7 @@ SHOWN_FROM = 1
 
 def plan(
     robot_path: str,
-    own_paths: Sequence[str],
+    trajectory_paths: Sequence[str],
     *,
     duration: float,
     noise: tuple[float, ...] | None,
@@ -31,9 +31,9 @@ def plan(
     talk: Talk,
 ) -> int:
     """Plan an excitation, compare it with the user's trajectory if one is given, and write it."""
-    if len(own_paths) > 1:
+    if len(trajectory_paths) > 1:
         raise click.UsageError(
-            f"--plan: expected at most one TRAJECTORY to compare with, found {len(own_paths)}"
+            f"--plan: expected at most one TRAJECTORY to compare with, found {len(trajectory_paths)}"
         )
     from vsacli.studies.identification.excitation import (
         TRIALS,
@@ -50,23 +50,23 @@ def plan(
         raise click.BadParameter(hint, param_hint="--duration")
     sensors = USUAL_NOISE if noise is None else Noise(*noise)
     robot = read_robot(robot_path)
-    own = read_trajectory(own_paths[0], robot, None, talk) if own_paths else None
-    inputs = [*robot.sources, *(() if own is None else own.sources)]
+    trajectory = read_trajectory(trajectory_paths[0], robot, None, talk) if trajectory_paths else None
+    inputs = [*robot.sources, *(() if trajectory is None else trajectory.sources)]
     with Outputs(overwrite=overwrite, inputs=[source.path for source in inputs]) as outputs:
         file = None if output is None else outputs.file(Path(output))
         try:
             with talk.progress(TRIALS, shown_from=SHOWN_FROM, label="searching") as progress:
-                found = plan_excitation(
-                    robot, own, duration=duration, noise=sensors, seed=seed, progress=progress.update
+                excitation = plan_excitation(
+                    robot, trajectory, duration=duration, noise=sensors, seed=seed, progress=progress.update
                 )
         except ImpossibleError as error:
             tell(f"{robot.name}: no excitation is feasible: {error}")
             return Exit.VERDICT
         if file is not None:
             with file.opened() as stream:
-                stream.write(excitation_text(found))
-    say(found, as_json)
+                stream.write(excitation_text(excitation))
+    say(excitation, as_json)
     talk.wrote(outputs)
     if output is None:
         talk.note("the excitation was not written; name a file for it: -o excitation.yaml")
-    return EXIT_OF_VERDICT[found.verdict]
+    return EXIT_OF_VERDICT[excitation.verdict]

@@ -52,12 +52,14 @@ def _check_placeholders(
             raise click.UsageError(f"{option} needs --actuator {joined(kinds, 'or')}, not {actuator}{hint}")
 
 
-def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[str, ...]) -> dict[str, str]:
+def _held_positions(
+    _context: click.Context, _parameter: click.Parameter, assignments: tuple[str, ...]
+) -> dict[str, str]:
     positions = {}
-    for word in written:
-        joint, equals, value = word.rpartition("=")
+    for assignment in assignments:
+        joint, equals, value = assignment.rpartition("=")
         if not equals:
-            raise click.BadParameter(f"expected JOINT=VALUE, e.g. finger=0.02, found {word!r}")
+            raise click.BadParameter(f"expected JOINT=VALUE, e.g. finger=0.02, found {assignment!r}")
         if joint in positions:
             raise click.BadParameter(f"{joint!r} is held twice")
         positions[joint] = value
@@ -125,7 +127,7 @@ def _hold(_context: click.Context, _parameter: click.Parameter, written: tuple[s
     "--hold",
     metavar="JOINT=VALUE",
     multiple=True,
-    callback=_hold,
+    callback=_held_positions,
     help="Position of a joint that is held, in rad or m, or with a unit as in elbow='30 deg'; may be "
     "repeated.",
     show_default="0 for joints outside the path to a --tip",

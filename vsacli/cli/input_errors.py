@@ -33,15 +33,15 @@ def naming_option(option: str, kind: type[InputError] = InputError) -> Iterator[
             problems = [Problem("", 0, str(field)) for field in error.fields]
         else:
             problems = list(error.problems)
-        raise InputError(_named(option, option.lstrip("-"), each) for each in problems) from error
+        raise InputError(_name_option(option, option.lstrip("-"), problem) for problem in problems) from error
 
 
 @contextmanager
-def naming_changes(others: Mapping[str, str]) -> Iterator[None]:
+def naming_changes(option_by_path: Mapping[str, str]) -> Iterator[None]:
     """Put `--set PATH=VALUE` before each error of a change, or the option from which the change was made.
 
     Args:
-        others: other options, by the path that each of them changes, e.g. {"rate": "--rate"}.
+        option_by_path: other options, by the path that each of them changes, e.g. {"rate": "--rate"}.
     """
     from vsacli.documents.reading import ChangeError
 
@@ -49,11 +49,11 @@ def naming_changes(others: Mapping[str, str]) -> Iterator[None]:
         yield
     except ChangeError as error:
         path = error.change.partition("=")[0]
-        option = others.get(path, f"--set {error.change}".rstrip())
-        raise InputError(_named(option, path, each) for each in error.problems) from error
+        option = option_by_path.get(path, f"--set {error.change}".rstrip())
+        raise InputError(_name_option(option, path, problem) for problem in error.problems) from error
 
 
-def _named(option: str, word: str, problem: Problem) -> Problem:
+def _name_option(option: str, word: str, problem: Problem) -> Problem:
     """Return a problem that names the option, once, instead of the word that it begins with."""
     if problem.file or problem.message.startswith(option):
         return problem

@@ -106,37 +106,43 @@ def invdyn(
     from vsacli.base.variables import ALL, select_variables
     from vsacli.results.store.writer import ResultWriter
 
-    listed = () if variables is None else [name for name in variables if name != ALL]
+    requested = () if variables is None else [name for name in variables if name != ALL]
     with naming_option("--variables"):
-        select_variables(listed)
+        select_variables(requested)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
-        drawn = None if figures is None else _figures(inputs, figures, path.stem, variables, outputs)
+        figure_files = (
+            None if figures is None else _staged_figures(inputs, figures, path.stem, variables, outputs)
+        )
         run = Run(
             *inputs,
             stop_on_infeasible=stop_on_infeasible,
             deflection_solver=deflection_solver,
             engine=engine,
             threads=threads,
-            asked=(*((JUDGED,) if variables is None or ALL in variables else ()), *listed),
+            asked=(*((JUDGED,) if variables is None or ALL in variables else ()), *requested),
             tell=talk.note,
         )
         provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]]), **run.provenance}
         writer = ResultWriter(file, *inputs, variables, provenance=provenance, precision=precision)
         report = compute(run, talk, writer)
-        if drawn is not None:
+        if figure_files is not None:
             from vsacli.cli.drawings import draw_staged
 
-            draw_staged(file, drawn, talk)
+            draw_staged(file, figure_files, talk)
             if inputs.trajectory.estimates:
                 from vsacli.cli.plot_recording import recording_figure
 
-                drawn.save(recording_figure(inputs.robot, inputs.trajectory.estimates.values(), path))
+                figure_files.save(recording_figure(inputs.robot, inputs.trajectory.estimates.values(), path))
     limits: list[str] = []
     if report.tools:
         from vsacli.analysis.tool_stiffness import limits_for_fixes
 
-        limits = [word for limit in limits_for_fixes(inputs.robot, report.tools) for word in ("--set", limit)]
+        limits = [
+            argument
+            for limit in limits_for_fixes(inputs.robot, report.tools)
+            for argument in ("--set", limit)
+        ]
     code = show_report(report, as_json, (robot, trajectory), changes, options=limits)
     talk.wrote(outputs)
     return code
@@ -153,7 +159,7 @@ def _check_one_rate(rate: float, changes: tuple[str, ...]) -> None:
             raise click.UsageError(f"--rate {rate:g} contradicts --set {change}; give one")
 
 
-def _figures(
+def _staged_figures(
     inputs: Inputs, target: FigureTarget, stem: str, variables: tuple[str, ...] | None, outputs: Outputs
 ) -> FigureFiles:
     """Stage the figures that the stored variables suffice for, and the figure of a recording."""
@@ -162,11 +168,11 @@ def _figures(
     from vsacli.results.charts.figures import drawable_figures, result_drawings
     from vsacli.robot.compliance import coupled_joints
 
-    stored = {ALL} if variables is None else {*variables}
-    if ALL in stored:
-        stored |= {name for name in VARIABLES if name not in ON_REQUEST}
+    stored_names = {ALL} if variables is None else {*variables}
+    if ALL in stored_names:
+        stored_names |= {name for name in VARIABLES if name not in ON_REQUEST}
     tools_yield = any(coupled_joints(inputs.robot, tool) for tool in range(len(inputs.robot.end_effectors)))
-    drawn = drawable_figures(result_drawings(inputs.robot.has_variable, tools_yield), stored)
+    names = drawable_figures(result_drawings(inputs.robot.has_variable, tools_yield), stored_names)
     if inputs.trajectory.estimates:
-        drawn.append(RECORDING)
-    return target.files(drawn, stem, outputs)
+        names.append(RECORDING)
+    return target.files(names, stem, outputs)

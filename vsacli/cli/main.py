@@ -69,7 +69,7 @@ class Commands(LazyRegistry):
 
     def __init__(self) -> None:
         functions = {name: name.replace("-", "_") for name in _SHORT_HELP}
-        super().__init__({name: f"vsacli.cli.{each}:{each}" for name, each in functions.items()})
+        super().__init__({name: f"vsacli.cli.{function}:{function}" for name, function in functions.items()})
 
     def __getitem__(self, name: str) -> click.Command:
         command: click.Command = super().__getitem__(name)
@@ -121,7 +121,7 @@ def vsacli() -> None:
     """
 
 
-FIRST_OWN = 3
+FIRST_FREE_DESCRIPTOR = 3
 """Lowest file descriptor that is not a standard stream."""
 
 
@@ -146,7 +146,7 @@ def _hold_closed_streams() -> None:
 
     Otherwise an opened file gets the descriptor of such a stream, and a library may print into it.
     """
-    while (number := os.open(os.devnull, os.O_RDWR)) < FIRST_OWN:
+    while (number := os.open(os.devnull, os.O_RDWR)) < FIRST_FREE_DESCRIPTOR:
         os.set_inheritable(number, True)
     os.close(number)
 
@@ -157,11 +157,11 @@ def run(arguments: Sequence[str]) -> int:
         with reporting_stdout_errors():
             code = vsacli.main(args=list(arguments), prog_name="vsacli", standalone_mode=False)
     except click.ClickException as error:
-        shown = io.StringIO()
-        _advised(error).show(shown)
-        return _fail(shown.getvalue().rstrip("\n"), Exit.USAGE)
+        message = io.StringIO()
+        _with_advice(error).show(message)
+        return _fail(message.getvalue().rstrip("\n"), Exit.USAGE)
     except Interrupted as error:
-        return _interrupted(error)
+        return _fail_interrupted(error)
     except (click.Abort, KeyboardInterrupt):
         return _fail("interrupted", Exit.INTERRUPTED)
     except InputError as error:
@@ -172,17 +172,19 @@ def run(arguments: Sequence[str]) -> int:
         return _fail(str(error), Exit.STORAGE)
     except Exception as error:
         if isinstance(error.__cause__, Interrupted):  # Python 3.11 wraps errors raised in `__set_name__`
-            return _interrupted(error.__cause__)
+            return _fail_interrupted(error.__cause__)
         import traceback
 
-        lines = traceback.format_exc()
-        if os.strerror(errno.EMFILE) in lines:  # in any error of the chain, such as one of an import
+        traceback_text = traceback.format_exc()
+        if os.strerror(errno.EMFILE) in traceback_text:  # in any error of the chain, such as one of an import
             return _fail(f"the command cannot go on: {reason(OSError(errno.EMFILE, ''))}", Exit.STORAGE)
-        return _fail(f"{lines}vsacli: this is a bug; please report it with the lines above", Exit.BUG)
+        return _fail(
+            f"{traceback_text}vsacli: this is a bug; please report it with the lines above", Exit.BUG
+        )
     return int(code or Exit.OK)
 
 
-def _advised(error: click.ClickException) -> click.ClickException:
+def _with_advice(error: click.ClickException) -> click.ClickException:
     """Return the error of a renamed option with its present name, of a missing input with what is there.
 
     Any other error is returned as it is.
@@ -190,10 +192,10 @@ def _advised(error: click.ClickException) -> click.ClickException:
     if isinstance(error, click.NoSuchOption) and error.ctx:
         from vsacli.base.renamed import successor, usage  # loaded for error messages only
 
-        options = [name for each in error.ctx.command.params for name in each.opts]
-        if new := successor(error.option_name, options):
+        options = [name for parameter in error.ctx.command.params for name in parameter.opts]
+        if new_name := successor(error.option_name, options):
             return click.UsageError(
-                f"{error.option_name} is now {usage(error.option_name) or new}", error.ctx
+                f"{error.option_name} is now {usage(error.option_name) or new_name}", error.ctx
             )
         arguments = [each for each in error.ctx.command.params if isinstance(each, click.Argument)]
         if error.option_name.strip("-") in [each.name for each in arguments]:
@@ -208,8 +210,8 @@ def _advised(error: click.ClickException) -> click.ClickException:
     return error
 
 
-def _interrupted(ended: Interrupted) -> int:
-    return _fail(str(ended), 128 + ended.number)  # shell convention for processes ended by a signal
+def _fail_interrupted(interrupt: Interrupted) -> int:
+    return _fail(str(interrupt), 128 + interrupt.number)  # shell convention for processes ended by a signal
 
 
 def _fail(message: str, code: int) -> int:

@@ -76,8 +76,8 @@ class _ActuatorType(StringParamType):
         self, _context: click.Context, _parameter: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Complete names of kinds, mechanisms and devices."""
-        of_kinds = (f"{kind}:{each}" for kind in ACTUATORS for each in mechanisms_of(kind))
-        names = (*ACTUATORS, *MECHANISMS, *of_kinds, *DEVICES)
+        with_mechanism = (f"{kind}:{mechanism}" for kind in ACTUATORS for mechanism in mechanisms_of(kind))
+        names = (*ACTUATORS, *MECHANISMS, *with_mechanism, *DEVICES)
         return [CompletionItem(name) for name in names if name.startswith(incomplete)]
 
 
@@ -106,8 +106,8 @@ class _JointType(_ActuatorType):
     ) -> list[CompletionItem]:
         """Complete the actuator behind the name."""
         name, colon, actuator = incomplete.partition(":")
-        found = super().shell_complete(context, parameter, actuator) if colon else []
-        return [CompletionItem(f"{name}:{each.value}") for each in found]
+        completions = super().shell_complete(context, parameter, actuator) if colon else []
+        return [CompletionItem(f"{name}:{completion.value}") for completion in completions]
 
 
 @new.command(
@@ -189,13 +189,13 @@ def robot(
     letters = _letters(joints, actuator, chosen)
     for option, sizes in {"--length": lengths, "--mass": masses}.items():
         if sizes is not None and len(sizes) not in (1, len(letters)):
-            found = f"{counted(len(letters), 'joint')}, but {counted(len(sizes), 'value')}"
-            raise click.UsageError(f"{option}: {found}; give one value for all links or one for each")
+            counts_text = f"{counted(len(letters), 'joint')}, but {counted(len(sizes), 'value')}"
+            raise click.UsageError(f"{option}: {counts_text}; give one value for all links or one for each")
     with naming_option("--joint" if joints is None else "--joints"):
         text = robot_template(
             letters,
-            [each.actuator for each in chosen] or actuator or "antagonistic",
-            [each.name for each in chosen],
+            [joint_option.actuator for joint_option in chosen] or actuator or "antagonistic",
+            [joint_option.name for joint_option in chosen],
             sizes=LinkSizes(lengths or (), masses or ()),
         )
     _write(text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text])
@@ -220,13 +220,15 @@ def _letters(joints: str | None, actuator: str | None, chosen: Sequence[_JointOp
         raise click.UsageError(
             "--actuator is that of every joint, but --joint names one for each joint; leave out one of both"
         )
-    names = Counter(each.name for each in chosen)
-    if repeated := [name for name, count in names.items() if count > 1]:
-        raise click.UsageError(f"--joint: the name {repeated[0]!r} is given twice; each joint has its own")
-    if joints is not None and len(joints) != len(chosen):
-        letters, times = counted(len(joints), "letter"), counted(len(chosen), "time")
+    names = Counter(joint_option.name for joint_option in chosen)
+    if repeated_names := [name for name, count in names.items() if count > 1]:
         raise click.UsageError(
-            f"--joints has {letters}, but --joint is given {times}; give a letter for each --joint, or "
+            f"--joint: the name {repeated_names[0]!r} is given twice; each joint has its own"
+        )
+    if joints is not None and len(joints) != len(chosen):
+        letters, times_text = counted(len(joints), "letter"), counted(len(chosen), "time")
+        raise click.UsageError(
+            f"--joints has {letters}, but --joint is given {times_text}; give a letter for each --joint, or "
             "leave out --joints if all are revolute"
         )
     return joints or "R" * len(chosen)
@@ -257,8 +259,10 @@ def trajectory(robot_path: str | None, output: str | None, overwrite: bool, talk
 
     robot = None if robot_path is None else read_robot(robot_path, argument="--robot")
     inputs = () if robot is None else [source.path for source in robot.sources]
-    _write(trajectory_template(robot), output, overwrite, talk, inputs)
-    talk.note(f"next: vsacli invdyn {_file(robot_path, 'arm.yaml')} {_file(output, 'move.yaml')}")
+    _write_template(trajectory_template(robot), output, overwrite, talk, inputs)
+    talk.note(
+        f"next: vsacli invdyn {_quoted_path(robot_path, 'arm.yaml')} {_quoted_path(output, 'move.yaml')}"
+    )
 
 
 @new.command(
@@ -282,16 +286,18 @@ def study(robot: str, trajectory: str, output: str | None, overwrite: bool, talk
     inputs = load_inputs(robot, trajectory, talk)
     folder = Path(output).parent if output not in (None, STANDARD) else Path()
     paths = (Path(os.path.relpath(path, folder)).as_posix() for path in (robot, trajectory))
-    _write(study_template(inputs.robot, inputs.trajectory, *paths), output, overwrite, talk, inputs.files)
-    talk.note(f"next: vsacli study {_file(output, 'study.yaml')}")
+    _write_template(
+        study_template(inputs.robot, inputs.trajectory, *paths), output, overwrite, talk, inputs.files
+    )
+    talk.note(f"next: vsacli study {_quoted_path(output, 'study.yaml')}")
 
 
-def _file(path: str | None, usual: str) -> str:
+def _quoted_path(path: str | None, default: str) -> str:
     """Return a path as a word of a shell command; the usual one for a standard stream."""
-    return shlex.quote(usual if path is None or path == STANDARD else path)
+    return shlex.quote(default if path is None or path == STANDARD else path)
 
 
-def _write(
+def _write_template(
     text: str,
     output: str | None,
     overwrite: bool,

@@ -115,7 +115,7 @@ def optimize(
             outputs.check(path)
         steps = searches(inputs.robot, minimize, vary)
         with talk.progress(steps, shown_from=0, label="searching") as progress:
-            found = optimized(
+            optimum = optimized(
                 *inputs,
                 minimize,
                 vary,
@@ -123,21 +123,21 @@ def optimize(
                 seed=seed,
                 progress=progress.update,
             )
-        if output is not None and found.trajectory is not None:
-            write_fixed(Fix(0.0, inputs.robot, found.trajectory), output, outputs)
+        if output is not None and optimum.trajectory is not None:
+            write_fixed(Fix(0.0, inputs.robot, optimum.trajectory), output, outputs)
         elif output is not None:
             talk.note(f"{output} is not written: nothing feasible was found")
-        elif found.trajectory is not None:
+        elif optimum.trajectory is not None:
             talk.note("the best trajectory is not written; give -o FILE to keep it")
-        if paths and found.trajectory is not None:
+        if paths and optimum.trajectory is not None:
             from vsacli.cli.optimize_plots import optimum_sheets
             from vsacli.results.plots import FigureFiles
 
-            sheets = optimum_sheets(found, found.trajectory, inputs.trajectory)
+            sheets = optimum_sheets(optimum, optimum.trajectory, inputs.trajectory)
             FigureFiles({name: paths[name] for name in sheets}, outputs).save(sheets)
     talk.wrote(outputs)
-    say(found, as_json)
-    return Exit.OK if found.possible else Exit.VERDICT
+    say(optimum, as_json)
+    return Exit.OK if optimum.possible else Exit.VERDICT
 
 
 def _check_objective(robot: Robot, minimize: str, vary: str) -> None:

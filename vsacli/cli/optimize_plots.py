@@ -10,7 +10,7 @@ from vsacli.analysis.result import Result
 from vsacli.analysis.run import inverse_dynamics
 from vsacli.base.arrays import FloatArray
 from vsacli.results.charts.chart import Sheet
-from vsacli.results.charts.optimum import Moved, OptimizedJoint, change_sheet, pace_sheet
+from vsacli.results.charts.optimum import JointMotion, OptimizedJoint, change_sheet, pace_sheet
 from vsacli.robot.joint import Joint
 from vsacli.studies.search import Optimum
 from vsacli.studies.search.paced_motion import path_at
@@ -20,37 +20,41 @@ CHANGE, PACE = "optimum", "pace"
 """Names of the figures."""
 
 
-def optimum_sheets(found: Optimum, best: Trajectory, asked: Trajectory) -> dict[str, Sheet]:
+def optimum_sheets(optimum: Optimum, best_trajectory: Trajectory, commanded: Trajectory) -> dict[str, Sheet]:
     """Return the figures of the changes at each joint, and of the timing if it was varied."""
-    before, after = (inverse_dynamics(found.robot, each) for each in (asked, best))
-    place = after.time - best.start
-    if found.pace is not None:
-        place = path_at(place, found.pace, asked.duration)
+    before, after = (
+        inverse_dynamics(optimum.robot, trajectory) for trajectory in (commanded, best_trajectory)
+    )
+    path_position = after.time - best_trajectory.start
+    if optimum.pace is not None:
+        path_position = path_at(path_position, optimum.pace, commanded.duration)
     joints = [
         OptimizedJoint(
             name=joint.name,
             joint_type=joint.type,
-            before=_moved(before, before.time - asked.start, index),
-            after=_moved(after, place, index),
+            before=_joint_motion(before, before.time - commanded.start, index),
+            after=_joint_motion(after, path_position, index),
             limits=_torque_limits(joint),
         )
-        for index, joint in enumerate(found.robot.joints)
+        for index, joint in enumerate(optimum.robot.joints)
     ]
-    title = f"optimum of {found.robot_name}, {found.asked}: {found.words}"
+    title = f"optimum of {optimum.robot_name}, {optimum.asked}: {optimum.words}"
     change = f"{title}, before and after"
-    sheets = {CHANGE: change_sheet(joints, change, along_path=found.pace is not None)}
-    if found.pace is not None:
-        uniform = math.nan if found.timing is None else asked.duration / found.timing.uniform
-        sheets[PACE] = pace_sheet(place, 1 / found.pace(place), uniform, f"timing of the {title}")
+    sheets = {CHANGE: change_sheet(joints, change, along_path=optimum.pace is not None)}
+    if optimum.pace is not None:
+        uniform = math.nan if optimum.timing is None else commanded.duration / optimum.timing.uniform
+        sheets[PACE] = pace_sheet(
+            path_position, 1 / optimum.pace(path_position), uniform, f"timing of the {title}"
+        )
     return sheets
 
 
-def _moved(result: Result, place: FloatArray, index: int) -> Moved:
+def _joint_motion(result: Result, path_position: FloatArray, index: int) -> JointMotion:
     """Return stiffness, its attainable range, and motor torques of a joint over places along the motion."""
     stiffness, lower, upper = (
-        row[:, index] for row in (result.stiffness, result.stiffness_min, result.stiffness_max)
+        values[:, index] for values in (result.stiffness, result.stiffness_min, result.stiffness_max)
     )
-    return Moved(place, stiffness, lower, upper, result.tau_motor[:, index].T)
+    return JointMotion(path_position, stiffness, lower, upper, result.tau_motor[:, index].T)
 
 
 def _torque_limits(joint: Joint) -> FloatArray:

@@ -40,7 +40,7 @@ class Number(FloatParamType):
             number = self.read(value)
         except ValueError:
             self.fail(f"{value!r} is not a {self.name}; expected {self.expected}", param, ctx)
-        if reason := self._out_of_range(number):
+        if reason := self._range_requirement(number):
             self.fail(f"must be {reason}, not {value}; expected {self.expected}", param, ctx)
         return number
 
@@ -52,7 +52,7 @@ class Number(FloatParamType):
         """
         return float(text)
 
-    def _out_of_range(self, number: float) -> str:
+    def _range_requirement(self, number: float) -> str:
         if isinstance(number, float) and not math.isfinite(number):
             return "finite"
         if self.positive and number <= 0:
@@ -110,13 +110,13 @@ class Numbers(StringParamType):
 
     def __init__(self, expected: str, counts: Iterable[int] = (), *, positive: bool = False) -> None:
         self.expected, self.counts = expected, tuple(counts)
-        self._one = Number(expected, positive=positive)
+        self._number_type = Number(expected, positive=positive)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """See `click.ParamType.convert`."""
         if not isinstance(value, str):
             return value
-        numbers = tuple(self._one.convert(word.strip(), param, ctx) for word in value.split(","))
+        numbers = tuple(self._number_type.convert(word.strip(), param, ctx) for word in value.split(","))
         if self.counts and len(numbers) not in self.counts:
             self.fail(f"expected {self.expected}, found {len(numbers)}", param, ctx)
         return numbers
@@ -137,18 +137,18 @@ class Words(click.Choice[str]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """See `click.Choice.convert`."""
         if value not in self.choices:
-            self.fail(self._reason(value), param, ctx)
+            self.fail(self._refusal_text(value), param, ctx)
         return super().convert(value, param, ctx)
 
-    def _reason(self, value: str) -> str:
+    def _refusal_text(self, value: str) -> str:
         """Return why a word is refused."""
         from vsacli.base.did_you_mean import nearest  # loaded for error messages only
         from vsacli.base.renamed import successor
 
         if new := successor(value, self.choices):
             return f"{value!r} is now {new!r}"
-        meant = self.synonyms.get(value) or nearest(value, self.choices)
-        hint = f"; did you mean {meant!r}?" if meant else ""
+        suggestion = self.synonyms.get(value) or nearest(value, self.choices)
+        hint = f"; did you mean {suggestion!r}?" if suggestion else ""
         return f"{value!r} is not one of {', '.join(map(repr, self.choices))}{hint}"
 
 

@@ -26,40 +26,46 @@ from vsacli.results.store.sensitivity_file import StoredSensitivity
 from vsacli.results.store.study_table import StoredStudy
 
 
-def draw_computed(paths: list[Path], shown: DrawnPart, target: FigurePlace, talk: Talk) -> None:
+def draw_computed(paths: list[Path], part: DrawnPart, target: FigurePlace, talk: Talk) -> None:
     """Draw results, simulations, study tables or a sensitivity analysis."""
-    kind = _kind_of(paths)
-    if kind in (file_formats.STUDY_TABLE, file_formats.SENSITIVITY) and shown != EVERYTHING:
-        words = "study tables" if kind == file_formats.STUDY_TABLE else "sensitivity files"
-        raise click.UsageError(f"{shown.option} cannot be used with {words}; leave it out")
+    kind = _common_format(paths)
+    if kind in (file_formats.STUDY_TABLE, file_formats.SENSITIVITY) and part != EVERYTHING:
+        files_text = "study tables" if kind == file_formats.STUDY_TABLE else "sensitivity files"
+        raise click.UsageError(f"{part.option} cannot be used with {files_text}; leave it out")
     if kind == file_formats.SENSITIVITY:
         _draw_ranking(paths, target, talk)
     elif target.place.file_format == PAGE:
-        if (of_times := shown._replace(span=EVERYTHING.span)) != EVERYTHING:
-            raise click.UsageError(f"{of_times.option} cannot be used with --format html; leave it out")
+        if (part_without_span := part._replace(span=EVERYTHING.span)) != EVERYTHING:
+            raise click.UsageError(
+                f"{part_without_span.option} cannot be used with --format html; leave it out"
+            )
         from vsacli.cli.plot_page import write_page  # a page loads the searches, 0.1 s
 
-        write_page(paths, None if kind == file_formats.STUDY_TABLE else shown.span, *target, talk)
+        write_page(paths, None if kind == file_formats.STUDY_TABLE else part.span, *target, talk)
     elif kind == file_formats.STUDY_TABLE:
         _draw_studies(paths, target)
     elif len(paths) == 1:
-        _draw_file(paths[0], shown, target, talk)
+        _draw_file(paths[0], part, target, talk)
     else:
-        _draw_comparison(paths, shown, target, talk)
+        _draw_comparison(paths, part, target, talk)
 
 
-def _kind_of(paths: list[Path]) -> str | None:
+def _common_format(paths: list[Path]) -> str | None:
     """Return the format of the first file; study tables are only drawn among themselves.
 
     Raises:
         click.UsageError: some files are study tables, and others are not.
     """
-    there = [path for path in paths if path.is_file()] or paths[:1]  # others are missed when they are read
-    formats = [stored_format(path) for path in there]
-    are = [each == file_formats.STUDY_TABLE for each in formats]
-    if any(are) and not all(are):
-        table, other = there[are.index(True)], there[are.index(False)]
-        raise click.UsageError(f"{table} is a study table, {other} is not; plot study tables by themselves")
+    existing_paths = [path for path in paths if path.is_file()] or paths[
+        :1
+    ]  # others are missed when they are read
+    formats = [stored_format(path) for path in existing_paths]
+    is_table = [file_format == file_formats.STUDY_TABLE for file_format in formats]
+    if any(is_table) and not all(is_table):
+        table, other_path = existing_paths[is_table.index(True)], existing_paths[is_table.index(False)]
+        raise click.UsageError(
+            f"{table} is a study table, {other_path} is not; plot study tables by themselves"
+        )
     return formats[0]
 
 
@@ -89,38 +95,38 @@ def _draw_studies(paths: list[Path], target: FigurePlace) -> None:
     target.figures(figures, stem).save(figures)
 
 
-def _draw_file(path: Path, shown: DrawnPart, target: FigurePlace, talk: Talk) -> None:
+def _draw_file(path: Path, selection: DrawnPart, target: FigurePlace, talk: Talk) -> None:
     """Draw the figures of one file, and of the recording that it was computed from."""
     with open_stored(path) as stored:
         talk.detail(result_line(stored))
-        part = _part_of(stored, shown)
+        excerpt = _excerpt(stored, selection)
         with naming_option("--variables"):
-            names = chosen_figures(part, shown.variables)
-        recorded = shown.variables is None and has_recording(stored, talk)
-        figures = target.figures([*names, RECORDING] if recorded else names, path.stem)
-        draw_stored_figures(part, path, figures, talk, shown.variables)
-        if recorded:
+            names = chosen_figures(excerpt, selection.variables)
+        with_recording = selection.variables is None and has_recording(stored, talk)
+        figures = target.figures([*names, RECORDING] if with_recording else names, path.stem)
+        draw_stored_figures(excerpt, path, figures, talk, selection.variables)
+        if with_recording:
             from vsacli.cli.plot_recording import recording_figure  # both load the fits, half of all modules
             from vsacli.files.repetition import rebuilt
 
             robot, trajectory = rebuilt(stored)
             profiles = trajectory.estimates.values()
-            figures.save(recording_figure(robot, profiles, path, shown.joints, shown.span))
+            figures.save(recording_figure(robot, profiles, path, selection.joints, selection.span))
 
 
-def _draw_comparison(paths: list[Path], shown: DrawnPart, target: FigurePlace, talk: Talk) -> None:
+def _draw_comparison(paths: list[Path], part: DrawnPart, target: FigurePlace, talk: Talk) -> None:
     stem = "-".join(path.stem for path in paths)
-    files = target.figures(comparison_names(shown.variables), stem)
+    files = target.figures(comparison_names(part.variables), stem)
     with ExitStack() as stack:
-        opened = [stack.enter_context(open_stored(path)) for path in paths]
-        for each in opened:
-            talk.detail(result_line(each))
+        results = [stack.enter_context(open_stored(path)) for path in paths]
+        for result in results:
+            talk.detail(result_line(result))
         with naming_option("--variables"):
-            select_variables(shown.variables or (), opened[0].declared)
-        files.save(compare_files([_part_of(each, shown) for each in opened], shown.variables))
+            select_variables(part.variables or (), results[0].declared)
+        files.save(compare_files([_excerpt(result, part) for result in results], part.variables))
 
 
-def _part_of(stored: StoredResult, shown: DrawnPart) -> StoredResult:
+def _excerpt(stored: StoredResult, part: DrawnPart) -> StoredResult:
     """Return the part of an open file to draw; the file itself if that is all of it."""
-    everything = not shown.joints and shown.span == EVERYTHING.span
-    return stored if everything else Excerpt(stored, shown.joints, shown.span)
+    is_everything = not part.joints and part.span == EVERYTHING.span
+    return stored if is_everything else Excerpt(stored, part.joints, part.span)

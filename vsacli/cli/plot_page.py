@@ -42,85 +42,94 @@ def write_page(
     """
     page = target.page("-".join(path.stem for path in paths), outputs)
     assert page is not None, "as of a target for a page"
-    page.write_text(_studies(paths) if span is None else _results(paths, span, talk))
+    page.write_text(_studies_page(paths) if span is None else _results_page(paths, span, talk))
 
 
-def _results(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
+def _results_page(paths: list[Path], span: tuple[float, float], talk: Talk) -> str:
     with ExitStack() as stack:
-        whole = [stack.enter_context(open_stored(path)) for path in paths]
-        for each in whole:
-            talk.detail(result_line(each))
-        files = [Excerpt(each, (), span) for each in whole]
-        reports = [stored_report(each.kind, each.report_json) for each in files]
-        fixes = _fixes(whole, talk)
-        samples = sum(each.samples for each in files)
+        results = [stack.enter_context(open_stored(path)) for path in paths]
+        for result in results:
+            talk.detail(result_line(result))
+        files = [Excerpt(result, (), span) for result in results]
+        reports = [stored_report(result.kind, result.report_json) for result in files]
+        fixes = _fix_texts(results, talk)
+        sample_count = sum(result.samples for result in files)
 
         def progress(variables: int) -> AbstractContextManager[ProgressBar]:
-            shown_from = 0 if samples >= LONG_PAGE else variables + 1
+            shown_from = 0 if sample_count >= LONG_PAGE else variables + 1
             return talk.progress(variables, shown_from=shown_from, label="drawing")
 
         return result_page(files, reports, fixes, progress)
 
 
-def _fixes(files: list[StoredResult], talk: Talk) -> list[FixText | None]:
+def _fix_texts(files: list[StoredResult], talk: Talk) -> list[FixText | None]:
     """Return the fixes of each file, None where none are needed; show the progress of the search."""
-    failed = [each.kind == "result" and each.verdict in FIXABLE for each in files]
+    is_fixable = [result.kind == "result" and result.verdict in FIXABLE for result in files]
     fixes: list[FixText | None] = []
-    with talk.progress(sum(failed), shown_from=1, label="looking for fixes") as bar:
-        for each, fixable in zip(files, failed, strict=True):
-            fixes.append(_fix(each, talk) if fixable else None)
+    with talk.progress(sum(is_fixable), shown_from=1, label="looking for fixes") as bar:
+        for result, fixable in zip(files, is_fixable, strict=True):
+            fixes.append(_fix_text(result, talk) if fixable else None)
             bar.update(int(fixable))
     return fixes
 
 
-def _fix(result: StoredResult, talk: Talk) -> FixText | None:
+def _fix_text(result: StoredResult, talk: Talk) -> FixText | None:
     """Return the fixes of `check-feasibility --fixes` for a result's inputs, or print why not."""
     from vsacli.files.repetition import rebuilt  # a page without fixes loads a third less
     from vsacli.studies.search import fixes
 
     try:
         provenance = result.provenance()
-        made_by, this = provenance["generated_by"], f"vsacli {__version__}"
-        if made_by != this:  # which may have interpreted the same inputs differently
-            reason = f"was computed by {made_by}, and this is {this}"
+        made_by, this_version = provenance["generated_by"], f"vsacli {__version__}"
+        if made_by != this_version:  # which may have interpreted the same inputs differently
+            reason = f"was computed by {made_by}, and this is {this_version}"
             raise InputError.one(f"{reason}; check-feasibility --fixes looks for them", result.path)
         min_margin = provenance["options"].get("min_margin", MIN_MARGIN)
-        found = fixes(*rebuilt(result), min_margin)
+        found_fixes = fixes(*rebuilt(result), min_margin)
     except (InputError, StorageError) as error:
         reason = str(error).removeprefix(f"{result.path}: ")
         talk.note(f"{result.path}: no fixes on its page: {reason}")
         return None
-    lines = str(found).splitlines()
-    if not found.fixes:
+    lines = str(found_fixes).splitlines()
+    if not found_fixes.fixes:
         return FixText(lines, "")
-    announced, command = _command(result, found)
-    return FixText([*lines, announced], command)
+    announcement, command = _next_command(result, found_fixes)
+    return FixText([*lines, announcement], command)
 
 
-def _command(result: StoredResult, found: Fixes) -> tuple[str, str]:
+def _next_command(result: StoredResult, found_fixes: Fixes) -> tuple[str, str]:
     """Return announcement and command of the next step: write the first fix, or list all fixes again."""
     inputs = result.inputs()
-    files = [_named(each.path) for role in ("robot", "trajectory") for each in inputs if each.role == role]
+    files = [
+        _unambiguous_path(stored_input.path)
+        for role in ("robot", "trajectory")
+        for stored_input in inputs
+        if stored_input.role == role
+    ]
     parts = ["vsacli", "check-feasibility", *files]
-    if found.min_margin != MIN_MARGIN:
-        parts += ["--min-margin", f"{found.min_margin}"]
-    changes = format_changes({path: value for each in inputs for path, value in each.changes.items()})
+    if found_fixes.min_margin != MIN_MARGIN:
+        parts += ["--min-margin", f"{found_fixes.min_margin}"]
+    changes = format_changes(
+        {path: value for stored_input in inputs for path, value in stored_input.changes.items()}
+    )
     parts += [part for change in changes for part in ("--set", change)]
     if changes:
-        announced = "this lists them again; to have one written, change the files themselves as --set does:"
+        announcement = (
+            "this lists them again; to have one written, change the files themselves as --set does:"
+        )
         parts += ["--fixes"]
     else:
-        announced = "this writes the trajectory with the first fix; --write-fix takes the number of any:"
+        announcement = "this writes the trajectory with the first fix; --write-fix takes the number of any:"
         parts += ["--write-fix", "1", "-o", "fixed.yaml"]
-    return announced, one_line(shlex.join(parts))
+    return announcement, one_line(shlex.join(parts))
 
 
-def _named(path: str) -> str:
+def _unambiguous_path(path: str) -> str:
     """Return a path that is not mistaken for an option; "-", standard input, stays as it is."""
     return f"./{path}" if path.startswith("-") and path != "-" else path
 
 
-def _studies(paths: list[Path]) -> str:
+def _studies_page(paths: list[Path]) -> str:
     from vsacli.studies.sweeps import StudySummary
 
     with ExitStack() as stack:

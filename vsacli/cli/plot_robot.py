@@ -8,7 +8,7 @@ from pathlib import Path
 from vsacli.base.outputs import Staged
 from vsacli.cli.console import Talk
 from vsacli.files.info import render
-from vsacli.files.info.robot_info import describe_robot, load_sizes, static_load
+from vsacli.files.info.robot_info import describe_robot, static_load, static_loads
 from vsacli.results.charts.arm_chart import arm_chart
 from vsacli.results.charts.robot_charts import actuator_charts
 from vsacli.results.pages import robot_page
@@ -22,7 +22,7 @@ ARM, ACTUATORS, STIFFNESS = "arm", "actuators", "stiffness"
 """Names of the figures, whose files are called `<stem>-<name>`."""
 
 
-WORDS = {
+FIGURE_CAPTIONS = {
     ARM: "the arm with joints, links and motors",
     ACTUATORS: "torque of the springs over deflection",
     STIFFNESS: "attainable stiffness over torque",
@@ -44,8 +44,8 @@ def draw_robot(path: str, staged: Callable[[list[str], str], FigureFiles], talk:
         StorageError: a figure cannot be written.
     """
     robot = load_robot(path)
-    names = _names(robot)
-    staged(names, Path(path).stem).save(_figures(robot))
+    names = _figure_names(robot)
+    staged(names, Path(path).stem).save(_robot_figures(robot))
     if names == [ARM]:
         talk.note(f"{path}: no figures of actuators and stiffness: all joints are rigid")
 
@@ -58,21 +58,24 @@ def write_robot_page(path: str, page: Staged) -> None:
         StorageError: the page cannot be written.
     """
     robot = load_robot(path)
-    drawn = {WORDS[name]: rendered_figure(figure, "svg") for name, figure in _figures(robot).items()}
+    figures = {
+        FIGURE_CAPTIONS[name]: rendered_figure(figure, "svg")
+        for name, figure in _robot_figures(robot).items()
+    }
     inputs = [source_text(source) for source in robot.sources]
-    page.write_text(robot_page(robot, drawn, render(describe_robot(robot)), inputs))
+    page.write_text(robot_page(robot, figures, render(describe_robot(robot)), inputs))
 
 
-def _names(robot: Robot) -> list[str]:
+def _figure_names(robot: Robot) -> list[str]:
     """Return the names of the figures of a robot; a rigid one has no springs to draw."""
-    compliant = any(joint.actuator.sprung for joint in robot.joints)
-    return [ARM, ACTUATORS, STIFFNESS] if compliant else [ARM]
+    is_compliant = any(joint.actuator.sprung for joint in robot.joints)
+    return [ARM, ACTUATORS, STIFFNESS] if is_compliant else [ARM]
 
 
-def _figures(robot: Robot) -> Figures:
+def _robot_figures(robot: Robot) -> Figures:
     figures = {ARM: arm_figure(arm_chart(robot))}
-    if _names(robot) != [ARM]:
-        charts = actuator_charts(robot, load_sizes(static_load(robot)).tolist())
+    if _figure_names(robot) != [ARM]:
+        charts = actuator_charts(robot, static_loads(static_load(robot)).tolist())
         figures[ACTUATORS] = actuators_figure(charts, robot.name)
         figures[STIFFNESS] = stiffness_figure(charts, robot.name)
     return figures

@@ -112,15 +112,15 @@ def sensitivity(
     inputs = load_inputs(robot, trajectory, talk, changes)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = None if output is None else outputs.file(Path(output))
-        found = _analyzed(inputs, patterns, tolerances, runs or 0, seed, file, talk)
+        analysis = _analyze(inputs, patterns, tolerances, runs or 0, seed, file, talk)
         if figures is not None:
-            _draw(found, inputs.robot, tolerances, figures, run_stem(robot, trajectory), outputs)
-    say(found, as_json)
+            _draw_figures(analysis, inputs.robot, tolerances, figures, run_stem(robot, trajectory), outputs)
+    say(analysis, as_json)
     talk.wrote(outputs)
-    return Exit.VERDICT if found.left_out else Exit.OK
+    return Exit.VERDICT if analysis.left_out else Exit.OK
 
 
-def _analyzed(
+def _analyze(
     inputs: Inputs,
     patterns: tuple[str, ...],
     tolerances: str | None,
@@ -142,7 +142,7 @@ def _analyzed(
         progress = stack.enter_context(talk.progress(steps, shown_from=SHOWN_FROM))
         stack.enter_context(naming_option("--tolerances"))  # all else has been checked
         stack.enter_context(naming_kind("--tolerances", tolerances, ("tolerances",)))
-        found = analyzed(
+        analysis = analyzed(
             run,
             tolerances,
             runs=runs,
@@ -151,8 +151,8 @@ def _analyzed(
             keep=unheard if writer is None else writer.write,
         )
         if writer is not None:
-            writer.finish({**found.as_json(), "complete": True})
-    return found
+            writer.finish({**analysis.as_json(), "complete": True})
+    return analysis
 
 
 def unheard(_: object) -> None:
@@ -162,13 +162,15 @@ def unheard(_: object) -> None:
 def _writer(file: Staged, run: SensitivityRun) -> SensitivityWriter:
     from vsacli.results.store.derived_files import ParameterValue, SensitivityWriter
 
-    numbers = [ParameterValue(str(each), each.value, each.unit) for each in run.parameters]
+    parameters = [
+        ParameterValue(str(parameter), parameter.value, parameter.unit) for parameter in run.parameters
+    ]
     provenance = {"command_line": shlex.join(["vsacli", *sys.argv[1:]])}
-    return SensitivityWriter(file, run.robot, run.trajectory, numbers, run.slopes, provenance=provenance)
+    return SensitivityWriter(file, run.robot, run.trajectory, parameters, run.slopes, provenance=provenance)
 
 
-def _draw(
-    found: Sensitivity,
+def _draw_figures(
+    analysis: Sensitivity,
     robot: Robot,
     tolerances: str | None,
     target: FigureTarget,
@@ -179,11 +181,11 @@ def _draw(
     from vsacli.results.charts.optimum import MotorTorqueCurve, band_sheet
     from vsacli.results.plots import ranking_figure
 
-    names = [RANKING] if found.curves is None else [RANKING, BAND]
+    names = [RANKING] if analysis.curves is None else [RANKING, BAND]
     files = target.files(names, stem, outputs)
-    files.save({RANKING: ranking_figure(Ranking.of(found.as_json(), robot.joint_names))})
-    if found.curves is not None and tolerances is not None:
-        time, values, deviation = found.curves
+    files.save({RANKING: ranking_figure(Ranking.of(analysis.as_json(), robot.joint_names))})
+    if analysis.curves is not None and tolerances is not None:
+        time, values, deviation = analysis.curves
         torques = [
             MotorTorqueCurve(
                 joint.name, joint.type, motor, values[:, index, motor - 1], deviation[:, index, motor - 1]
@@ -191,6 +193,6 @@ def _draw(
             for index, joint in enumerate(robot.joints)
             for motor in range(1, joint.actuator.motor_count + 1)
         ]
-        parameters = counted(len(found.parameters), "parameter")
-        title = f"sensitivity of {found.robot}, {found.trajectory}: {parameters}, tolerances "
+        parameters = counted(len(analysis.parameters), "parameter")
+        title = f"sensitivity of {analysis.robot}, {analysis.trajectory}: {parameters}, tolerances "
         files.save({BAND: band_sheet(time, torques, title + Path(tolerances).name)})

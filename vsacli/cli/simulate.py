@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 PROGRESS_STEPS = 1000
 FEEDBACK_LINEARIZATION = "feedback-linearization"
 
-_UNREAD = (
+_UNREAD_SENSORS = (
     "--sensor-noise and --encoder-bits affect the stored measurements only; with --feedback positions the "
     "controller uses them"
 )
@@ -216,37 +216,37 @@ def simulate(
     """
     path = Path(f"{run_stem(robot, trajectory)}-simulation.h5" if output is None else output)
     inputs = load_inputs(robot, trajectory, talk, changes)
-    simulation = _prepared(inputs, Options(**choices))
+    simulation = _prepare_simulation(inputs, Options(**choices))
     gains: Gains | None = simulation.keywords["gains"]
     if gains is not None:  # the result stores the poles file as one of its inputs
-        arm = replace(inputs.robot, sources=(*inputs.robot.sources, *gains.sources))
-        inputs = inputs._replace(robot=arm)
+        robot_with_gains = replace(inputs.robot, sources=(*inputs.robot.sources, *gains.sources))
+        inputs = inputs._replace(robot=robot_with_gains)
     from vsacli.results.store.derived_files import SimulationWriter
 
-    sensed = simulation.keywords["sensors"] is not None
-    if sensed and choices["feedback"] == "state":
-        talk.note(_UNREAD)
+    has_sensors = simulation.keywords["sensors"] is not None
+    if has_sensors and choices["feedback"] == "state":
+        talk.note(_UNREAD_SENSORS)
     with Outputs(overwrite=overwrite, inputs=inputs.files) as outputs:
         file = outputs.file(path)
-        drawn = figures and _figures(inputs.robot, figures, path.stem, outputs)
+        figure_files = figures and _staged_figures(inputs.robot, figures, path.stem, outputs)
         run = simulation(engine=engine, tell=talk.note)
         provenance = {
             "command_line": shlex.join(["vsacli", *sys.argv[1:]]),
             "options": json.dumps(choices),
             **run.provenance,
         }
-        writer = SimulationWriter(file, *inputs, sensed=sensed, provenance=provenance)
+        writer = SimulationWriter(file, *inputs, sensed=has_sensors, provenance=provenance)
         report = _run(run, talk, writer)
-        if drawn is not None:
+        if figure_files is not None:
             from vsacli.cli.drawings import draw_staged
 
-            draw_staged(file, drawn, talk)
+            draw_staged(file, figure_files, talk)
     say(report, as_json)
     talk.wrote(outputs)
     return Exit.OK if report.verdict == "ok" else Exit.VERDICT
 
 
-def _figures(robot: Robot, target: FigureTarget, stem: str, outputs: Outputs) -> FigureFiles:
+def _staged_figures(robot: Robot, target: FigureTarget, stem: str, outputs: Outputs) -> FigureFiles:
     from vsacli.results.charts.figures import simulation_drawings
 
     def drawn(variable: Variable) -> bool:
@@ -257,7 +257,7 @@ def _figures(robot: Robot, target: FigureTarget, stem: str, outputs: Outputs) ->
     return target.files(simulation_drawings(drawn), stem, outputs)
 
 
-def _prepared(inputs: Inputs, options: Options) -> partial[SimulationRun]:
+def _prepare_simulation(inputs: Inputs, options: Options) -> partial[SimulationRun]:
     from vsacli.control.simulation import (
         GoalTolerance,
         SimulationRun,
@@ -296,13 +296,13 @@ def _initial_error(inputs: Inputs, options: Options) -> InitialError:
     from vsacli.control.simulation import InitialError
     from vsacli.control.simulation.start import start_state
 
-    of_position = InitialError(options.initial_error)
-    error = replace(of_position, stiffness=options.initial_stiffness_error)
-    given = {
-        "--initial-error": (options.initial_error, of_position),
+    position_error = InitialError(options.initial_error)
+    error = replace(position_error, stiffness=options.initial_stiffness_error)
+    errors_by_option = {
+        "--initial-error": (options.initial_error, position_error),
         "--initial-stiffness-error": (options.initial_stiffness_error, error),
     }
-    for option, (values, state) in given.items():
+    for option, (values, state) in errors_by_option.items():
         if values != (0.0,):
             with naming_option(option):
                 start_state(*inputs, state)
@@ -327,12 +327,12 @@ def _gains(robot: Robot, options: Options) -> Gains | None:
 
     poles, stiffness_poles, integral = options.poles, options.stiffness_poles, options.integral
     if options.controller != FEEDBACK_LINEARIZATION:
-        for option, given in {
+        for option, value in {
             "poles": poles,
             "stiffness-poles": stiffness_poles,
             "integral": integral,
         }.items():
-            if given:
+            if value:
                 raise click.UsageError(f"--{option} needs --controller {FEEDBACK_LINEARIZATION}")
         return None
     if poles is not None and poles.endswith((".yaml", ".yml")):

@@ -82,17 +82,17 @@ def size(
     Exit code 3 if no choice meets the requirements of a motor, or if infeasible samples were ignored.
     """
     if catalog is None:
-        for option, given in {"--output": output, "--gear": gears, "--minimize": minimize}.items():
-            if given:
+        for option, value in {"--output": output, "--gear": gears, "--minimize": minimize}.items():
+            if value:
                 raise click.UsageError(f"{option} needs --catalog FILE, the motors to choose from")
     from vsacli.studies.sizing import size_drives, sized_text
     from vsacli.studies.sizing.ratios import gears_of_joints
 
-    loaded = read_robot(robot)
-    motions = [read_trajectory(path, loaded, None, talk) for path in trajectories]
+    robot_model = read_robot(robot)
+    motions = [read_trajectory(path, robot_model, None, talk) for path in trajectories]
     with naming_option("--gear"):
-        gears_of_joints(gears, loaded.joint_names)
-    sources = [*loaded.sources, *(source for motion in motions for source in motion.sources)]
+        gears_of_joints(gears, robot_model.joint_names)
+    sources = [*robot_model.sources, *(source for motion in motions for source in motion.sources)]
     inputs = [*(source.path for source in sources), *([] if catalog is None else [catalog])]
     with Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         if output is not None:
@@ -100,28 +100,28 @@ def size(
         samples = sum(motion.samples for motion in motions)
         kind = naming_kind("--catalog", catalog, ("motor catalog",))
         with kind, talk.progress(samples) as progress:
-            found = size_drives(loaded, motions, catalog, gears, minimize, progress=progress.update)
-        if output is not None and found.lacking:
-            talk.note(f"{output} is not written: there is no motor for {found.lacking[0].name}")
+            sizing = size_drives(robot_model, motions, catalog, gears, minimize, progress=progress.update)
+        if output is not None and sizing.lacking:
+            talk.note(f"{output} is not written: there is no motor for {sizing.lacking[0].name}")
         elif output is not None:
-            outputs.file(output).write_text(sized_text(loaded, found, Path(output).parent))
+            outputs.file(output).write_text(sized_text(robot_model, sizing, Path(output).parent))
         if figures is not None:
-            _draw(found, figures, run_stem(robot, trajectories[0]), outputs, talk)
-    say(found, as_json)
+            _draw_torque_speed(sizing, figures, run_stem(robot, trajectories[0]), outputs, talk)
+    say(sizing, as_json)
     talk.wrote(outputs)
-    return EXIT_OF_VERDICT[found.verdict]
+    return EXIT_OF_VERDICT[sizing.verdict]
 
 
-def _draw(found: Sizing, target: FigureTarget, stem: str, outputs: Outputs, talk: Talk) -> None:
+def _draw_torque_speed(sizing: Sizing, target: FigureTarget, stem: str, outputs: Outputs, talk: Talk) -> None:
     """Draw torque over speed for every motor with feasible samples."""
-    motors = [_torque_speed(motor) for motor in found.motors if motor.points is not None]
+    motors = [_torque_speed(motor) for motor in sizing.motors if motor.points is not None]
     if not motors:
         talk.note("nothing is drawn: no sample is feasible")
         return
     from vsacli.results.plots import torque_speed_figure
 
     files = target.files(["torque-speed"], stem, outputs)
-    files.save({"torque-speed": torque_speed_figure(motors, f"sizing of motors: {found.title}")})
+    files.save({"torque-speed": torque_speed_figure(motors, f"sizing of motors: {sizing.title}")})
 
 
 def _torque_speed(motor: MotorSizing) -> TorqueSpeed:

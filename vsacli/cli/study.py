@@ -21,14 +21,14 @@ from vsacli.cli.option_types import Whole, Words
 if TYPE_CHECKING:
     from vsacli.results.store.study_table import StoredStudy
 
-_SHARD = re.compile(r"(\d{1,6})/(\d{1,6})")
+_SHARD_PATTERN = re.compile(r"(\d{1,6})/(\d{1,6})")
 
 
 def _shard(_context: click.Context, _parameter: click.Parameter, text: str) -> tuple[int, int]:
-    found = _SHARD.fullmatch(text)
-    if found is None or not 1 <= int(found[1]) <= int(found[2]):
+    match = _SHARD_PATTERN.fullmatch(text)
+    if match is None or not 1 <= int(match[1]) <= int(match[2]):
         raise click.BadParameter(f"expected K/N with K from 1 to N, e.g. 2/8, found {text!r}")
-    return int(found[1]), int(found[2])
+    return int(match[1]), int(match[2])
 
 
 @click.command(
@@ -119,7 +119,7 @@ def study(
             tell=talk.note,
         ) as table,
     ):
-        return _shown(table, as_json, talk)
+        return _show_summary(table, as_json, talk)
 
 
 def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json: bool, talk: Talk) -> int:
@@ -132,10 +132,10 @@ def _merge(files: tuple[str, ...], output: str | None, overwrite: bool, as_json:
     with kinds, Outputs(overwrite=overwrite, inputs=files) as outputs:
         merge(files, outputs.file(output), command_line=_command_line())
     with StoredStudy(output) as table:
-        return _shown(table, as_json, talk)
+        return _show_summary(table, as_json, talk)
 
 
-def _shown(table: StoredStudy, as_json: bool, talk: Talk) -> int:
+def _show_summary(table: StoredStudy, as_json: bool, talk: Talk) -> int:
     """Print the summary of a written table; return exit code 3 if a run in it failed."""
     from vsacli.studies.sweeps import StudySummary
 

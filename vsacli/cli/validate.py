@@ -15,7 +15,7 @@ from vsacli.cli.input_errors import in_words, recognized
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from vsacli.files.validation import Checked
+    from vsacli.files.validation import CheckedInput
 
 
 @click.command(
@@ -50,14 +50,14 @@ def validate(files: tuple[str, ...], as_json: bool, recompute: bool, talk: Talk)
         messages = [message.as_json() for file in checked for message in file.messages]
         click.echo(json.dumps(messages, indent=1))
     else:
-        for line in _lines(checked, talk):
+        for line in _finding_lines(checked, talk):
             click.echo(line)
     if not all(file.passed for file in checked):
         return Exit.USAGE
-    stored = (FileKind.RESULT, FileKind.SIMULATION)
-    again = [file.path for file in checked if recompute and recognize(file.path) in stored]
-    equal = [_recomputed(path, talk) for path in again]
-    return Exit.OK if all(equal) else Exit.VERDICT
+    result_kinds = (FileKind.RESULT, FileKind.SIMULATION)
+    result_paths = [file.path for file in checked if recompute and recognize(file.path) in result_kinds]
+    is_equal = [_recompute(path, talk) for path in result_paths]
+    return Exit.OK if all(is_equal) else Exit.VERDICT
 
 
 def _check_recomputable(files: Sequence[str]) -> None:
@@ -72,20 +72,20 @@ def _check_recomputable(files: Sequence[str]) -> None:
         raise click.UsageError(f"--recompute is for results; {file} is {in_words(kind)}")
 
 
-def _recomputed(path: str, talk: Talk) -> bool:
+def _recompute(path: str, talk: Talk) -> bool:
     """Recompute a result and print how it compares."""
     from vsacli.files.repetition import repeat
 
     differences, precision = repeat(path, talk.note)
     if not differences:
-        rounded = "" if precision == "double" else f", rounded to {precision} precision"
-        click.echo(f"{path}: computed again, equal bit for bit{rounded}")
+        precision_text = "" if precision == "double" else f", rounded to {precision} precision"
+        click.echo(f"{path}: computed again, equal bit for bit{precision_text}")
     for difference in differences:
         click.echo(f"{path}: computed again, {difference}")
     return not differences
 
 
-def _lines(checked: Sequence[Checked], talk: Talk) -> Iterator[str]:
+def _finding_lines(checked: Sequence[CheckedInput], talk: Talk) -> Iterator[str]:
     for file in checked:
         if file.passed and talk.quiet:
             continue

@@ -72,19 +72,21 @@ def examples(names: Iterable[str] = ()) -> list[Example]:
         InputError: for each unknown name, with the nearest valid one.
     """
     trajectories = [_trajectory(path) for path in sorted((examples_root() / "trajectories").rglob("*.yaml"))]
-    found = {
-        path.stem: Example(path, tuple(each for each in trajectories if path.stem in each.robots))
+    examples_by_name = {
+        path.stem: Example(
+            path, tuple(trajectory for trajectory in trajectories if path.stem in trajectory.robots)
+        )
         for path in sorted((examples_root() / "robots").rglob("*.yaml"), key=lambda path: path.stem)
     }
-    wanted = {name if name in found else Path(name).stem for name in names}
-    if unknown := sorted(wanted - found.keys()):
-        raise InputError(Problem("", 0, _unknown(name, found)) for name in unknown)
-    return [example for name, example in found.items() if not wanted or name in wanted]
+    requested = {name if name in examples_by_name else Path(name).stem for name in names}
+    if unknown := sorted(requested - examples_by_name.keys()):
+        raise InputError(Problem("", 0, _unknown_name_message(name, examples_by_name)) for name in unknown)
+    return [example for name, example in examples_by_name.items() if not requested or name in requested]
 
 
-def _unknown(name: str, found: Iterable[str]) -> str:
-    near = nearest(name, found)
-    hint = "vsacli examples lists them" if near is None else f"did you mean {near!r}?"
+def _unknown_name_message(name: str, names: Iterable[str]) -> str:
+    nearest_name = nearest(name, names)
+    hint = "vsacli examples lists them" if nearest_name is None else f"did you mean {nearest_name!r}?"
     return f"no example is called {name!r}; {hint}"
 
 
@@ -104,8 +106,12 @@ def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) ->
         InputError: as `examples`.
         StorageError: as `Outputs.file`.
     """
-    chosen = list(names)
-    sources = [path for example in examples(chosen) for path in example.files()] if chosen else _every_file()
+    requested = list(names)
+    sources = (
+        [path for example in examples(requested) for path in example.files()]
+        if requested
+        else _bundled_files()
+    )
     copies = {path: Path(folder) / path.relative_to(examples_root()) for path in sources}
     for copy in copies.values():
         outputs.folder(copy.parent)
@@ -125,9 +131,9 @@ def opening_comment(path: Path) -> str:
     return " ".join(line.lstrip("# ") for line in takewhile(lambda line: line.startswith("#"), lines))
 
 
-def _every_file() -> list[Path]:
-    found = (path for folder in ("robots", "trajectories") for path in (examples_root() / folder).rglob("*"))
-    return sorted(path for path in found if path.is_file() and not path.name.startswith("."))
+def _bundled_files() -> list[Path]:
+    paths = (path for folder in ("robots", "trajectories") for path in (examples_root() / folder).rglob("*"))
+    return sorted(path for path in paths if path.is_file() and not path.name.startswith("."))
 
 
 def examples_root() -> Path:

@@ -118,10 +118,10 @@ def robot_template(
         StorageError: the disk has no room for a temporary file.
     """
     types = _joint_types(joints)
-    words = [actuators] * len(types) if isinstance(actuators, str) else actuators
+    actuator_words = [actuators] * len(types) if isinstance(actuators, str) else actuators
     names = joint_names or [f"joint_{number}" for number in range(1, len(types) + 1)]
-    chosen = [*zip(names, types, words, strict=True)]
-    values = _robot_values(name, chosen, sizes)
+    joints_to_write = [*zip(names, types, actuator_words, strict=True)]
+    values = _robot_values(name, joints_to_write, sizes)
     if sizes != USUAL_SIZES:
         usual = load_template(_robot_document(_robot_values(name, chosen, USUAL_SIZES)))
         scales = _scales_of_numbers(load_template(_robot_document(values)), usual)
@@ -149,7 +149,7 @@ def _robot_values(name: str, joints: Sequence[tuple[str, str, str]], sizes: Link
         "placeholder": True,
         "gravity": [0, -9.81, 0] if first_is_horizontal else [0, 0, -9.81],
         "joints": [
-            _joint(joint, sizes.of_link(index), 0 if index or first_is_horizontal else "pi/2")
+            _joint_values(joint, sizes.of_link(index), 0 if index or first_is_horizontal else "pi/2")
             for index, joint in enumerate(joints)
         ],
     }
@@ -183,20 +183,20 @@ def _scales_of_numbers(robot: Robot, usual: Robot) -> dict[tuple[str | int, ...]
             case ("joints", PathIndex(index), *inner):
                 length, force = float(lengths[index]), float(forces[index])
                 scale = _scale_of_unit(quantity.unit(robot.joints[index].type), length, force)
-                steps = (step.number if isinstance(step, PathIndex) else step for step in inner)
-                scales["joints", index, *steps] = scale
+                keys = (step.number if isinstance(step, PathIndex) else step for step in inner)
+                scales["joints", index, *keys] = scale
     return scales
 
 
 def _scale_of_unit(unit: str, length: float, force: float) -> float:
     """Return the scale of a quantity by its unit, such as N m/rad^3; a mass scales as a force."""
     scale_of = {"m": length, "N": force, "kg": force, "s": math.sqrt(length)}
-    over, _, under = unit.partition("/")
+    numerator, _, denominator = unit.partition("/")
     scale = 1.0
-    for units, sign in ((over, 1), (under.strip("()"), -1)):
+    for units, sign in ((numerator, 1), (denominator.strip("()"), -1)):
         for word in units.split():
-            symbol, _, power = word.partition("^")
-            scale *= scale_of.get(symbol, 1.0) ** (sign * float(power or 1))
+            symbol, _, exponent = word.partition("^")
+            scale *= scale_of.get(symbol, 1.0) ** (sign * float(exponent or 1))
     return scale
 
 
@@ -221,9 +221,9 @@ def _joint_types(letters: str) -> list[str]:
     if not types or not all(types):
         expected = "expected a letter for each joint, R (revolute) or P (prismatic), e.g. RRP for 3 joints"
         number = int(letters) if re.fullmatch("[0-9]{1,3}", letters) else 0
-        several = counted(number, "revolute joint")
+        joints_text = counted(number, "revolute joint")
         hint = (
-            f"for {several}: --joints {'R' * number}"
+            f"for {joints_text}: --joints {'R' * number}"
             if 0 < number <= MOST_SPELLED_OUT
             else f"found {letters!r}"
         )
@@ -231,7 +231,7 @@ def _joint_types(letters: str) -> list[str]:
     return types
 
 
-def _joint(joint: tuple[str, str, str], size: tuple[float, float], alpha: int | str) -> Values:
+def _joint_values(joint: tuple[str, str, str], size: tuple[float, float], alpha: int | str) -> Values:
     """Return a joint by its name, type and actuator, length and mass of its link, and its twist.
 
     Of the usual sizes, the axis of the first of several joints is vertical, those of all others are
@@ -239,28 +239,28 @@ def _joint(joint: tuple[str, str, str], size: tuple[float, float], alpha: int | 
     first joints hardly grows with the number of joints, so that springs of one size hold all arms.
     """
     (name, joint_type, actuator), (length, mass) = joint, size
-    across = mass * length * length / 12
-    inertia = {"xx": across * 2 / 15, "yy": across, "zz": across}
+    moment = mass * length * length / 12
+    inertia = {"xx": moment * 2 / 15, "yy": moment, "zz": moment}
     link = {
         "mass": three_digits(mass),
-        "inertia": {axis: three_digits(each) for axis, each in inertia.items()},
+        "inertia": {axis: three_digits(component) for axis, component in inertia.items()},
     }
-    half, travel = three_digits(length / 2), three_digits(length * 2 / 3)
-    geometry = _by_type(
+    half_length, travel = three_digits(length / 2), three_digits(length * 2 / 3)
+    geometry = _choose_by_type(
         joint_type,
-        {"dh": {"a": 2 * half, "alpha": alpha}, "link": {**link, "com": [-half, 0, 0]}},
+        {"dh": {"a": 2 * half_length, "alpha": alpha}, "link": {**link, "com": [-half_length, 0, 0]}},
         {"dh": {"a": 0, "alpha": alpha, "d": travel}, "link": {**link, "com": [0, 0, -travel / 2]}},
     )
     try:
-        driven = _drive_values(actuator, joint_type)
+        drive_values = _drive_values(actuator, joint_type)
     except InputError as error:
         raise InputError.one(f"{name}: {error}") from None
     return {
         "name": for_yaml(name) if name.lower() in (*BOOLEANS, "null") else name,
         "type": joint_type,
         **geometry,
-        "damping": _by_type(joint_type, 0.1, 1.0),
-        **driven,
+        "damping": _choose_by_type(joint_type, 0.1, 1.0),
+        **drive_values,
     }
 
 
@@ -279,5 +279,5 @@ def _drive_values(actuator: str, joint_type: str) -> Values:
     return {key: entry for key, entry in document["joints"][-1].items() if key in OF_DEVICE}
 
 
-def _by_type(joint_type: str, revolute: Any, prismatic: Any) -> Any:
+def _choose_by_type(joint_type: str, revolute: Any, prismatic: Any) -> Any:
     return revolute if joint_type == TYPES["R"] else prismatic

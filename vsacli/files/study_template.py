@@ -18,7 +18,7 @@ STUDY_HEAD = (
     "combinations are computed. What stands commented out is optional and shown with its default.",
 )
 
-PLAIN = re.compile(r"[A-Za-z./][\w./ -]*")
+PLAIN_TEXT = re.compile(r"[A-Za-z./][\w./ -]*")
 """Texts that YAML reads as they are."""
 
 VARIED_SHARE, VARIED_VALUES = 0.2, 5
@@ -34,20 +34,20 @@ def study_template(robot: Robot, trajectory: Trajectory, robot_path: str, trajec
         robot_path: path of the robot file, relative to the study file.
         trajectory_path: path of the trajectory file, likewise.
     """
-    path, value = _varied_number(robot)
-    ends = [three_digits(value * (1 + share)) for share in (-VARIED_SHARE, VARIED_SHARE)]
-    vary: dict[str, Any] = {path: {"linspace": [*ends, VARIED_VALUES]}}
+    path, value = _varied_parameter(robot)
+    range_ends = [three_digits(value * (1 + share)) for share in (-VARIED_SHARE, VARIED_SHARE)]
+    vary: dict[str, Any] = {path: {"linspace": [*range_ends, VARIED_VALUES]}}
     if trajectory.sources and ValuesInFile(trajectory.sources[0]).has(("duration",)):
         vary["duration"] = [three_digits(trajectory.duration * factor) for factor in (1, 1.5, 2)]
     texts = {"name": f"{robot.name}-{trajectory.name}", "robot": robot_path, "trajectory": trajectory_path}
-    quoted = {key: text if PLAIN.fullmatch(text) else for_yaml(text) for key, text in texts.items()}
+    quoted = {key: text if PLAIN_TEXT.fullmatch(text) else for_yaml(text) for key, text in texts.items()}
     values = {**quoted, "vary": vary}
     return commented_document(file_formats.STUDY, StudyFile, values, STUDY_HEAD)
 
 
-def _varied_number(robot: Robot) -> tuple[str, float]:
+def _varied_parameter(robot: Robot) -> tuple[str, float]:
     """Return the path of the first stiffness of a spring, of all joints if it is equal, and its value."""
-    springs = [
+    spring_numbers = [
         (number.path[2:], number.path[1], number.value)
         for number in robot.checked.numbers
         if number.path[0] == "joints"
@@ -55,9 +55,9 @@ def _varied_number(robot: Robot) -> tuple[str, float]:
         and number.quantity.revolute.startswith("N")
         and number.value
     ]
-    if not springs:
+    if not spring_numbers:
         return f"joints.{robot.joint_names[0]}.link.mass", robot.joints[0].link.mass
-    inner, joint, value = springs[0]
-    equal = [each for each in springs if each[0] == inner and each[2] == value]
-    where = "*" if len(equal) == len(robot.joints) else str(joint)
-    return ".".join(("joints", where, *map(str, inner))), value
+    path_in_joint, joint, value = spring_numbers[0]
+    equal_numbers = [each for each in spring_numbers if each[0] == path_in_joint and each[2] == value]
+    joint_key = "*" if len(equal_numbers) == len(robot.joints) else str(joint)
+    return ".".join(("joints", joint_key, *map(str, path_in_joint))), value

@@ -28,36 +28,36 @@ from vsacli.trajectory.file import load_trajectory
 from vsacli.trajectory.trajectory import Trajectory
 
 
-def possible_duration(robot: Robot, text: str, usual: float) -> tuple[float, str]:
+def possible_duration(robot: Robot, text: str, usual_duration: float) -> tuple[float, str]:
     """Return a duration with which the robot can execute a trajectory file, and a remark if it is longer.
 
     Args:
         robot: robot that executes the trajectory.
         text: text of the file, with the usual duration.
-        usual: usual duration, s.
+        usual_duration: usual duration, s.
 
     Raises:
         StorageError: the disk has no room for a temporary file.
     """
-    acceptance, trajectory = Acceptance(robot, MIN_MARGIN), _read(text, robot)
+    acceptance, trajectory = Acceptance(robot, MIN_MARGIN), _load_text(text, robot)
     reasons = "; ".join(_refusal_reasons(acceptance, trajectory))
     if not reasons:
-        return usual, ""
+        return usual_duration, ""
     try:
-        duration = usual * smallest_slow_down(Task(acceptance, trajectory)).factor
+        duration = usual_duration * smallest_slow_down(Task(acceptance, trajectory)).factor
     except ImpossibleError as error:
-        return usual, f"This robot cannot execute it, nor more slowly: {error}."
-    rounded = _rounded_up(duration)
-    if not _refusal_reasons(acceptance, trajectory.stretched(rounded / usual)):
-        duration = rounded
-    return duration, f"It does not take {usual:g} s, since then {reasons}."
+        return usual_duration, f"This robot cannot execute it, nor more slowly: {error}."
+    rounded_duration = _round_up(duration)
+    if not _refusal_reasons(acceptance, trajectory.stretched(rounded_duration / usual_duration)):
+        duration = rounded_duration
+    return duration, f"It does not take {usual_duration:g} s, since then {reasons}."
 
 
 def _refusal_reasons(acceptance: Acceptance, trajectory: Trajectory) -> tuple[str, ...]:
     return acceptance.reasons(TaskSamples.of(trajectory, 0, trajectory.samples))
 
 
-def _read(text: str, robot: Robot) -> Trajectory:
+def _load_text(text: str, robot: Robot) -> Trajectory:
     with temporary_folder() as folder:
         path = folder / "starter.yaml"
         with reporting_temporary_errors():
@@ -65,7 +65,7 @@ def _read(text: str, robot: Robot) -> Trajectory:
         return load_trajectory(path, robot)
 
 
-def _rounded_up(duration: float) -> float:
+def _round_up(duration: float) -> float:
     """Return a duration rounded up to two digits."""
     unit = 10.0 ** (math.floor(math.log10(duration)) - 1)
     return float(f"{math.ceil(duration / unit) * unit:.6g}")

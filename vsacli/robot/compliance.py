@@ -57,7 +57,7 @@ def tip_compliance(
         TypeError: Robot or wrench is of another type.
     """
     check_robot(robot)
-    chosen = robot.end_effector(tool)
+    tool_index = robot.end_effector(tool)
     positions = checked_shape("q", q, len(robot.joints))
     joint_stiffness = checked_shape("stiffness", stiffness, len(robot.joints))
     _check_same_shape("stiffness", joint_stiffness, positions.shape)
@@ -66,7 +66,7 @@ def tip_compliance(
         components = wrench_components(wrenches.frame)
         _check_same_shape("the wrench", wrenches.wrench, (*positions.shape[:-1], components))
     pose = HeldPose(robot, np.atleast_2d(positions), np.atleast_2d(joint_stiffness), wrenches)
-    compliance, _ = pose.compliance(chosen)
+    compliance, _ = pose.compliance(tool_index)
     return compliance.reshape(*positions.shape[:-1], len(WRENCH_AXES), len(WRENCH_AXES))
 
 
@@ -88,15 +88,17 @@ def softest_direction(compliance: FloatArray) -> tuple[FloatArray, FloatArray]:
         Stiffness, (...), N/m, and unit vectors in base axes, (..., 3), with the largest component positive;
         both NaN where C is. Where the tool does not yield, the stiffness is infinite, the direction NaN.
     """
-    block = compliance[..., :3, :3]
-    known: BoolArray = np.isfinite(np.sum(block, axis=(-2, -1)))
-    symmetric: FloatArray = np.where(known[..., None, None], block + np.swapaxes(block, -1, -2), 0.0) / 2
+    translational = compliance[..., :3, :3]
+    is_finite: BoolArray = np.isfinite(np.sum(translational, axis=(-2, -1)))
+    symmetric: FloatArray = (
+        np.where(is_finite[..., None, None], translational + np.swapaxes(translational, -1, -2), 0.0) / 2
+    )
     values, vectors = np.linalg.eigh(symmetric)
     largest, direction = values[..., -1], vectors[..., -1]
-    yields = known & (largest > 0)
-    stiffness = np.divide(1.0, largest, out=np.where(known, np.inf, np.nan), where=yields)
-    leading = np.take_along_axis(direction, np.abs(direction).argmax(axis=-1)[..., None], axis=-1)
-    return stiffness, np.where(yields[..., None], direction * np.sign(leading), np.nan)
+    is_yielding = is_finite & (largest > 0)
+    stiffness = np.divide(1.0, largest, out=np.where(is_finite, np.inf, np.nan), where=is_yielding)
+    largest_component = np.take_along_axis(direction, np.abs(direction).argmax(axis=-1)[..., None], axis=-1)
+    return stiffness, np.where(is_yielding[..., None], direction * np.sign(largest_component), np.nan)
 
 
 class HeldPose:
@@ -125,12 +127,12 @@ class HeldPose:
         coupled = coupled_joints(self._robot, tool)
         matrix = self._matrix[:, coupled][:, :, coupled]
         columns = jacobian_in_base(self._robot, self._frames, tool)[..., coupled]
-        least = smallest_eigenvalues(matrix)
-        stable = least > SMALLEST_EIGENVALUE
-        matrix[~stable] = np.eye(len(coupled))
+        smallest = smallest_eigenvalues(matrix)
+        is_stable = smallest > SMALLEST_EIGENVALUE
+        matrix[~is_stable] = np.eye(len(coupled))
         compliance: FloatArray = columns @ np.linalg.solve(matrix, np.swapaxes(columns, -1, -2))
-        compliance[~stable | ~np.isfinite(columns).all(axis=(-2, -1))] = np.nan
-        return compliance, least <= SMALLEST_EIGENVALUE
+        compliance[~is_stable | ~np.isfinite(columns).all(axis=(-2, -1))] = np.nan
+        return compliance, smallest <= SMALLEST_EIGENVALUE
 
 
 def coupled_joints(robot: Robot, tool: int) -> list[int]:
@@ -140,8 +142,8 @@ def coupled_joints(robot: Robot, tool: int) -> list[int]:
     a joint change with it. Other branches do not count, so that a branch has what it has alone.
     """
     sprung = [joint.actuator.sprung for joint in robot.joints]
-    first = [joint for joint in robot.paths[robot.tool_joints[tool]] if sprung[joint]][:1]
-    return [joint for joint, path in enumerate(robot.paths) if sprung[joint] and {*first} & {*path}]
+    first_sprung = [joint for joint in robot.paths[robot.tool_joints[tool]] if sprung[joint]][:1]
+    return [joint for joint, path in enumerate(robot.paths) if sprung[joint] and {*first_sprung} & {*path}]
 
 
 def smallest_eigenvalues(matrices: FloatArray) -> FloatArray:
@@ -157,12 +159,12 @@ def smallest_eigenvalues(matrices: FloatArray) -> FloatArray:
     if not matrices.shape[-1]:
         return np.full(len(matrices), np.inf)
     diagonal = np.diagonal(matrices, axis1=-2, axis2=-1)
-    regular = np.isfinite(matrices).all(axis=(-2, -1)) & (diagonal > 0).all(axis=-1)
-    least: FloatArray = np.where(np.isfinite(matrices).all(axis=(-2, -1)), diagonal.min(axis=-1), np.nan)
-    root = 1 / np.sqrt(diagonal[regular])
-    scaled = root[:, :, None] * matrices[regular] * root[:, None]
-    least[regular] = np.linalg.eigvalsh((scaled + np.swapaxes(scaled, -1, -2)) / 2)[:, 0]
-    return least
+    is_regular = np.isfinite(matrices).all(axis=(-2, -1)) & (diagonal > 0).all(axis=-1)
+    smallest: FloatArray = np.where(np.isfinite(matrices).all(axis=(-2, -1)), diagonal.min(axis=-1), np.nan)
+    scale = 1 / np.sqrt(diagonal[is_regular])
+    scaled = scale[:, :, None] * matrices[is_regular] * scale[:, None]
+    smallest[is_regular] = np.linalg.eigvalsh((scaled + np.swapaxes(scaled, -1, -2)) / 2)[:, 0]
+    return smallest
 
 
 class _ConstantLoad(NamedTuple):
@@ -200,12 +202,14 @@ def holding_torque_slope(robot: Robot, frames: RobotFrames, wrench: Wrench | Non
             normal = np.cross(axes[outer], axis)
             if joints[inner].is_revolute:
                 trace = np.trace(virial, axis1=-2, axis2=-1)
-                both = np.einsum("si,sij,sj->s", axes[outer], trace[:, None, None] * np.eye(3) - virial, axis)
-                of_moment = np.einsum("si,si->s", moment, normal)
+                common_slope = np.einsum(
+                    "si,sij,sj->s", axes[outer], trace[:, None, None] * np.eye(3) - virial, axis
+                )
+                moment_slope = np.einsum("si,si->s", moment, normal)
             else:
-                both, of_moment = -np.einsum("si,si->s", force, normal), 0.0
-            slope[:, outer, inner] = both
-            slope[:, inner, outer] = both - of_moment
+                common_slope, moment_slope = -np.einsum("si,si->s", force, normal), 0.0
+            slope[:, outer, inner] = common_slope
+            slope[:, inner, outer] = common_slope - moment_slope
     return slope
 
 
@@ -221,11 +225,11 @@ def _constant_loads(robot: Robot, frames: RobotFrames, wrench: Wrench | None) ->
         lever = frames.tools[tool].origin - frames.seats[carrier].origin
         loads[carrier] = _sum_of_loads(loads[carrier], _ConstantLoad(force, _dyad(lever, force), moment))
     for joint_index in reversed(range(len(loads))):
-        parent, beyond = robot.parents[joint_index], loads[joint_index]
+        parent, load = robot.parents[joint_index], loads[joint_index]
         if parent >= 0:
             lever = frames.seats[joint_index].origin - frames.seats[parent].origin
-            shifted = beyond._replace(virial=beyond.virial + _dyad(lever, beyond.force))
-            loads[parent] = _sum_of_loads(loads[parent], shifted)
+            shifted_load = load._replace(virial=load.virial + _dyad(lever, load.force))
+            loads[parent] = _sum_of_loads(loads[parent], shifted_load)
     return loads
 
 
@@ -242,8 +246,8 @@ def _tool_wrenches(
     ):
         if frame is not None:
             axes = np.eye(3) if frame == "base" else frames.tools[tool].axes
-            turned = (axes[..., None, :, :] @ components[:, tool, :, :, None])[..., 0]
-            force, moment = np.broadcast_to(turned, (len(frames.base.origin), 2, 3)).swapaxes(0, 1)
+            in_base = (axes[..., None, :, :] @ components[:, tool, :, :, None])[..., 0]
+            force, moment = np.broadcast_to(in_base, (len(frames.base.origin), 2, 3)).swapaxes(0, 1)
             wrenches.append((carrier, tool, force, moment))
     return wrenches
 
@@ -253,4 +257,6 @@ def _dyad(lever: FloatArray, force: FloatArray) -> FloatArray:
 
 
 def _sum_of_loads(first: _ConstantLoad, second: _ConstantLoad) -> _ConstantLoad:
-    return _ConstantLoad(*(one + other for one, other in zip(first, second, strict=True)))
+    return _ConstantLoad(
+        *(first_part + second_part for first_part, second_part in zip(first, second, strict=True))
+    )

@@ -95,8 +95,8 @@ def frames(robot: Geometry, q: FloatArray) -> RobotFrames:
     base = FramePose(np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))
     seats, links = list[FramePose](), list[FramePose]()
     for joint, parent, variable in zip(robot.joints, robot.parents, q.T, strict=True):
-        carrying = links[parent] if parent >= 0 else base
-        seats.append(carrying if joint.mount is None else carrying.compose(_constant_frame(joint.mount)))
+        carrier = links[parent] if parent >= 0 else base
+        seats.append(carrier if joint.mount is None else carrier.compose(_constant_frame(joint.mount)))
         links.append(seats[-1].compose(_link_frame(joint, variable)))
     return RobotFrames(base, tuple(seats), tuple(links), _tool_frames(robot, links))
 
@@ -175,13 +175,13 @@ def jacobian(
     """
     check_robot(robot)
     check_frame(frame, "Jacobian")
-    chosen = robot.end_effector(tool)
+    tool_index = robot.end_effector(tool)
     positions = checked_shape("q", q, len(robot.joints))
     in_base = frames_in_base(robot, np.atleast_2d(positions))
-    columns = jacobian_in_base(robot, in_base, chosen)
+    columns = jacobian_in_base(robot, in_base, tool_index)
     if frame == "end_effector":
-        turn = np.swapaxes(in_base.tools[chosen].axes, -1, -2)
-        columns = np.concatenate((turn @ columns[:, :3], turn @ columns[:, 3:]), axis=1)
+        base_to_tool = np.swapaxes(in_base.tools[tool_index].axes, -1, -2)
+        columns = np.concatenate((base_to_tool @ columns[:, :3], base_to_tool @ columns[:, 3:]), axis=1)
     return columns.reshape(*positions.shape[:-1], *columns.shape[1:])
 
 
@@ -193,12 +193,12 @@ def jacobian_in_base(robot: Robot, frames: RobotFrames, tool: int) -> FloatArray
         frames: its frames in the base frame.
         tool: index of the tool among the end effectors.
     """
-    moved = frames.tools[tool]
-    columns = np.zeros((len(moved.origin), len(WRENCH_AXES), len(robot.joints)))
+    tool_frame = frames.tools[tool]
+    columns = np.zeros((len(tool_frame.origin), len(WRENCH_AXES), len(robot.joints)))
     for index in robot.paths[robot.tool_joints[tool]]:
         seat, is_revolute = frames.seats[index], robot.joints[index].is_revolute
         axis = seat.axes[..., 2]
-        columns[:, :3, index] = np.cross(axis, moved.origin - seat.origin) if is_revolute else axis
+        columns[:, :3, index] = np.cross(axis, tool_frame.origin - seat.origin) if is_revolute else axis
         columns[:, 3:, index] = axis if is_revolute else 0
     return columns
 

@@ -46,7 +46,7 @@ AT_LINK = Pose()
 END_EFFECTOR = "end_effector"
 """Name of the tool of a robot without `tools`."""
 
-OF_PLACEHOLDERS = (
+PLACEHOLDER_WARNING = (
     "the springs and motors of this robot are placeholders: replace them by those of your devices "
     "and remove `placeholder: true`"
 )
@@ -82,7 +82,7 @@ class Robot(DeclaredRecord):
     @cached_property
     def _hash(self) -> int:
         """Hash of all parameters, computed once: robots are keys of recorded functions."""
-        return hash(tuple(getattr(self, each.name) for each in fields(self) if each.compare))
+        return hash(tuple(getattr(self, parameter.name) for parameter in fields(self) if parameter.compare))
 
     def _problems(self) -> Iterator[FieldProblem]:
         """Yield problems of parents, or else of tools."""
@@ -90,8 +90,8 @@ class Robot(DeclaredRecord):
 
     def _parent_problems(self) -> Iterator[FieldProblem]:
         names = self.joint_names
-        for number, joint in enumerate(self.joints):
-            if joint.parent in (None, FRAME_0, *names[:number]):
+        for index, joint in enumerate(self.joints):
+            if joint.parent in (None, FRAME_0, *names[:index]):
                 continue
             if joint.parent == joint.name:
                 reason = "a joint is not mounted on its own link; name an earlier joint, or null for the base"
@@ -99,9 +99,9 @@ class Robot(DeclaredRecord):
                 order = "list joints after the one that carries them (a cycle has no such order)"
                 reason = f"{joint.parent!r} comes later in the file; {order}"
             else:
-                hint = did_you_mean(str(joint.parent), names[:number]) if number else ""
+                hint = did_you_mean(str(joint.parent), names[:index]) if index else ""
                 reason = f"no earlier joint is called {joint.parent!r} (null stands for the base){hint}"
-            yield FieldProblem(("joints", number, "parent"), reason)
+            yield FieldProblem(("joints", index, "parent"), reason)
 
     def _tool_problems(self) -> Iterator[FieldProblem]:
         if self.tool != AT_LINK and self.tools:
@@ -131,8 +131,8 @@ class Robot(DeclaredRecord):
             for name in self.joint_names
         ]
         return [
-            (*row, *further)
-            for row, *further in zip(rows, ["on", *self.parent_names], ["tools", *tools], strict=True)
+            (*row, *other_cells)
+            for row, *other_cells in zip(rows, ["on", *self.parent_names], ["tools", *tools], strict=True)
         ]
 
     def replace(self, path: str | Mapping[str, Any], value: Any = None) -> Self:
@@ -173,9 +173,9 @@ class Robot(DeclaredRecord):
     @cached_property
     def parents(self) -> tuple[int, ...]:
         """Index of the joint on whose link each joint is mounted; -1 for frame 0."""
-        index = {FRAME_0: -1, **{name: number for number, name in enumerate(self.joint_names)}}
+        joint_indices = {FRAME_0: -1, **{name: number for number, name in enumerate(self.joint_names)}}
         return tuple(
-            number - 1 if joint.parent is None else index[joint.parent]
+            number - 1 if joint.parent is None else joint_indices[joint.parent]
             for number, joint in enumerate(self.joints)
         )
 
@@ -188,23 +188,24 @@ class Robot(DeclaredRecord):
     def paths(self) -> tuple[tuple[int, ...], ...]:
         """Joints that move the link of each joint, from the base to this joint."""
         paths: list[tuple[int, ...]] = []
-        for number, parent in enumerate(self.parents):
-            paths.append((*(paths[parent] if parent >= 0 else ()), number))
+        for index, parent in enumerate(self.parents):
+            paths.append((*(paths[parent] if parent >= 0 else ()), index))
         return tuple(paths)
 
     @cached_property
     def subtrees(self) -> tuple[tuple[int, ...], ...]:
         """Joints that stand on the base together, because one on the base carries the others."""
-        first = [path[0] for path in self.paths]
+        first_joints = [path[0] for path in self.paths]
         return tuple(
-            tuple(number for number, own in enumerate(first) if own == base) for base in dict.fromkeys(first)
+            tuple(index for index, first_joint in enumerate(first_joints) if first_joint == base)
+            for base in dict.fromkeys(first_joints)
         )
 
     @property
     def is_plain_chain(self) -> bool:
         """Whether each link carries the next joint at its frame, and the tool is not one of `tools`."""
-        mounted = any(joint.mount is not None for joint in self.joints)
-        return not (mounted or self.tools) and self.parents == tuple(range(-1, len(self.joints) - 1))
+        has_mount = any(joint.mount is not None for joint in self.joints)
+        return not (has_mount or self.tools) and self.parents == tuple(range(-1, len(self.joints) - 1))
 
     @property
     def tips(self) -> tuple[int, ...]:
@@ -271,13 +272,13 @@ class Robot(DeclaredRecord):
             return bool(self.limited_tools)
         if variable.requires == LOSSES:
             return any(joint.has_friction or joint.damper is not None for joint in self.joints)
-        required_of_none = variable.requires in OF_ANY_ROBOT
-        return required_of_none or any(any(joint.has_columns(variable)) for joint in self.joints)
+        is_in_any_result = variable.requires in OF_ANY_ROBOT
+        return is_in_any_result or any(any(joint.has_columns(variable)) for joint in self.joints)
 
     @cached_property
     def signals(self) -> tuple[Signal, ...]:
         """Commanded signals in results besides the motion: stiffness, others where a joint has them."""
-        return tuple(each for each in COMMANDED.values() if self.has_variable(VARIABLES[each.key]))
+        return tuple(signal for signal in COMMANDED.values() if self.has_variable(VARIABLES[signal.key]))
 
     @property
     def spring_sources(self) -> tuple[Source, ...]:
@@ -320,7 +321,7 @@ class Robot(DeclaredRecord):
 
         findings = robot_findings(self.checked, self.checked_subtrees, self.sources)
         massless = not any(joint.link.mass for joint in self.joints)
-        of_robot = {OF_PLACEHOLDERS: self.placeholder, WITHOUT_MASSES: massless}
+        of_robot = {PLACEHOLDER_WARNING: self.placeholder, WITHOUT_MASSES: massless}
         of_joints = (warning for joint in self.joints for warning in joint.warnings())
         whole = (*(warning for warning, applies in of_robot.items() if applies), *of_joints)
         return (*(Problem("", 0, warning) for warning in whole), *findings)

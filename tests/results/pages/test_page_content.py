@@ -27,7 +27,7 @@ from vsacli.base.variables import VARIABLES
 from vsacli.cli.main import run
 from vsacli.results.charts.figures import result_title
 from vsacli.results.charts.reduction import FULL_DETAIL
-from vsacli.results.charts.stored import BOUNDS
+from vsacli.results.charts.stored import STIFFNESS_BOUNDS
 from vsacli.results.pages.result_page import sections_of
 from vsacli.results.store.reader import StoredResult, open_stored
 
@@ -104,7 +104,8 @@ def test_every_curve_of_a_page_is_that_of_the_file(page: Page, feasible_result: 
         wanted = {
             (name, *index)
             for name in file
-            if name not in ("flags", "inputs", "joint", "joint_type", "motor", "report", "time", *BOUNDS)
+            if name
+            not in ("flags", "inputs", "joint", "joint_type", "motor", "report", "time", *STIFFNESS_BOUNDS)
             for index in np.ndindex(file[name].shape[1:])
         }
     assert drawn == wanted
@@ -115,7 +116,7 @@ def test_every_variable_has_a_place_on_pages() -> None:
         names = [name for section in sections_of(list(declared)) for name in section.names]
         assert len(names) == len(set(names))
         own = {SIMULATED_NAMES.get(name, name) for name in declared if not name.endswith("_std")}
-        assert set(names) == own - {*FLAG_BITS, *BOUNDS}
+        assert set(names) == own - {*FLAG_BITS, *STIFFNESS_BOUNDS}
 
 
 def test_stiffness_is_drawn_inside_what_can_be_reached(page: Page, feasible_result: Path) -> None:

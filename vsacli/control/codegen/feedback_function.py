@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from vsacli.actuators.drivetrain import Drivetrain, DrivetrainState
-from vsacli.base.flags import Flag, finite, marked, not_finite_flags
+from vsacli.base.flags import Flag, finite, flags_where, not_finite_flags
 from vsacli.base.wrench import WrenchFrame
 from vsacli.control.codegen.interface import Array, Function, Rows, Structure, arrays_by_argument
 from vsacli.control.codegen.robot_functions import (

@@ -13,7 +13,7 @@ import numpy as np
 from vsacli.actuators.drivetrain import SIDES, Drivetrain
 from vsacli.base.arrays import FLAG_TYPE
 from vsacli.base.errors import InputError
-from vsacli.base.flags import Flag, finite, marked, not_finite_flags
+from vsacli.base.flags import Flag, finite, flags_where, not_finite_flags
 from vsacli.base.signals import DAMPING
 from vsacli.base.wrench import WrenchFrame
 from vsacli.compute.tracing import cells_of

@@ -20,9 +20,11 @@ def describe_cache(folder: str) -> dict[str, Any]:
     Raises:
         StorageError: the cache cannot be used.
     """
-    with _opened() as cache:
+    with _open_cache() as cache:
         sizes = [entry.size for entry in cache.entries()]
-        found = [each for place in _places(Path(folder), cache.folder) for each in unfinished(place)]
+        unfinished_files = [
+            each for place in _folders_once(Path(folder), cache.folder) for each in unfinished(place)
+        ]
     return {
         "kind": "cache",
         "folder": str(cache.folder),
@@ -30,7 +32,8 @@ def describe_cache(folder: str) -> dict[str, Any]:
         "size": sum(sizes),
         "limit": MOST_BYTES,
         "unfinished": [
-            {"path": str(each.path), "size": each.size, "owner": each.owner.value} for each in found
+            {"path": str(each.path), "size": each.size, "owner": each.owner.value}
+            for each in unfinished_files
         ],
     }
 
@@ -41,19 +44,19 @@ def clear_cache() -> None:
     Raises:
         StorageError: the cache cannot be used.
     """
-    with _opened() as cache:
+    with _open_cache() as cache:
         cache.clear()
 
 
 @contextmanager
-def _opened() -> Iterator[Cache]:
+def _open_cache() -> Iterator[Cache]:
     try:
         yield open_cache()
     except CacheError as error:
         raise StorageError("compiled code", str(error)) from error
 
 
-def _places(*folders: Path) -> list[Path]:
+def _folders_once(*folders: Path) -> list[Path]:
     """Return these folders and the folder for temporary files, if there is one, each once."""
     places = dict.fromkeys(folders)
     with suppress(OSError):
@@ -73,8 +76,8 @@ def cache_lines(cache: Mapping[str, Any]) -> Iterator[str]:
     libraries = counted(cache["entries"], "library", "libraries")
     size, limit = _megabytes(cache["size"]), _megabytes(cache["limit"])
     yield f"compiled code: {libraries}, {size} of at most {limit}, in {cache['folder']}"
-    for each in cache["unfinished"]:
-        yield f"unfinished: {each['path']}, {_megabytes(each['size'])}, {_OWNERS[each['owner']]}"
+    for file in cache["unfinished"]:
+        yield f"unfinished: {file['path']}, {_megabytes(file['size'])}, {_OWNERS[file['owner']]}"
 
 
 def _megabytes(size: int) -> str:

@@ -25,7 +25,7 @@ MOST_STARTS = 16
 """Number of random start configurations for each goal; fewer in long chains."""
 
 MOST_SWEEPS = 50
-SETTLED_GAIN = 1e-11
+NEGLIGIBLE_GAIN = 1e-11
 """Relative gain of a sweep over all joints below which the search ends."""
 
 MOST_EVALUATIONS = 1e7
@@ -66,71 +66,73 @@ def unlimited(joint: Joint) -> bool:
     return not joint.is_revolute and not all(map(math.isfinite, joint.limits.position))
 
 
-def largest_sizes(objective: Objective, goals: int, robot: Robot) -> Extremes:
+def largest_magnitudes(objective: Objective, goals: int, robot: Robot) -> Extremes:
     """Maximize the magnitude of each goal separately; NaN if values overflow."""
     with np.errstate(all="ignore"):
-        q = _searched(objective, _random(goals, robot), robot)
-        sizes = np.abs(_own_values(objective, q))
-    best, rows = sizes.argmax(axis=1), np.arange(goals)
-    return Extremes(sizes[rows, best], q[rows, best])
+        q = _coordinate_ascent(objective, _start_configurations(goals, robot), robot)
+        magnitudes = np.abs(_values_of_goals(objective, q))
+    best_start, goal_index = magnitudes.argmax(axis=1), np.arange(goals)
+    return Extremes(magnitudes[goal_index, best_start], q[goal_index, best_start])
 
 
-def _random(goals: int, robot: Robot) -> FloatArray:
+def _start_configurations(goals: int, robot: Robot) -> FloatArray:
     """Return start configurations, (goals, starts, joints)."""
-    count = len(robot.joints)
-    starts = min(MOST_STARTS, max(2, 200 // count))
+    joint_count = len(robot.joints)
+    starts = min(MOST_STARTS, max(2, 200 // joint_count))
     low, high = np.array([free_range(joint) for joint in robot.joints]).T
-    return np.random.default_rng(SEED).uniform(low, high, (goals, starts, count))
+    return np.random.default_rng(SEED).uniform(low, high, (goals, starts, joint_count))
 
 
-def _searched(objective: Objective, q: FloatArray, robot: Robot) -> FloatArray:
+def _coordinate_ascent(objective: Objective, q: FloatArray, robot: Robot) -> FloatArray:
     """Return the configurations after sweeps over all joints, repeated until the gain is negligible."""
-    count = len(robot.joints)
-    work = max(q[..., 0].size * len(_ANGLES), SAMPLES_AT_NO_COST) * count * count
-    before = np.zeros(len(q))
-    for _ in range(min(MOST_SWEEPS, int(MOST_EVALUATIONS / work))):
+    joint_count = len(robot.joints)
+    sweep_evaluations = max(q[..., 0].size * len(_ANGLES), SAMPLES_AT_NO_COST) * joint_count * joint_count
+    previous_magnitudes = np.zeros(len(q))
+    for _ in range(min(MOST_SWEEPS, int(MOST_EVALUATIONS / sweep_evaluations))):
         for index, joint in enumerate(robot.joints):
-            best = _best_angle if joint.is_revolute else _best_end
-            q[..., index] = best(objective, q, index, np.array(free_range(joint)))
-        sizes = np.abs(_own_values(objective, q)).max(axis=1)
-        if np.all(sizes - before <= SETTLED_GAIN * sizes):
+            best_position = _best_angle if joint.is_revolute else _best_end
+            q[..., index] = best_position(objective, q, index, np.array(free_range(joint)))
+        magnitudes = np.abs(_values_of_goals(objective, q)).max(axis=1)
+        if np.all(magnitudes - previous_magnitudes <= NEGLIGIBLE_GAIN * magnitudes):
             break
-        before = sizes
+        previous_magnitudes = magnitudes
     return q
 
 
-def _own_values(objective: Objective, q: FloatArray) -> FloatArray:
+def _values_of_goals(objective: Objective, q: FloatArray) -> FloatArray:
     """Return the values of each goal at its own configurations, (..., goals, starts, joints)."""
-    everything = objective(q.reshape(-1, q.shape[-1])).reshape(*q.shape[:-1], q.shape[-3])
-    own: FloatArray = np.einsum("...gsg->...gs", everything)
-    return own
+    all_values = objective(q.reshape(-1, q.shape[-1])).reshape(*q.shape[:-1], q.shape[-3])
+    goal_values: FloatArray = np.einsum("...gsg->...gs", all_values)
+    return goal_values
 
 
-def _at(objective: Objective, q: FloatArray, index: int, positions: FloatArray) -> FloatArray:
+def _values_at_positions(
+    objective: Objective, q: FloatArray, index: int, positions: FloatArray
+) -> FloatArray:
     """Return values with one joint moved to each of several positions, (positions, goals, starts)."""
-    moved = np.repeat(q[None], len(positions), axis=0)
-    moved[..., index] = positions[:, None, None]
-    return _own_values(objective, moved)
+    moved_q = np.repeat(q[None], len(positions), axis=0)
+    moved_q[..., index] = positions[:, None, None]
+    return _values_of_goals(objective, moved_q)
 
 
-def _best_end(objective: Objective, q: FloatArray, index: int, ends: FloatArray) -> FloatArray:
-    low, high = np.abs(_at(objective, q, index, ends))
-    best: FloatArray = np.where(high > low, ends[1], ends[0])
+def _best_end(objective: Objective, q: FloatArray, index: int, limits: FloatArray) -> FloatArray:
+    low_magnitude, high_magnitude = np.abs(_values_at_positions(objective, q, index, limits))
+    best: FloatArray = np.where(high_magnitude > low_magnitude, limits[1], limits[0])
     return best
 
 
-def _best_angle(objective: Objective, q: FloatArray, index: int, ends: FloatArray) -> FloatArray:
+def _best_angle(objective: Objective, q: FloatArray, index: int, limits: FloatArray) -> FloatArray:
     """Return the maximum of |a + b cos q + c sin q| between the ends, from its values at three angles."""
-    thirds = _at(objective, q, index, _ANGLES)
-    a = thirds.mean(axis=0)
-    b, c = (np.tensordot(wave(_ANGLES), thirds, 1) * 2 / len(_ANGLES) for wave in (np.cos, np.sin))
+    values_at_thirds = _values_at_positions(objective, q, index, _ANGLES)
+    a = values_at_thirds.mean(axis=0)
+    b, c = (np.tensordot(wave(_ANGLES), values_at_thirds, 1) * 2 / len(_ANGLES) for wave in (np.cos, np.sin))
     peak = np.arctan2(c, b)
-    inside = [ends[0] + np.mod(angle - ends[0], TURN) for angle in (peak, peak + math.pi)]
+    peak_angles = [limits[0] + np.mod(angle - limits[0], TURN) for angle in (peak, peak + math.pi)]
     candidates = np.stack(
-        [np.minimum(angle, ends[1]) for angle in inside] + [np.full_like(peak, end) for end in ends]
+        [np.minimum(angle, limits[1]) for angle in peak_angles] + [np.full_like(peak, end) for end in limits]
     )
-    sizes = np.abs(a + b * np.cos(candidates) + c * np.sin(candidates))
-    best: FloatArray = np.take_along_axis(candidates, sizes.argmax(axis=0)[None], axis=0)[0]
+    magnitudes = np.abs(a + b * np.cos(candidates) + c * np.sin(candidates))
+    best: FloatArray = np.take_along_axis(candidates, magnitudes.argmax(axis=0)[None], axis=0)[0]
     return best
 
 
@@ -149,13 +151,13 @@ def describe_robot(robot: Robot) -> dict[str, Any]:
     stiffness of its spring at these torques. `attainable_stiffness` is the part of it within the limits that
     matter at rest, with what `bounds` each end.
     """
-    by_tool = _reaches(robot)
+    reach_by_tool = _describe_reaches(robot)
     return {
         "kind": "robot",
         **_without_defaults(json_fields(robot), "tools"),
         "mass": sum(joint.link.mass for joint in robot.joints),
-        "reach": by_tool if robot.tools else next(iter(by_tool.values()), None),
-        "joints": _joints(robot),
+        "reach": reach_by_tool if robot.tools else next(iter(reach_by_tool.values()), None),
+        "joints": _describe_joints(robot),
         "held_at_zero": held_at_zero(robot),
         "warnings": list(robot.warnings),
     }
@@ -166,33 +168,33 @@ def _without_defaults(fields: dict[str, Any], *names: str) -> dict[str, Any]:
     return {name: content for name, content in fields.items() if content or name not in names}
 
 
-def _reaches(robot: Robot) -> dict[str, Any]:
+def _describe_reaches(robot: Robot) -> dict[str, Any]:
     """Return the reach of each tool by its name."""
     if not robot.end_effectors:
         return {}
-    furthest, bounds = reach(robot), reach_bounds(robot)
+    farthest, bounds = reach(robot), reach_bounds(robot)
     return {
         name: {"bound": bound, "found": float(found), "at": configuration.tolist()}
         for name, bound, found, configuration in zip(
-            robot.tool_names, bounds, furthest.values, furthest.configurations, strict=True
+            robot.tool_names, bounds, farthest.values, farthest.configurations, strict=True
         )
     }
 
 
-def _joints(robot: Robot) -> list[dict[str, Any]]:
+def _describe_joints(robot: Robot) -> list[dict[str, Any]]:
     loads = static_load(robot)
     carriers = [None if parent < 0 else robot.joint_names[parent] for parent in robot.parents]
-    in_row = [None, *robot.joint_names[:-1]]
+    chain_carriers = [None, *robot.joint_names[:-1]]
     return [
         {
             **_without_defaults({**json_fields(joint), "parent": None}, "parent", "mount"),
-            **({} if carriers == in_row else {"parent": carriers[index]}),
+            **({} if carriers == chain_carriers else {"parent": carriers[index]}),
             "static_load": {"torque": float(value), "at": configuration.tolist()},
             "stiffness_range": stiffness_ranges(joint, float(value), float(configuration[index])),
-            "attainable_stiffness": _attainable(joint, float(value), float(configuration[index])),
+            "attainable_stiffness": _describe_attainable(joint, float(value), float(configuration[index])),
         }
         for index, (joint, value, configuration) in enumerate(
-            zip(robot.joints, load_sizes(loads), loads.configurations, strict=True)
+            zip(robot.joints, static_loads(loads), loads.configurations, strict=True)
         )
     ]
 
@@ -208,10 +210,10 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
     with np.errstate(all="ignore"):  # a load may be infinite or NaN
         if "stiffness" not in joint.actuator.commanded:
             at_rest = Command.at_rest(tau_e, np.full(3, q))
-            held = joint.actuator.transmit(at_rest, MIN_MARGIN, None).stiffness
+            stiffness = joint.actuator.transmit(at_rest, MIN_MARGIN, None).stiffness
             return {
-                "unloaded": [float(held[0])] * 2,
-                "loaded": [float(held[1:].min()), float(held[1:].max())],
+                "unloaded": [float(stiffness[0])] * 2,
+                "loaded": [float(stiffness[1:].min()), float(stiffness[1:].max())],
             }
         solution = joint.actuator.solve(tau_e, np.ones(3), np.full(3, q))
     return {
@@ -220,12 +222,15 @@ def stiffness_ranges(joint: Joint, load: float, q: float) -> dict[str, list[floa
     }
 
 
-def _attainable(joint: Joint, load: float, q: float) -> dict[str, dict[str, Any]]:
+def _describe_attainable(joint: Joint, load: float, q: float) -> dict[str, dict[str, Any]]:
     """Return the stiffness attainable within all limits; empty if it is not commanded."""
     if "stiffness" not in joint.actuator.commanded:
         return {}
     attainable = attainable_stiffnesses(joint, load, q)
-    return {name: {"range": [*ends.range], "bounds": [*ends.bounds]} for name, ends in attainable.items()}
+    return {
+        name: {"range": [*attainable_range.range], "bounds": [*attainable_range.bounds]}
+        for name, attainable_range in attainable.items()
+    }
 
 
 def gravity_torques(robot: Robot, q: FloatArray) -> FloatArray:
@@ -241,8 +246,8 @@ def gravity_torques(robot: Robot, q: FloatArray) -> FloatArray:
         mass[index] += joint.link.mass
         moment[index] += joint.link.mass * links[index].point(joint.link.com)
         axis, origin = seats[index].axes[..., 2], seats[index].origin
-        about = np.cross(axis, moment[index] - mass[index] * origin)
-        torques[:, index] = -(about if joint.is_revolute else mass[index] * axis) @ gravity
+        moment_arm = np.cross(axis, moment[index] - mass[index] * origin)
+        torques[:, index] = -(moment_arm if joint.is_revolute else mass[index] * axis) @ gravity
         if (parent := robot.parents[index]) >= 0:
             mass[parent] += mass[index]
             moment[parent] += moment[index]
@@ -256,8 +261,8 @@ def reach(robot: Robot) -> Extremes:
         positions = [tool.origin for tool in frames(robot, q).tools]
         return np.stack([np.sum(position * position, axis=1) for position in positions], axis=1)
 
-    found = largest_sizes(squared, len(robot.end_effectors), robot)
-    return found._replace(values=np.sqrt(found.values))
+    farthest = largest_magnitudes(squared, len(robot.end_effectors), robot)
+    return farthest._replace(values=np.sqrt(farthest.values))
 
 
 def reach_bounds(robot: Robot) -> list[float]:
@@ -267,26 +272,26 @@ def reach_bounds(robot: Robot) -> list[float]:
     the farther end of their range.
     """
     return [
-        sum(_length(robot.joints[index]) for index in robot.paths[carrier]) + math.hypot(*tool.xyz)
+        sum(_farthest_length(robot.joints[index]) for index in robot.paths[carrier]) + math.hypot(*tool.xyz)
         for tool, carrier in zip(robot.end_effectors, robot.tool_joints, strict=True)
     ]
 
 
-def _length(joint: Joint) -> float:
-    ends = (0.0,) if joint.is_revolute else free_range(joint)
+def _farthest_length(joint: Joint) -> float:
+    positions = (0.0,) if joint.is_revolute else free_range(joint)
     mount = 0.0 if joint.mount is None else math.hypot(*joint.mount.xyz)
-    return mount + math.hypot(joint.dh.a, max(abs(joint.dh.d + end) for end in ends))
+    return mount + math.hypot(joint.dh.a, max(abs(joint.dh.d + end) for end in positions))
 
 
 def static_load(robot: Robot) -> Extremes:
     """Return the largest |torque| of each joint found for gravity alone, N m (N)."""
-    return largest_sizes(lambda q: gravity_torques(robot, q), len(robot.joints), robot)
+    return largest_magnitudes(lambda q: gravity_torques(robot, q), len(robot.joints), robot)
 
 
-def load_sizes(loads: Extremes) -> FloatArray:
+def static_loads(loads: Extremes) -> FloatArray:
     """Return the static loads of all joints, (joints,), N m (N), with zero in place of rounding errors."""
-    least = LOAD_ROUNDING * np.max(loads.values, initial=0.0)
-    return np.where(loads.values <= least, 0.0, loads.values)
+    rounding = LOAD_ROUNDING * np.max(loads.values, initial=0.0)
+    return np.where(loads.values <= rounding, 0.0, loads.values)
 
 
 def held_at_zero(robot: Robot) -> list[str]:

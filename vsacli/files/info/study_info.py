@@ -19,24 +19,26 @@ def describe_study(path: str) -> dict[str, Any]:
     """
     with StoredStudy(path) as table:
         provenance = table.provenance()
-        inputs = [{"path": each.path, "sha256": each.sha256} for each in table.inputs()]
+        inputs = [
+            {"path": stored_input.path, "sha256": stored_input.sha256} for stored_input in table.inputs()
+        ]
         return {
             "kind": "table of a study",
             **StudySummary.of(table).as_json(),
-            "parameters": [_parameter(table, path) for path in table.parameters],
+            "parameters": [_describe_parameter(table, path) for path in table.parameters],
             "columns": list(table.columns),
             "provenance": {"created": str(table.attributes["created"]), **provenance, "inputs": inputs},
         }
 
 
-def _parameter(table: StoredStudy, path: str) -> dict[str, Any]:
+def _describe_parameter(table: StoredStudy, path: str) -> dict[str, Any]:
     """Describe the values of a parameter: all texts, or range and count of distinct numbers."""
     if table.parameter_is_text(path):
         return {"path": path, "values": sorted(set(table.texts(path)))}
     values = table.read(path)
     low, high = (float(values.min()), float(values.max())) if len(values) else (None, None)
-    different = len(np.unique(values))
-    return {"path": path, "units": table.unit(path), "min": low, "max": high, "different": different}
+    distinct_count = len(np.unique(values))
+    return {"path": path, "units": table.unit(path), "min": low, "max": high, "different": distinct_count}
 
 
 def study_lines(table: Mapping[str, Any]) -> Iterator[str]:

@@ -26,7 +26,7 @@ from vsacli.trajectory.trajectory import Trajectory
 
 BLOCK_SAMPLES = 8192
 
-MOTION = ("dq", "ddq", "d3q", "d4q")
+DERIVATIVES = ("dq", "ddq", "d3q", "d4q")
 
 
 def describe_table(
@@ -41,18 +41,18 @@ def describe_table(
     if rate is not None:
         raise InputError.one("has times in column 'time'; leave --rate out", path)
     try:
-        described = describe_trajectory_file(path, robot_path)
+        description = describe_trajectory_file(path, robot_path)
     except InputError:  # the recording's faults are described
         return describe_recording(path, robot, progress, rate)
     file = for_yaml(Path(path).name)
-    signals = ["position", *(key for key in COMMANDED if key in described["joints"][0])]
+    signals = ["position", *(key for key in COMMANDED if key in description["joints"][0])]
     sources = [f"{key}: {{type: csv, file: {file}}}" for key in signals]
     if tools := placeholder_robot(path).robot.tools:
         sources.append("# wrenches:  # the file has these columns, not the frames: base or end_effector")
         sources += [f"#   {tool.name}: {{type: csv, frame: ..., file: {file}}}" for tool in tools]
-    described["trajectory"] = "\n".join([f"format: {file_formats.TRAJECTORY}", "name: recorded", *sources])
-    described["mapping"] = f"format: {file_formats.COLUMNS}\ncolumns: {{time: time}}"
-    return described
+    description["trajectory"] = "\n".join([f"format: {file_formats.TRAJECTORY}", "name: recorded", *sources])
+    description["mapping"] = f"format: {file_formats.COLUMNS}\ncolumns: {{time: time}}"
+    return description
 
 
 def describe_trajectory_file(path: str, robot_path: str | None) -> dict[str, Any]:
@@ -62,8 +62,8 @@ def describe_trajectory_file(path: str, robot_path: str | None) -> dict[str, Any
     else:
         robot, ordered = placeholder_robot(path)
         if not ordered:
-            unknown = "does not say which joints there are, or which is which in its lists"
-            raise InputError.one(f"{unknown}; name the robot with --robot ROBOT", path)
+            reason = "does not say which joints there are, or which is which in its lists"
+            raise InputError.one(f"{reason}; name the robot with --robot ROBOT", path)
     return describe_trajectory(load_trajectory(path, robot), robot.joint_names)
 
 
@@ -91,12 +91,16 @@ def describe_trajectory(trajectory: Trajectory, joint_names: Sequence[str]) -> d
         "notes": list(trajectory.notes),
     }
     if trajectory.wrench is not None:
-        described = {
+        wrench_descriptions = {
             signal: _describe_wrench(trajectory.wrench, signal, ranges)
             for signal in trajectory.wrench.profiles
         }
-        by_tool = {signal.tool: each for signal, each in described.items() if signal.tool}
-        description |= {WRENCHES: by_tool} if by_tool else {WRENCH.key: described[WRENCH]}
+        wrench_by_tool = {
+            signal.tool: wrench for signal, wrench in wrench_descriptions.items() if signal.tool
+        }
+        description |= (
+            {WRENCHES: wrench_by_tool} if wrench_by_tool else {WRENCH.key: wrench_descriptions[WRENCH]}
+        )
     return description
 
 
@@ -138,12 +142,12 @@ def trajectory_lines(trajectory: Mapping[str, Any]) -> Iterator[str]:
         f"{short(trajectory['start'])} s"
     )
     commanded = [key for key in COMMANDED if key in trajectory["joints"][0]]
-    rows = [("joint", "q", *(f"peak {name}" for name in MOTION), *commanded)]
+    rows = [("joint", "q", *(f"peak {name}" for name in DERIVATIVES), *commanded)]
     rows += [
         (
             joint["name"],
             range_text(joint["q"]),
-            *(short(joint[name]["peak"]) for name in MOTION),
+            *(short(joint[name]["peak"]) for name in DERIVATIVES),
             *(range_text(joint[key]) for key in commanded),
         )
         for joint in trajectory["joints"]
@@ -152,13 +156,13 @@ def trajectory_lines(trajectory: Mapping[str, Any]) -> Iterator[str]:
     units = (f"; {key} {COMMANDED[key].quantities[0]}" for key in commanded)
     yield f"units: q {POSITION}, its k-th derivative per s^k{''.join(units)}"
     if WRENCH.key in trajectory:
-        yield _wrench("wrench", trajectory[WRENCH.key])
+        yield _wrench_line("wrench", trajectory[WRENCH.key])
     for tool, wrench in trajectory.get(WRENCHES, {}).items():
-        yield _wrench(f"wrench on {tool}", wrench)
+        yield _wrench_line(f"wrench on {tool}", wrench)
     yield from warnings_and_notes(trajectory["warnings"], trajectory["notes"])
 
 
-def _wrench(title: str, wrench: Mapping[str, Any]) -> str:
+def _wrench_line(title: str, wrench: Mapping[str, Any]) -> str:
     axes = [axis for axis in wrench if axis != "frame"]
     ranges = ", ".join(f"{axis} {range_text(wrench[axis]['wrench'])}" for axis in axes)
     return f"{title} along the axes of {wrench['frame']}, N and N m: {ranges}"

@@ -139,9 +139,11 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
         joint_names: joints of the robot that was recorded; empty if unknown.
     """
     columns, labels = (
-        (_named_columns(rows, time), _labels(rows)) if rows.header.line else _joint_states(rows, time)
+        (_columns_by_name(rows, time), _labels_in_rows(rows))
+        if rows.header.line
+        else _joint_states(rows, time)
     )
-    found: dict[str, Guess] = {}
+    guesses_by_name: dict[str, Guess] = {}
     names = JointNames(joint_names)
     if joint_names:
         columns = _sided([_of_motor(column, names) for column in columns], names)
@@ -149,11 +151,11 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
     columns = [column for column in columns if column.role == best[column.signal]]
     assign = partial(_of_robot, joints=names) if joint_names else _named
     for quantity in dict.fromkeys((*QUANTITIES, *VARIABLES_OF_MOTORS)):
-        of_it = [column for column in columns if column.quantity == quantity != "theta"]
-        measured = [column for column in of_it if column.role != COMMANDED]
+        quantity_columns = [column for column in columns if column.quantity == quantity != "theta"]
+        measured = [column for column in quantity_columns if column.role != COMMANDED]
         # commands only if, by name or order, none of the joints has a measurement
-        for column, joint in list(assign(measured, labels)) or assign(of_it, labels):
-            source, doubt = _source(rows, column)
+        for column, joint in list(assign(measured, labels)) or assign(quantity_columns, labels):
+            source, doubt = _column_source(rows, column)
             command = COMMAND if column.role == COMMANDED else ""
             sides = "sides taken for motors 1 and 2" * column.sided
             reasons = "; ".join(filter(None, (joint.reason, sides, command, doubt)))
@@ -163,44 +165,55 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
     return sorted(found.values(), key=lambda guess: (guess.quantity not in TAKEN, guess.place))
 
 
-def _named_columns(rows: FirstRows, time: TimeColumn | None) -> list[_QuantityColumn]:
+def _columns_by_name(rows: FirstRows, time: TimeColumn | None) -> list[_QuantityColumn]:
     """Return columns of joints by their names: with a quantity first, then in the order of the roles."""
-    places = [place for place in rows.of_numbers if time is None or place != time.place]
-    columns = [column for place in places if not rows.is_index(place) for column in _of_name(rows, place)]
+    column_indices = [
+        column_index for column_index in rows.of_numbers if time is None or column_index != time.place
+    ]
+    columns = [
+        column
+        for column_index in column_indices
+        if not rows.is_index(column_index)
+        for column in _meanings_by_name(rows, column_index)
+    ]
     columns.sort(key=lambda column: (column.of_motors, column.bare, list(ROLES).index(column.role)))
     return [column for column in columns if column.role != ERROR]
 
 
-def _of_name(rows: FirstRows, place: int) -> Iterator[_QuantityColumn]:
+def _meanings_by_name(rows: FirstRows, column_index: int) -> Iterator[_QuantityColumn]:
     """Yield the meaning of a column by its name; a name without a word for a quantity may mean a position."""
-    heading = split_heading(rows.columns[place])[0]
+    heading = split_heading(rows.columns[column_index])[0]
     role, name = role_of(heading)
-    if _STIFFNESS.fullmatch(name.strip("_ ")) and min(rows.numbers(place)) > 0:
-        yield _QuantityColumn(place, "stiffness", words=words_of_column_name(name)[1:], role=role)
+    if _STIFFNESS.fullmatch(name.strip("_ ")) and min(rows.numbers(column_index)) > 0:
+        yield _QuantityColumn(column_index, "stiffness", words=words_of_column_name(name)[1:], role=role)
         return
     for match in reversed(list(WORDS.finditer(name))):
-        quantity = next((key for key, known in QUANTITIES.items() if match[0].lower() in known), None)
+        quantity = next(
+            (key for key, known_words in QUANTITIES.items() if match[0].lower() in known_words), None
+        )
         if quantity is not None:
             entry = _INDEX.match(name, match.end())
-            before, words = (
+            before_quantity, words = (
                 name[: match.start()],
                 (*words_of_column_name(name[: match.start()]), *words_of_column_name(name[match.end() :])),
             )
-            yield _QuantityColumn(place, quantity, before, words, int(entry[1]) if entry else None, role=role)
+            yield _QuantityColumn(
+                column_index, quantity, before_quantity, words, int(entry[1]) if entry else None, role=role
+            )
             return
     if heading:
-        yield _QuantityColumn(place, "q", heading, words_of_column_name(heading), bare=True, role=role)
+        yield _QuantityColumn(column_index, "q", heading, words_of_column_name(heading), bare=True, role=role)
 
 
-def _of_motor(column: _QuantityColumn, joints: JointNames) -> _QuantityColumn:
+def _as_motor_column(column: _QuantityColumn, joints: JointNames) -> _QuantityColumn:
     """Return a column as that of a motor if its name says of which motor it is, otherwise unchanged."""
     variable = OF_MOTORS.get(column.quantity)
     if variable is None or (column.quantity == "q" and not column.of_motors):
         return column
-    found = motor_of(column.words, joints)
-    if found is None:
+    match = motor_of(column.words, joints)
+    if match is None:
         return column
-    motor, words = found
+    motor, words = match
     return _QuantityColumn(
         column.place, f"{variable}_{motor}", column.before, words, of_motor=True, role=column.role
     )
@@ -236,57 +249,62 @@ def _sided(columns: Sequence[_QuantityColumn], joints: JointNames) -> list[_Quan
 
 def _labels(rows: FirstRows) -> dict[int, str]:
     """Return joint names found in the rows, as ROS writes them, by their indices in arrays."""
-    words = [words_of_column_name(column) or ("",) for column in rows.columns]
+    words_by_column = [words_of_column_name(column) or ("",) for column in rows.columns]
     return {
-        int(last): rows.text(place)
-        for place, (*before, last) in enumerate(words)
-        if before[-1:] == ["name"] and last.isdecimal() and rows.text(place)
+        int(last_word): rows.text(column_index)
+        for column_index, (*prefix, last_word) in enumerate(words_by_column)
+        if prefix[-1:] == ["name"] and last_word.isdecimal() and rows.text(column_index)
     }
 
 
 def _joint_states(rows: FirstRows, time: TimeColumn | None) -> tuple[list[_QuantityColumn], dict[int, str]]:
     """Return the columns of a `sensor_msgs/JointState` without header: stamp, frame, names, three arrays."""
-    first = None if time is None or time.nanoseconds is None else time.nanoseconds + 2
-    texts = [place for place in range(first or 0, len(rows.columns)) if rows.text(place)]
-    count = next((number for number, place in enumerate(texts) if place != texts[0] + number), len(texts))
-    if first is None or texts[:1] != [first]:
-        return [], {}
-    numbers = range(first + count, min(first + 4 * count, len(rows.columns)))
-    columns = [
-        _QuantityColumn(place, ARRAYS[at // count], entry=at % count)
-        for at, place in enumerate(numbers)
-        if rows.numbers(place)
+    first_name = None if time is None or time.nanoseconds is None else time.nanoseconds + 2
+    text_columns = [
+        column_index for column_index in range(first_name or 0, len(rows.columns)) if rows.text(column_index)
     ]
-    return columns, {number: rows.text(first + number) for number in range(count)}
+    count = next(
+        (rank for rank, column_index in enumerate(text_columns) if column_index != text_columns[0] + rank),
+        len(text_columns),
+    )
+    if first_name is None or text_columns[:1] != [first_name]:
+        return [], {}
+    numeric_columns = range(first_name + count, min(first_name + 4 * count, len(rows.columns)))
+    columns = [
+        _QuantityColumn(column_index, ARRAYS[entry // count], entry=entry % count)
+        for entry, column_index in enumerate(numeric_columns)
+        if rows.numbers(column_index)
+    ]
+    return columns, {rank: rows.text(first_name + rank) for rank in range(count)}
 
 
-def _of_robot(
+def _assign_robot_joints(
     columns: Sequence[_QuantityColumn], labels: Mapping[int, str], joints: JointNames
 ) -> list[tuple[_QuantityColumn, _GuessedJoint]]:
     """Return columns with the joints that their names indicate; if none does, one family in joint order."""
     families = defaultdict(list)
     for column in columns:
         families[column.family].append(column)
-    complete = (
+    complete_families = (
         family
         for family in families.values()
         if len(family) == len(joints.names) and not any(map(_is_no_joint, family))
     )
-    return [pair for family in families.values() for pair in _matched(family, labels, joints)] or [
+    return [pair for family in families.values() for pair in _match_family(family, labels, joints)] or [
         (column, _GuessedJoint(name, f"joint {rank} of the robot, by the order alone", sure=False))
-        for family in islice(complete, 1)
+        for family in islice(complete_families, 1)
         for rank, (column, name) in enumerate(zip(family, joints.names, strict=True), 1)
     ]
 
 
-def _matched(
+def _match_family(
     family: Sequence[_QuantityColumn], labels: Mapping[int, str], joints: JointNames
 ) -> list[tuple[_QuantityColumn, _GuessedJoint]]:
     """Return the columns of a family that match joints, by their names or by names in their rows.
 
     If columns count from zero and joints from one, or vice versa, numbers are not used.
     """
-    found, unmatched = [], []
+    matched, unmatched = [], []
     for column in family:
         label = None if column.entry is None else labels.get(column.entry)
         if label is not None:
@@ -296,30 +314,30 @@ def _matched(
         else:
             name, reason = joints.in_words(column.words), ""
         if name:
-            found.append((column, _GuessedJoint(name, reason, label in (None, name))))
+            matched.append((column, _GuessedJoint(name, reason, label in (None, name))))
         elif label is None:
             unmatched.append(column)
-    numbered = [column for column in unmatched if any(word.isdecimal() for word in column.words)]
-    shifted = len(family) == len(joints.names) or any("0" in column.words for column in numbered)
-    return [] if numbered and shifted else found
+    numbered_columns = [column for column in unmatched if any(word.isdecimal() for word in column.words)]
+    is_shifted = len(family) == len(joints.names) or any("0" in column.words for column in numbered_columns)
+    return [] if numbered_columns and is_shifted else matched
 
 
-def _named(
+def _assign_named_joints(
     columns: Sequence[_QuantityColumn], labels: Mapping[int, str]
 ) -> Iterator[tuple[_QuantityColumn, _GuessedJoint]]:
     """Yield columns with joints named by their own names, or by names in their rows."""
     rank = 0
     for column in columns:
         label = None if column.entry is None else labels.get(column.entry)
-        last = _SEPARATORS.split(column.before.rstrip("_-./ "))[-1]
+        last_part = _SEPARATORS.split(column.before.rstrip("_-./ "))[-1]
         if label is None and _is_no_joint(column):
             continue
         rank += 1
         if label is not None:
             if IDENTIFIER.fullmatch(label):
                 yield column, _GuessedJoint(label, f"the rows call it {label}")
-        elif column.entry is None and IDENTIFIER.fullmatch(last) and last.lower() not in GENERIC:
-            yield column, _GuessedJoint(last)
+        elif column.entry is None and IDENTIFIER.fullmatch(last_part) and last_part.lower() not in GENERIC:
+            yield column, _GuessedJoint(last_part)
         else:
             yield column, _GuessedJoint(f"joint_{rank}", "by the order alone", sure=False)
 
@@ -337,19 +355,23 @@ def names_torque(heading: str) -> bool:
 
 def _is_no_joint(column: _QuantityColumn) -> bool:
     """Return whether a name indicates a pose, such as `tcp_pos_x`, or no quantity."""
-    telling = [word for word in column.words if word not in GENERIC]
-    return column.bare or any(word in AXES for word in telling) or bool(telling and set(telling) <= {*POSES})
+    specific_words = [word for word in column.words if word not in GENERIC]
+    return (
+        column.bare
+        or any(word in AXES for word in specific_words)
+        or bool(specific_words and set(specific_words) <= {*POSES})
+    )
 
 
-def _source(rows: FirstRows, column: _QuantityColumn) -> tuple[MappedColumn, str]:
+def _column_source(rows: FirstRows, column: _QuantityColumn) -> tuple[MappedColumn, str]:
     """Return the mapping of a column, and a remark if its unit is uncertain."""
     heading = rows.columns[column.place]
-    own = rows.unit(column.place)
-    source = MappedColumn(column=rows.called(column.place), unit=own)
-    spoken = source.undeclared_unit(heading)
-    if spoken is not None:
-        return MappedColumn(column=source.column, unit=spoken), f"its name speaks of {spoken}"
+    declared_unit = rows.unit(column.place)
+    source = MappedColumn(column=rows.called(column.place), unit=declared_unit)
+    unit_in_name = source.undeclared_unit(heading)
+    if unit_in_name is not None:
+        return MappedColumn(column=source.column, unit=unit_in_name), f"its name speaks of {unit_in_name}"
     largest = max(map(abs, rows.numbers(column.place)), default=math.nan)
-    if own is None and column.quantity == "q" and largest > LARGEST_ANGLE:
+    if declared_unit is None and column.quantity == "q" and largest > LARGEST_ANGLE:
         return source, f"goes to {largest:.4g}: if these are degrees, add unit: deg"
     return source, ""

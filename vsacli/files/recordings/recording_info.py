@@ -45,10 +45,10 @@ from vsacli.trajectory.recorded.problems import Disorder, find_disorder
 from vsacli.trajectory.recorded.recording import NEEDED, read_samples
 from vsacli.trajectory.recorded.samples import elapsed_times
 
-TOGETHER = 16
+COLUMNS_AT_ONCE = 16
 """Columns read at a time: a million rows of them take 128 MB, however many columns the table has."""
 
-AS_WRITTEN = "-"
+UNCONVERTED_UNIT = "-"
 """Placeholder unit of numbers that are shown as written."""
 
 JITTERS = "jitters"
@@ -57,7 +57,7 @@ JITTERS = "jitters"
 FEWEST_ROWS = 10
 """Minimum number of values of a column to be checked for faults."""
 
-_OWN_NAME = re.compile(rf"(.+\.)?({'|'.join([TIME, *VARIABLES])})({measured('')}|_shaft)?\d*(_[12])?")
+_COMMAND_COLUMN = re.compile(rf"(.+\.)?({'|'.join([TIME, *VARIABLES])})({measured('')}|_shaft)?\d*(_[12])?")
 """Names by which commands read a column although no mapping names it."""
 
 
@@ -106,24 +106,24 @@ def describe_recording(
             raise InputError.one(f"has times in column {name!r}; leave --rate out", rows.path)
         time = None
     disorder = clock.disorder if clock else None
-    derived = disorder.rate if disorder else None
-    likely = rate or (None if derived is None or math.isnan(derived) else derived)
-    found = guesses(rows, clock.column if clock else None, joint_names)
-    surveyed = _Survey(rows, time, found, progress, likely)
+    derived_rate = disorder.rate if disorder else None
+    likely_rate = rate or (None if derived_rate is None or math.isnan(derived_rate) else derived_rate)
+    column_guesses = guesses(rows, clock.column if clock else None, joint_names)
+    survey = _RecordingSurvey(rows, time, column_guesses, progress, likely_rate)
     if clock is not None and (rate is None or (disorder and not disorder.is_replaced_by(rate))):
-        surveyed.describe_clock(clock)
-    proposal = _Proposal(rows, time, found, likely, None if rate else disorder)
+        survey.describe_clock(clock)
+    proposal = _ProposedMapping(rows, time, column_guesses, likely_rate, None if rate else disorder)
     refusal = proposal.refusal(robot)
     return {
         "kind": "recording",
         "name": Path(path).name,
-        "rows": surveyed.rows,
-        "time": surveyed.time,
-        "columns": surveyed.columns,
-        "warnings": surveyed.warnings,
+        "rows": survey.rows,
+        "time": survey.time,
+        "columns": survey.columns,
+        "warnings": survey.warnings,
         "refusal": refusal,
         "mapping": "\n".join(proposal.columns_file(joint_names)),
-        "trajectory": "\n".join(proposal.trajectory(robot, refusal, surveyed.rate)),
+        "trajectory": "\n".join(proposal.trajectory(robot, refusal, survey.rate)),
     }
 
 
@@ -131,8 +131,10 @@ def _choose_clock(rows: FirstRows, joint_names: Sequence[str]) -> _Clock | None:
     """Return the first column of stamps that increase where the joints have numbers, or nearly do."""
     clocks: list[_Clock] = []
     for column in time_columns(rows):
-        places = [guess.place for guess in guesses(rows, column, joint_names) if guess.quantity in TAKEN]
-        table = _read_columns(rows, places, column).without_empty_rows().with_joined_rows()
+        column_indices = [
+            guess.place for guess in guesses(rows, column, joint_names) if guess.quantity in TAKEN
+        ]
+        table = _read_columns(rows, column_indices, column).without_empty_rows().with_joined_rows()
         stamps = _seconds(table)
         clocks.append(_Clock(column, table, stamps, find_disorder(stamps)))
         if clocks[-1].disorder is None:
@@ -144,7 +146,10 @@ def _read_columns(
     rows: FirstRows, places: Sequence[int], time: TimeColumn | None, rate: float | None = None
 ) -> CsvTable:
     """Return columns of all rows under their positions, as written, and the times."""
-    columns = {str(place): MappedColumn(column=place + 1, unit=AS_WRITTEN) for place in places}
+    columns = {
+        str(column_index): MappedColumn(column=column_index + 1, unit=UNCONVERTED_UNIT)
+        for column_index in places
+    }
     if time is not None:
         columns[TIME] = time.source
     mapping = ColumnMapping(columns, REST, rate, rows.skip_rows)
@@ -152,12 +157,14 @@ def _read_columns(
 
 
 def _seconds(table: CsvTable) -> FloatArray:
-    at = next(i for i, name in enumerate(table.columns) if split_heading(name)[0] == TIME)
-    unit = split_heading(table.columns[at])[1] or "s"
-    return np.asarray(table.values[:, at] * conversion_factor(unit, "s"))
+    time_index = next(
+        column_index for column_index, name in enumerate(table.columns) if split_heading(name)[0] == TIME
+    )
+    unit = split_heading(table.columns[time_index])[1] or "s"
+    return np.asarray(table.values[:, time_index] * conversion_factor(unit, "s"))
 
 
-class _Proposal:
+class _ProposedMapping:
     """A mapping of the columns of a recording, as text and as the reader takes it.
 
     Args:
@@ -173,26 +180,30 @@ class _Proposal:
         self,
         rows: FirstRows,
         time: TimeColumn | None,
-        found: Sequence[Guess],
+        column_guesses: Sequence[Guess],
         rate: float | None,
         disorder: Disorder | None,
     ) -> None:
-        self._rows, self._time, self._found = rows, time, found
+        self._rows, self._time, self._column_guesses = rows, time, column_guesses
         self._rate, self._disorder = rate, disorder
 
-    def _left_out(self, taken: Sequence[Guess]) -> str | tuple[str | int, ...]:
+    def _ignored_columns(self, included: Sequence[Guess]) -> str | tuple[str | int, ...]:
         """Return the columns to ignore: all others, one by one if commands know some by their names."""
         stamps = (self._time.place, self._time.nanoseconds) if self._time else ()
-        used = {*stamps, *(guess.place for guess in taken if is_proposed(guess))}
-        unused = [place for place in range(len(self._rows.columns)) if place not in used]
-        names = [split_heading(self._rows.columns[place])[0] for place in unused]
-        if not any(map(_OWN_NAME.fullmatch, names)):
-            return REST if unused else ()
-        return tuple(self._rows.called(place) for place in unused)
+        used_columns = {*stamps, *(guess.place for guess in included if is_proposed(guess))}
+        unused_columns = [
+            column_index
+            for column_index in range(len(self._rows.columns))
+            if column_index not in used_columns
+        ]
+        names = [split_heading(self._rows.columns[column_index])[0] for column_index in unused_columns]
+        if not any(map(_COMMAND_COLUMN.fullmatch, names)):
+            return REST if unused_columns else ()
+        return tuple(self._rows.called(column_index) for column_index in unused_columns)
 
-    def _lines(self, taken: Sequence[Guess], joint_names: Sequence[str]) -> Iterator[str]:
+    def _mapping_lines(self, taken: Sequence[Guess], joint_names: Sequence[str]) -> Iterator[str]:
         yield from mapping_lines(
-            self._time, taken, joint_names, self._left_out(taken), self._rate, self._rows.skip_rows
+            self._time, taken, joint_names, self._ignored_columns(taken), self._rate, self._rows.skip_rows
         )
 
     def columns_file(self, joint_names: Sequence[str]) -> Iterator[str]:
@@ -206,7 +217,7 @@ class _Proposal:
             f"# {self._rows.called(place)}: not recognized" for place in torques if place not in places
         )
 
-    def _rates(self) -> Iterator[str]:
+    def _rate_lines(self) -> Iterator[str]:
         if self._rate is not None:
             yield f"rate: {self._rate:g}" + (
                 "  # guessed from the stamps, which do not increase" * bool(self._disorder)
@@ -218,7 +229,7 @@ class _Proposal:
         yield from [f"# not complete: {refusal}"] if refusal else []
         yield f"format: {file_formats.TRAJECTORY}"
         yield "name: recorded"
-        yield from self._rates()
+        yield from self._rate_lines()
         if self._rate is None and self._time is None and not self._disorder:
             yield "# rate: ...  # rows per second: no column holds times"
         elif jittering is not None:
@@ -226,8 +237,8 @@ class _Proposal:
         yield "position:"
         yield "  type: csv"
         yield f"  file: {file}"
-        yield from (f"  {line}" for line in self._lines(self._of_trajectory, joint_names))
-        if any(guess.quantity == STIFFNESS.key for guess in self._of_trajectory):
+        yield from (f"  {line}" for line in self._mapping_lines(self._trajectory_guesses, joint_names))
+        if any(guess.quantity == STIFFNESS.key for guess in self._trajectory_guesses):
             yield f"stiffness: {{type: csv, file: {file}}}"
             return
         stiffnesses = {}
@@ -242,8 +253,8 @@ class _Proposal:
             yield "# stiffness: {type: constant, value: ...}  # N m/rad, of joints of variable stiffness"
 
     @property
-    def _of_trajectory(self) -> list[Guess]:
-        return [guess for guess in self._found if not guess.of_motor]
+    def _trajectory_guesses(self) -> list[Guess]:
+        return [guess for guess in self._column_guesses if not guess.of_motor]
 
     def refusal(self, robot: Robot | None) -> str:
         """Return why a run with this robot would refuse the trajectory, a clause; empty if it would not."""
@@ -253,18 +264,18 @@ class _Proposal:
             return "no column holds times; give the rate of the rows with --rate HZ"
         if robot is None:
             return ""
-        taken = [guess for guess in self._of_trajectory if guess.quantity in TAKEN]
-        names = {guess.name for guess in taken}
+        included = [guess for guess in self._trajectory_guesses if guess.quantity in TAKEN]
+        names = {guess.name for guess in included}
         missing = [joint for joint in robot.joint_names if f"{joint}.{POSITION.names[0]}" not in names]
         if missing:
             return f"no column is recognized as the position of {joined(missing)}; write it below"
-        columns = {guess.name: guess.source for guess in taken}
+        columns = {guess.name: guess.source for guess in included}
         if self._time is not None:
             columns[TIME] = self._time.source
-        mapping = ColumnMapping(columns, self._left_out(taken), self._rate, self._rows.skip_rows)
+        mapping = ColumnMapping(columns, self._ignored_columns(included), self._rate, self._rows.skip_rows)
         signals = [
             POSITION,
-            *([STIFFNESS] if any(guess.quantity == STIFFNESS.key for guess in taken) else []),
+            *([STIFFNESS] if any(guess.quantity == STIFFNESS.key for guess in included) else []),
         ]
         try:
             read_samples(self._rows.path, CommandedJoints.of(robot), signals, mapping)
@@ -274,7 +285,7 @@ class _Proposal:
         return ""
 
 
-class _Survey:
+class _RecordingSurvey:
     """Findings on all rows, read a few columns at a time.
 
     Attributes:
@@ -289,61 +300,65 @@ class _Survey:
         self,
         rows: FirstRows,
         time: TimeColumn | None,
-        found: Sequence[Guess],
+        column_guesses: Sequence[Guess],
         progress: Progress,
         rate: float | None,
     ) -> None:
         self._rows, self._time = rows, time
-        self._guesses = {guess.place: guess for guess in found}
+        self._guesses = {guess.place: guess for guess in column_guesses}
         self.rows = 0
         self.time: dict[str, Any] | None = None
         self._file = Path(rows.path).name
-        self.warnings = [f"{self._file}: {clause}" for clause in (*unread_times(rows), *_lists(rows))]
+        self.warnings = [f"{self._file}: {clause}" for clause in (*unread_times(rows), *_list_columns(rows))]
         self.rate: float | None = None
         stamps = () if time is None else (time.place, time.nanoseconds)
-        numbers = [place for place in rows.of_numbers if place not in stamps]
-        numbers.sort(key=lambda place: place not in self._guesses)
-        self.columns = [self._unread(place) for place in range(len(rows.columns))]
+        numeric_columns = [column_index for column_index in rows.of_numbers if column_index not in stamps]
+        numeric_columns.sort(key=lambda place: place not in self._guesses)
+        self.columns = [self._unread_description(column_index) for column_index in range(len(rows.columns))]
         size = os.path.getsize(rows.path) if rows.path != "-" else 0
         with progress(size) as bar:
-            for first in range(0, max(1, len(numbers)), TOGETHER):
-                part = numbers[first : first + TOGETHER]
-                self._look(part, _read_columns(rows, part, time, rate))
-                bar.update(size * len(part) // max(1, len(numbers)))
+            for start in range(0, max(1, len(numeric_columns)), COLUMNS_AT_ONCE):
+                chunk = numeric_columns[start : start + COLUMNS_AT_ONCE]
+                self._survey_columns(chunk, _read_columns(rows, chunk, time, rate))
+                bar.update(size * len(chunk) // max(1, len(numeric_columns)))
 
-    def _unread(self, place: int) -> dict[str, Any]:
-        filled = self._rows.filled(place)
-        kind = "index" if self._rows.is_index(place) else "text" if filled else "nothing"
-        if kind == "text" and self._rows.list_length(place):
+    def _unread_description(self, column_index: int) -> dict[str, Any]:
+        cells = self._rows.filled(column_index)
+        kind = "index" if self._rows.is_index(column_index) else "text" if cells else "nothing"
+        if kind == "text" and self._rows.list_length(column_index):
             kind = "list"
-        if self._time is not None and place in (self._time.place, self._time.nanoseconds):
+        if self._time is not None and column_index in (self._time.place, self._time.nanoseconds):
             kind = "time"
         return {
-            "number": place + 1,
-            "name": self._rows.columns[place],
+            "number": column_index + 1,
+            "name": self._rows.columns[column_index],
             "holds": kind,
-            "first": filled[0] if filled else None,
+            "first": cells[0] if cells else None,
             "min": math.nan,
             "max": math.nan,
             "rows": None,
         }
 
-    def _look(self, places: Sequence[int], table: CsvTable) -> None:
+    def _survey_columns(self, column_indices: Sequence[int], table: CsvTable) -> None:
         self.rows = len(table.values)
         headings = [split_heading(heading)[0] for heading in table.columns]
         stamps = _seconds(table) if TIME in headings else None
-        for place in places:
-            values = table.values[:, headings.index(str(place))]
-            there = np.isfinite(values)
-            described = self.columns[place]
-            described |= {
-                "holds": described["holds"] if described["holds"] == "index" else "numbers",
-                "min": float(values[there].min(initial=math.inf)) if there.any() else math.nan,
-                "max": float(values[there].max(initial=-math.inf)) if there.any() else math.nan,
-                "rows": int(np.count_nonzero(there)),
+        for column_index in column_indices:
+            values = table.values[:, headings.index(str(column_index))]
+            finite = np.isfinite(values)
+            description = self.columns[column_index]
+            description |= {
+                "holds": description["holds"] if description["holds"] == "index" else "numbers",
+                "min": float(values[finite].min(initial=math.inf)) if finite.any() else math.nan,
+                "max": float(values[finite].max(initial=-math.inf)) if finite.any() else math.nan,
+                "rows": int(np.count_nonzero(finite)),
             }
-            if stamps is not None and np.count_nonzero(there) >= FEWEST_ROWS and not _counts(values[there]):
-                self._judge(place, stamps[there], values[there], table, np.flatnonzero(there))
+            if (
+                stamps is not None
+                and np.count_nonzero(finite) >= FEWEST_ROWS
+                and not _is_counter(values[finite])
+            ):
+                self._add_faults(column_index, stamps[finite], values[finite], table, np.flatnonzero(finite))
 
     def describe_clock(self, clock: _Clock) -> None:
         """Describe the stamps, and put their faults before those of the signals."""
@@ -354,10 +369,10 @@ class _Survey:
         if disorder is not None:
             rate = math.nan if disorder.rate is None else disorder.rate
             duration = (len(stamps) - 1) / rate
-        column, first = clock.column, clock.table.first_stamp
+        column, first_stamp = clock.column, clock.table.first_stamp
         unit = (
             "clock"
-            if isinstance(first, str)
+            if isinstance(first_stamp, str)
             else "ns"
             if column.source.nanoseconds
             else column.source.unit or "s"
@@ -366,7 +381,7 @@ class _Survey:
             "column": self._rows.columns[column.place] or column.place + 1,
             "unit": unit,
             "unit_guessed": column.unit_guessed,
-            "first": float(stamps[0]) if first is None else first,
+            "first": float(stamps[0]) if first_stamp is None else first_stamp,
             "duration": duration,
             "rate": rate,
             "step": {
@@ -384,30 +399,34 @@ class _Survey:
             if any(fault.startswith(JITTERS) for fault in faults):
                 self.rate = mean_rate(stamps)
 
-    def _judge(
-        self, place: int, stamps: FloatArray, values: FloatArray, table: CsvTable, rows: IndexArray
+    def _add_faults(
+        self, column_index: int, stamps: FloatArray, values: FloatArray, table: CsvTable, rows: IndexArray
     ) -> None:
         """Add the faults of a column, unless it holds commands or errors, or its stamps do not increase."""
-        if role_of(self._rows.columns[place])[0] in (COMMANDED, ERROR) or not np.all(np.diff(stamps) > 0):
+        if role_of(self._rows.columns[column_index])[0] in (COMMANDED, ERROR) or not np.all(
+            np.diff(stamps) > 0
+        ):
             return
-        guess = self._guesses.get(place)
-        angle, taken = (guess is not None and guess.quantity in some for some in (("q",), TAKEN))
-        name = self._rows.columns[place] or f"column {place + 1}"
+        guess = self._guesses.get(column_index)
+        is_angle, is_included = (
+            guess is not None and guess.quantity in quantities for quantities in (("q",), TAKEN)
+        )
+        name = self._rows.columns[column_index] or f"column {column_index + 1}"
         time = elapsed_times(stamps)
-        for first, sentence in column_faults(stamps, time, values, angle=angle, left_out=taken):
-            line = table.line_of(int(rows[first]))
+        for first_row, sentence in column_faults(stamps, time, values, angle=is_angle, left_out=is_included):
+            line = table.line_of(int(rows[first_row]))
             self.warnings.append(f"{self._file}:{line}: {name} {sentence}")
 
 
-def _lists(rows: FirstRows) -> Iterator[str]:
+def _list_columns(rows: FirstRows) -> Iterator[str]:
     """Yield that columns hold several values in each cell."""
-    for place, name in enumerate(rows.columns):
-        if count := rows.list_length(place):
+    for column_index, name in enumerate(rows.columns):
+        if count := rows.list_length(column_index):
             advice = f"split it into {count} columns, one for each"
-            yield f"column {name or place + 1!r} holds lists of {count} values in its cells; {advice}"
+            yield f"column {name or column_index + 1!r} holds lists of {count} values in its cells; {advice}"
 
 
-def _counts(values: FloatArray) -> bool:
+def _is_counter(values: FloatArray) -> bool:
     """Return whether values are whole numbers that never decrease, as of a counter rather than a sensor."""
     return bool(np.all(values == np.round(values)) and np.all(np.diff(values) >= 0))
 

@@ -16,7 +16,7 @@ from vsacli.robot.model import Robot
 JOINT_SHARE, SUM_OF_JOINTS = 0.11, 0.9
 """Length of a drawn joint along its axis, relative to the size of the arm; of all joints together at most."""
 
-ROOM = 1.5
+VIEW_WIDTH = 1.5
 """Width of a view relative to the size of the arm."""
 
 FLAT_SHARE = 0.05
@@ -79,20 +79,20 @@ class ArmPoints(NamedTuple):
         """
         [origins], [seats], [elbows], [tools] = self.origins, self.seats, self.elbows, self.tools
         lines = [[np.zeros(3), origins[0]]]
-        open_ends = {0: lines[0]}
-        stretches = [
+        line_by_frame = {0: lines[0]}
+        segments = [
             (carrier, [*([] if np.array_equal(seat, origins[carrier]) else [seat]), elbow, origin])
             for carrier, seat, elbow, origin in zip(self.carriers, seats, elbows, origins[1:], strict=True)
         ]
-        stretches += [(carrier, [tool]) for carrier, tool in zip(self.tool_carriers, tools, strict=True)]
-        for number, (carrier, corners) in enumerate(stretches, 1):
-            line = open_ends.pop(carrier, None)
+        segments += [(carrier, [tool]) for carrier, tool in zip(self.tool_carriers, tools, strict=True)]
+        for frame, (carrier, corners) in enumerate(segments, 1):
+            line = line_by_frame.pop(carrier, None)
             if line is None:
                 line = [origins[carrier]]
                 lines.append(line)
             line += corners
-            if number < len(origins):
-                open_ends[number] = line
+            if frame < len(origins):
+                line_by_frame[frame] = line
         return [np.array(line) for line in lines]
 
 
@@ -169,16 +169,18 @@ def arm_chart(robot: Robot) -> ArmChart:
     corners = np.concatenate(lines)
     extents = np.ptp(corners, axis=0)
     size = max(float(extents.max()), SMALLEST_SIZE)
-    length = size * min(JOINT_SHARE, SUM_OF_JOINTS / len(robot.joints))
-    centers = _centers(points, length)
+    joint_length = size * min(JOINT_SHARE, SUM_OF_JOINTS / len(robot.joints))
+    centers = _joint_centers(points, joint_length)
     down = direction_of(np.array(robot.gravity))
-    drawn = np.concatenate((corners, centers))
-    middle = (drawn.max(axis=0) + drawn.min(axis=0)) / 2
-    title = f"{robot.name}: arm at {_configuration(robot, q)}"
+    drawn_points = np.concatenate((corners, centers))
+    middle = (drawn_points.max(axis=0) + drawn_points.min(axis=0)) / 2
+    title = f"{robot.name}: arm at {_configuration_text(robot, q)}"
     views = views_of(down, extents, size)
-    size = max(size, float(np.ptp(drawn, axis=0).max()))
-    tools = robot.tool_names if len(robot.tool_names) > 1 else ()
-    return ArmChart(title, robot.joints, q, tools, points, lines, centers, down, size, length, middle, views)
+    size = max(size, float(np.ptp(drawn_points, axis=0).max()))
+    tool_names = robot.tool_names if len(robot.tool_names) > 1 else ()
+    return ArmChart(
+        title, robot.joints, q, tool_names, points, lines, centers, down, size, joint_length, middle, views
+    )
 
 
 def direction_of(gravity: FloatArray) -> FloatArray:
@@ -187,30 +189,30 @@ def direction_of(gravity: FloatArray) -> FloatArray:
     return gravity / strength if strength else np.zeros(3)
 
 
-def _configuration(robot: Robot, q: FloatArray) -> str:
+def _configuration_text(robot: Robot, q: FloatArray) -> str:
     """Return the home configuration in words."""
-    moved = [joint.name for joint, position in zip(robot.joints, q, strict=True) if position != 0]
-    if not moved:
+    moved_joints = [joint.name for joint, position in zip(robot.joints, q, strict=True) if position != 0]
+    if not moved_joints:
         return "q = 0"
-    if len(moved) == len(q):
+    if len(moved_joints) == len(q):
         return "the middle of the position limits"
-    return f"q = 0, {', '.join(moved)} at the middle of the limits"
+    return f"q = 0, {', '.join(moved_joints)} at the middle of the limits"
 
 
-def _centers(points: ArmPoints, length: float) -> FloatArray:
+def _joint_centers(points: ArmPoints, joint_length: float) -> FloatArray:
     """Return the places of the joints: where the offset d is long, in the middle of it.
 
     Joints in the place of an earlier one move along their axes: the first one backward, others forward.
     """
     seats, elbows, axes = points.seats[0], points.elbows[0], points.axes[0]
-    far = np.linalg.norm(elbows - seats, axis=1) > 2 * length
-    centers: FloatArray = np.where(far[:, None], (seats + elbows) / 2, seats)
+    is_offset_long = np.linalg.norm(elbows - seats, axis=1) > 2 * joint_length
+    centers: FloatArray = np.where(is_offset_long[:, None], (seats + elbows) / 2, seats)
     for index in range(1, len(centers)):
-        near = np.flatnonzero(np.linalg.norm(centers[:index] - centers[index], axis=1) < length)
-        if near.tolist() == [0]:
-            centers[0] -= 1.1 * length * axes[0]
-        elif near.size:
-            centers[index] += 1.1 * length * axes[index]
+        overlapping = np.flatnonzero(np.linalg.norm(centers[:index] - centers[index], axis=1) < joint_length)
+        if overlapping.tolist() == [0]:
+            centers[0] -= 1.1 * joint_length * axes[0]
+        elif overlapping.size:
+            centers[index] += 1.1 * joint_length * axes[index]
     return centers
 
 
@@ -223,8 +225,8 @@ def views_of(down: FloatArray, extents: FloatArray, size: float) -> tuple[View, 
     up_axis = int(np.argmax(np.abs(down))) if down.any() else 2
     up = np.zeros(3)
     up[up_axis] = -1.0 if down[up_axis] > 0 else 1.0
-    level = [axis for axis in range(3) if axis != up_axis]
-    right_axis = level[int(np.argmax(extents[level]))]
+    level_axes = [axis for axis in range(3) if axis != up_axis]
+    right_axis = level_axes[int(np.argmax(extents[level_axes]))]
     right = np.zeros(3)
     right[right_axis] = 1.0
     side = _along_axes("side view", right, up)

@@ -23,7 +23,7 @@ PANEL_WIDTH = 3.0
 """Width of a panel, inches: with fonts of 10 pt, two panels side by side stay readable in a column of a
 paper."""
 
-DIFFERENCE, LIMIT_LOOK = -1, -2
+DIFFERENCE, LIMIT_STYLE = -1, -2
 """Look of the difference of two curves, distinct from the looks of both; and of a limit of all joints."""
 
 ATTAINABLE, UNCERTAIN = "attainable", "two standard deviations"
@@ -43,15 +43,15 @@ class ShadedArea(NamedTuple):
     time: FloatArray
     low: FloatArray
     high: FloatArray
-    look: int
+    style_index: int
 
     @classmethod
-    def around(cls, curve: Curve, deviation: FloatArray, look: int) -> ShadedArea | None:
+    def around(cls, curve: Curve, deviation: FloatArray, style_index: int) -> ShadedArea | None:
         """Return the band of a curve for a standard deviation, (points,); None if that is NaN throughout."""
         if np.isnan(deviation).all():
             return None
-        spread = DEVIATIONS * deviation
-        return cls(curve.time, curve.values - spread, curve.values + spread, look)
+        half_width = DEVIATIONS * deviation
+        return cls(curve.time, curve.values - half_width, curve.values + half_width, style_index)
 
 
 class Line(NamedTuple):
@@ -59,7 +59,7 @@ class Line(NamedTuple):
 
     Attributes:
         curve: points of the curve.
-        look: number of color and dashes in figures, or `DIFFERENCE`.
+        style_index: number of color and dashes in figures, or `DIFFERENCE`.
         label: name of the joint or of the component of a wrench.
         color: number of the color on pages.
         joint: number of the joint, from 0; None if the curve belongs to no joint.
@@ -70,7 +70,7 @@ class Line(NamedTuple):
     """
 
     curve: Curve
-    look: int
+    style_index: int
     label: str = ""
     color: int = 0
     joint: int | None = None
@@ -81,9 +81,9 @@ class Line(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """A bound of the curve of a joint; `look` is the number of its look in figures."""
+    """A bound of the curve of a joint; `style_index` is the number of its look in figures."""
 
-    look: int
+    style_index: int
     joint: int
     value: float
 
@@ -109,8 +109,8 @@ class Failures:
         """Return the failures flagged in a result; none if it was stored without flags."""
         time = result.time
         if "flags" not in result.variables:
-            none = np.zeros((len(result.joint_names), time.size), dtype=np.bool_)
-            return cls(time, none, none, none)
+            no_flags = np.zeros((len(result.joint_names), time.size), dtype=np.bool_)
+            return cls(time, no_flags, no_flags, no_flags)
         flags = np.ascontiguousarray(result.read("flags").T, dtype=FLAG_TYPE)
         return cls(
             time, *(has_flag(flags, flag) for flag in (Flag.INFEASIBLE, Flag.SINGULAR, Flag.NEAR_SINGULAR))
@@ -121,16 +121,16 @@ class Failures:
 
         Torques grow towards a singularity already at samples whose margin is still large enough.
         """
-        near = self.infeasible[joint] | self.singular[joint] | self.near_singular[joint]
-        count = np.append(0, np.cumsum(near))
-        width = APPROACH * (self.time[-1] - self.time[0])
-        last = self.time.size - 1
+        is_near = self.infeasible[joint] | self.singular[joint] | self.near_singular[joint]
+        near_counts = np.append(0, np.cumsum(is_near))
+        half_width = APPROACH * (self.time[-1] - self.time[0])
+        last_sample = self.time.size - 1
         # The samples next to each time are included, however far apart samples are.
-        before = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, last)
-        after = np.minimum(np.searchsorted(self.time, time), last)
-        first = np.minimum(np.searchsorted(self.time, time - width), before)
-        end = np.maximum(np.searchsorted(self.time, time + width, side="right"), after + 1)
-        calm: BoolArray = count[end] == count[first]
+        previous_sample = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, last_sample)
+        next_sample = np.minimum(np.searchsorted(self.time, time), last_sample)
+        first_sample = np.minimum(np.searchsorted(self.time, time - half_width), previous_sample)
+        end_sample = np.maximum(np.searchsorted(self.time, time + half_width, side="right"), next_sample + 1)
+        calm: BoolArray = near_counts[end_sample] == near_counts[first_sample]
         return calm
 
 
@@ -231,5 +231,5 @@ class Sheet(NamedTuple):
 
 def folding(rows: int, most_rows: int) -> tuple[int, int]:
     """Return the number of rows below each other, and of columns into which the rows are folded."""
-    folds = math.ceil(rows / most_rows)
-    return math.ceil(rows / folds), folds
+    group_columns = math.ceil(rows / most_rows)
+    return math.ceil(rows / group_columns), group_columns

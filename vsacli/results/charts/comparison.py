@@ -34,19 +34,19 @@ def check_comparable(files: Sequence[StoredResult]) -> None:
         InputError: the files are of different kinds, or have different joints.
     """
     if len({file.kind for file in files}) > 1:
-        listed = ", ".join(f"{file.path} is a {file.kind}" for file in files)
-        raise InputError.one(f"{listed}; compare results with results, and simulations with simulations")
+        kinds_text = ", ".join(f"{file.path} is a {file.kind}" for file in files)
+        raise InputError.one(f"{kinds_text}; compare results with results, and simulations with simulations")
     first = files[0]
     for file in files[1:]:
-        if _joints(file) != _joints(first):
+        if _joints_text(file) != _joints_text(first):
             message = (
-                f"cannot be compared with {first.path}: it has the joints {_joints(file)}, "
-                f"the other has {_joints(first)}; compare results of the same robot"
+                f"cannot be compared with {first.path}: it has the joints {_joints_text(file)}, "
+                f"the other has {_joints_text(first)}; compare results of the same robot"
             )
             raise InputError.one(message, file.path)
 
 
-def _joints(result: StoredResult) -> str:
+def _joints_text(result: StoredResult) -> str:
     pairs = zip(result.joint_names, result.joint_types, strict=True)
     return ", ".join(f"{name} ({joint_type})" for name, joint_type in pairs)
 
@@ -75,7 +75,7 @@ HEIGHTS = (1.6, 0.9)
 """Heights of a panel and of the panel with the differences below it, inches."""
 
 
-class _Compared(NamedTuple):
+class _ComparedVariable(NamedTuple):
     """A variable to compare, its words in the figure's title, and the label of its axes."""
 
     variable: str
@@ -83,9 +83,9 @@ class _Compared(NamedTuple):
     words: str
 
 
-_COMPARED = {
-    "result": _Compared("tau_motor", "motor torques", r"$\tau_{motor}$"),
-    "simulation": _Compared("q_error", "position errors", "$q - q_d$"),
+_DEFAULT_VARIABLES = {
+    "result": _ComparedVariable("tau_motor", "motor torques", r"$\tau_{motor}$"),
+    "simulation": _ComparedVariable("q_error", "position errors", "$q - q_d$"),
 }
 """Variables compared by default; for results as in Fig. 4 of Buondonno & De Luca (2016)."""
 
@@ -113,36 +113,46 @@ def comparison_sheets(
     """
     check_comparable(files)
     if variables is None:
-        several = [_COMPARED[files[0].kind]]
+        compared_variables = [_DEFAULT_VARIABLES[files[0].kind]]
     else:
         for file in files:
-            chosen = drawable_variables(file, variables)
-        several = [_Compared(each.name, each.long_name, variable_words(each)) for each in chosen]
+            drawable = drawable_variables(file, variables)
+        compared_variables = [
+            _ComparedVariable(compared.name, compared.long_name, variable_words(compared))
+            for compared in drawable
+        ]
     for file in files:
-        missing = [each.variable for each in several if each.variable not in file.variables]
+        missing = [
+            compared.variable for compared in compared_variables if compared.variable not in file.variables
+        ]
         if missing:
             raise InputError.one(missing_variables(COMPARISON, missing), file.path)
-    names = comparison_names(None if variables is None else [each.variable for each in several])
+    names = comparison_names(
+        None if variables is None else [compared.variable for compared in compared_variables]
+    )
     charts = StoredCharts(files)
-    return ((name, _comparison(charts, each)) for name, each in zip(names, several, strict=True))
+    return (
+        (name, _comparison(charts, compared))
+        for name, compared in zip(names, compared_variables, strict=True)
+    )
 
 
-def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
+def _comparison(charts: StoredCharts, compared: _ComparedVariable) -> Sheet:
     """Return the curves of all files for each joint, with their differences from the first file below."""
-    there = charts.existing(charts.first.declared[compared.variable])
-    there = there[:, : int(np.count_nonzero(np.any(there, axis=0)))]
+    existing = charts.existing(charts.first.declared[compared.variable])
+    existing = existing[:, : int(np.count_nonzero(np.any(existing, axis=0)))]
     signals = charts.signals({compared.variable: "computed"}, uncertain=False)
     differences = charts.differences(compared.variable)
     rows: list[Row] = []
-    for joint, of_joint in enumerate(there):
+    for joint, joint_mask in enumerate(existing):
         panels = (
             (
-                _over(charts, compared, signals, joint, column),
-                _apart(charts, compared, signals, differences, joint, column),
+                _overlay_chart(charts, compared, signals, joint, column),
+                _difference_chart(charts, compared, signals, differences, joint, column),
             )
-            if has_it
+            if exists
             else (None, None)
-            for column, has_it in enumerate(of_joint)
+            for column, exists in enumerate(joint_mask)
         )
         rows += zip(*panels, strict=True)
     time = np.sort(np.concatenate([file.time[[0, -1]] for file in charts.files]))
@@ -154,23 +164,23 @@ def _comparison(charts: StoredCharts, compared: _Compared) -> Sheet:
     return Sheet(f"comparison of {files} of {robots}: {compared.title}", size, legend, [block])
 
 
-def _over(
-    charts: StoredCharts, compared: _Compared, signals: StoredSignals, joint: int, column: int
+def _overlay_chart(
+    charts: StoredCharts, compared: _ComparedVariable, signals: StoredSignals, joint: int, column: int
 ) -> Chart:
-    first, motors = charts.first, "motor" in charts.first.declared[compared.variable].dims
+    first, has_motors = charts.first, "motor" in charts.first.declared[compared.variable].dims
     chart = charts.chart(compared.variable, signals, column, [joint], "file")
     return replace(
         chart,
-        title=first.joint_names[joint] + (f", motor {column + 1}" if motors else ""),
+        title=first.joint_names[joint] + (f", motor {column + 1}" if has_motors else ""),
         axis=axis_label(compared.words, chart.unit, first.joint_types[joint], column),
         limits=(),
-        failures=[(failed, [joint]) for failed in charts.failures],
+        failures=[(failures, [joint]) for failures in charts.failures],
     )
 
 
-def _apart(
+def _difference_chart(
     charts: StoredCharts,
-    compared: _Compared,
+    compared: _ComparedVariable,
     signals: StoredSignals,
     differences: StoredSignals,
     joint: int,
@@ -181,9 +191,9 @@ def _apart(
     rms = [line.rms for line in lines if line.rms is not None]
     if not any(value >= 0 for value in rms):
         return Chart("no values in common", "", lines, zero=True)
-    if (flat := flat_range(lines, signals.lines(column, [joint], "file"))) is not None:
+    if (flat_limits := flat_range(lines, signals.lines(column, [joint], "file"))) is not None:
         title = f"equal to the first, rms {max(rms):.1g} {unit}" if any(rms) else "equal to the first"
-        return Chart(title, "", lines, shown=flat, zero=True)
+        return Chart(title, "", lines, shown=flat_limits, zero=True)
     title = f"minus the first, rms {', '.join(f'{value:.3g}' for value in rms)} {unit}"
-    shown = charts.calm(lines, 0) if compared.variable in GROWING and lines else None
-    return Chart(title, "", lines, shown=shown, cut_off=shown is not None, zero=True)
+    y_limits = charts.calm(lines, 0) if compared.variable in GROWING and lines else None
+    return Chart(title, "", lines, shown=y_limits, cut_off=y_limits is not None, zero=True)

@@ -69,9 +69,9 @@ def panel_groups(joint_types: Sequence[str]) -> list[list[int]]:
     """Return the joints that share a panel: of one type and thus one unit; large groups are split evenly."""
     groups: list[list[int]] = []
     for joint_type in dict.fromkeys(joint_types):
-        joints = [joint for joint, other in enumerate(joint_types) if other == joint_type]
+        joints = [joint for joint, other_type in enumerate(joint_types) if other_type == joint_type]
         panels = math.ceil(len(joints) / JOINTS_PER_PANEL)
-        groups += [part.tolist() for part in np.array_split(joints, panels)]
+        groups += [group.tolist() for group in np.array_split(joints, panels)]
     return groups
 
 
@@ -111,7 +111,7 @@ def variable_words(variable: Variable) -> str:
 
 def grouped(charts: StoredCharts, *parts: Part, words: str = "") -> Sheet:
     """Return the figure of variables side by side, with a column of panels for each of their curves."""
-    blocks = [_groups(charts, part, named=part == parts[-1]) for part in parts]
+    blocks = [_group_panels(charts, part, named=part == parts[-1]) for part in parts]
     columns = [len(block.rows[0]) for block in blocks]
     width = PANEL_WIDTH * sum(columns) if len(blocks) > 1 else 2 * PANEL_WIDTH + legend_width(charts)
     height = max(block.height for block in blocks) + 1
@@ -119,29 +119,29 @@ def grouped(charts: StoredCharts, *parts: Part, words: str = "") -> Sheet:
     return Sheet(title, (width, height), _legend(charts, blocks), blocks, columns)
 
 
-def _of_parts(*parts: Part) -> Drawing:
+def _parts_drawing(*parts: Part) -> Drawing:
     return Drawing(tuple(name for name, _ in parts), lambda charts: grouped(charts, *parts))
 
 
-def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> PanelGrid:
+def _group_panels(charts: StoredCharts, part: Part, *, named: bool = True) -> PanelGrid:
     """Return a row of panels for each group of joints with the variable.
 
     Limits of several joints in one panel could not be told apart: their utilization has a row of its own.
     """
     name, words = part
-    there = charts.existing(charts.first.declared[name])
-    groups = [group for group in panel_groups(charts.first.joint_types) if there[group].any()]
-    columns = np.flatnonzero(there.any(axis=0)).tolist()
+    existing = charts.existing(charts.first.declared[name])
+    groups = [group for group in panel_groups(charts.first.joint_types) if existing[group].any()]
+    columns = np.flatnonzero(existing.any(axis=0)).tolist()
     signals = charts.signals({name: "computed"})
 
     def panels(group: Sequence[int], column: int) -> tuple[Chart | None, Chart | None]:
-        present = [joint for joint in group if there[joint, column]]
+        present = [joint for joint in group if existing[joint, column]]
         if not present:
             return None, None
-        chart, used = charts.with_utilization(charts.chart(name, signals, column, present), column)
+        chart, utilization = charts.with_utilization(charts.chart(name, signals, column, present), column)
         axis = axis_label(words, chart.unit, charts.first.joint_types[group[0]], column)
-        failures = [(each, group) for each in charts.failures]
-        return replace(chart, axis=axis, failures=failures), used
+        failures = [(file_failures, group) for file_failures in charts.failures]
+        return replace(chart, axis=axis, failures=failures), utilization
 
     rows: list[Row] = []
     for group in groups:
@@ -149,7 +149,7 @@ def _groups(charts: StoredCharts, part: Part, *, named: bool = True) -> PanelGri
     beside: list[Legend] = [{charts.first.joint_names[joint]: joint for joint in group} for group in groups]
     heights: tuple[float, ...] = (GROUP_HEIGHT, UTILIZATION * GROUP_HEIGHT)
     if any(chart for row in rows[1::2] for chart in row):
-        beside = [legend for each in beside for legend in (each, {})]
+        beside = [legend for names in beside for legend in (names, {})]
     else:
         rows, heights = rows[::2], (GROUP_HEIGHT,)
     named = named and legend_width(charts) > 0
@@ -163,7 +163,7 @@ def legend_width(charts: StoredCharts) -> float:
 
 def _legend(charts: StoredCharts, blocks: Sequence[PanelGrid]) -> dict[str, int]:
     """Return the legend of the joints with a curve; empty if their names are next to the panels."""
-    drawn = {
+    drawn_joints = {
         line.joint
         for block in blocks
         for row in block.rows
@@ -173,13 +173,13 @@ def _legend(charts: StoredCharts, blocks: Sequence[PanelGrid]) -> dict[str, int]
         if np.isfinite(line.curve.values).any()
     }
     names = enumerate(charts.first.joint_names)
-    return {} if legend_width(charts) else {name: joint for joint, name in names if joint in drawn}
+    return {} if legend_width(charts) else {name: joint for joint, name in names if joint in drawn_joints}
 
 
 def _corridors(charts: StoredCharts, most_rows: int, height: float) -> PanelGrid:
     """Return the stiffness of each joint within its attainable range, in rows of this height, inches."""
     rows = [
-        [replace(chart, failures=[(each, [joint]) for each in charts.failures])]
+        [replace(chart, failures=[(file_failures, [joint]) for file_failures in charts.failures])]
         for joint, chart in zip(charts.compliant, charts.corridors(), strict=True)
     ]
     return PanelGrid(charts.first.time, rows, (height,), most_rows)
@@ -207,17 +207,17 @@ def _motion(charts: StoredCharts) -> Sheet:
     part = ("q", "joint position $q$")
     if not charts.compliant:
         return grouped(charts, part)
-    positions = _groups(charts, part)
-    left = positions.height
-    stiffness = _corridors(charts, max(CORRIDOR_ROWS, int(left / LOW_HEIGHT)), LOW_HEIGHT)
-    folds = stiffness.columns
-    widths = (PANEL_WIDTH, PANEL_WIDTH if folds == 1 else NARROW_WIDTH * folds)
-    size = (sum(widths) + legend_width(charts), max(left, stiffness.height) + 1)
+    positions = _group_panels(charts, part)
+    positions_height = positions.height
+    stiffness = _corridors(charts, max(CORRIDOR_ROWS, int(positions_height / LOW_HEIGHT)), LOW_HEIGHT)
+    stiffness_columns = stiffness.columns
+    widths = (PANEL_WIDTH, PANEL_WIDTH if stiffness_columns == 1 else NARROW_WIDTH * stiffness_columns)
+    size = (sum(widths) + legend_width(charts), max(positions_height, stiffness.height) + 1)
     blocks = [positions, stiffness]
     return Sheet(result_title(charts.first), size, _legend(charts, blocks), blocks, widths)
 
 
-_PARTS: dict[str, tuple[Part, ...]] = {
+_RESULT_PARTS: dict[str, tuple[Part, ...]] = {
     "motor-torque": (("tau_motor", r"motor {force} $\tau_{motor}$"),),
     "elastic-torque": (("tau_e", r"elastic {force} $\tau_e$"),),
     "energy": (("elastic_energy", "elastic energy"), ("motor_energy", "work of motor {motor}")),
@@ -228,13 +228,13 @@ _PARTS: dict[str, tuple[Part, ...]] = {
 }
 """Figures of a result in addition to its motion; the first two are Figs. 2 and 3."""
 
-_OF_SIMULATIONS: dict[str, Part] = {
+_SIMULATION_PARTS: dict[str, Part] = {
     "position-error": ("q_error", "position error $q - q_d$"),
     "stiffness-error": ("stiffness_error", r"stiffness error $\sigma - \sigma_d$"),
-    **{name: _PARTS[name][0] for name in ("motor-torque", "losses", "motor-current", "motor-voltage")},
+    **{name: _RESULT_PARTS[name][0] for name in ("motor-torque", "losses", "motor-current", "motor-voltage")},
 }
 
-_FOLLOWED = {"q": "$q$", "stiffness": r"$\sigma$"}
+_COMMANDED_LABELS = {"q": "$q$", "stiffness": r"$\sigma$"}
 """Variables of simulations with a command, a column of panels each, with the axis label."""
 
 _ROLES = {"commanded": 0, "simulated": 1}
@@ -242,16 +242,16 @@ _ROLES = {"commanded": 0, "simulated": 1}
 
 def _energy(charts: StoredCharts) -> Sheet:
     """Return the energy in the springs, if there are any, and the work of each motor at its right."""
-    parts = _PARTS["energy"] if charts.compliant else _PARTS["energy"][1:]
+    parts = _RESULT_PARTS["energy"] if charts.compliant else _RESULT_PARTS["energy"][1:]
     return grouped(charts, *parts)
 
 
 def _simulated_motion(charts: StoredCharts) -> Sheet:
     """Return a row of panels for each joint: position and stiffness, commanded and simulated."""
     first = charts.first
-    there = np.array([charts.existing(first.declared[name])[:, 0] for name in _FOLLOWED]).T
-    there = there[:, there.any(axis=0)]
-    names = list(_FOLLOWED)[: there.shape[1]]
+    existing = np.array([charts.existing(first.declared[name])[:, 0] for name in _COMMANDED_LABELS]).T
+    existing = existing[:, existing.any(axis=0)]
+    names = list(_COMMANDED_LABELS)[: existing.shape[1]]
     signals = {name: charts.signals({COMMANDS[name]: "commanded", name: "simulated"}) for name in names}
 
     def panel(joint: int, name: str) -> Chart:
@@ -259,14 +259,14 @@ def _simulated_motion(charts: StoredCharts) -> Sheet:
         return replace(
             chart,
             title=first.joint_names[joint],
-            axis=f"{_FOLLOWED[name]} [{chart.unit}]",
-            limits=[limit._replace(look=len(_ROLES)) for limit in chart.limits],
-            failures=[(each, [joint]) for each in charts.failures],
+            axis=f"{_COMMANDED_LABELS[name]} [{chart.unit}]",
+            limits=[limit._replace(style_index=len(_ROLES)) for limit in chart.limits],
+            failures=[(file_failures, [joint]) for file_failures in charts.failures],
         )
 
     rows = [
-        [panel(joint, name) if has_it else None for name, has_it in zip(names, of_joint, strict=True)]
-        for joint, of_joint in enumerate(there)
+        [panel(joint, name) if exists else None for name, exists in zip(names, joint_mask, strict=True)]
+        for joint, joint_mask in enumerate(existing)
     ]
     block = PanelGrid(first.time, rows, (MOTION_HEIGHT,), MOTION_ROWS)
     size = (max(2, block.columns) * PANEL_WIDTH, block.height + 1.2)
@@ -277,7 +277,10 @@ def _tool_stiffness(charts: StoredCharts) -> Sheet:
     """Return the stiffness of each tool in its softest direction, and below it these directions."""
     stiffness, *directions = tool_charts(charts.files)
     tools = {name: index for index, name in enumerate(charts.first.tool_names)}
-    beside: list[Legend] = [tools, *({axis: look for look, axis in enumerate(AXES)} for _ in directions)]
+    beside: list[Legend] = [
+        tools,
+        *({axis: style_index for style_index, axis in enumerate(AXES)} for _ in directions),
+    ]
     rows = [[chart] for chart in (stiffness, *directions)]
     heights = (GROUP_HEIGHT, *(UTILIZATION * GROUP_HEIGHT for _ in directions))
     block = PanelGrid(charts.first.time, rows, heights, beside=beside)
@@ -286,8 +289,8 @@ def _tool_stiffness(charts: StoredCharts) -> Sheet:
 
 RESULT_DRAWINGS: dict[str, Drawing] = {
     "motion": Drawing(("q", "stiffness"), _motion),
-    **{name: _of_parts(*parts) for name, parts in _PARTS.items()},
-    "energy": Drawing(tuple(name for name, _ in _PARTS["energy"]), _energy),
+    **{name: _parts_drawing(*parts) for name, parts in _RESULT_PARTS.items()},
+    "energy": Drawing(tuple(name for name, _ in _RESULT_PARTS["energy"]), _energy),
     "tool-stiffness": Drawing((TIP_COMPLIANCE,), _tool_stiffness),
     "tool-path": Drawing(
         (TIP_COMPLIANCE, "q"), lambda charts: tool_path(charts.first, result_title(charts.first))
@@ -301,7 +304,7 @@ def result_drawings(has_variable: Callable[[Variable], bool], tools_yield: bool)
     return {
         name: drawing
         for name, drawing in RESULT_DRAWINGS.items()
-        if all(has_variable(VARIABLES[needed]) for needed in drawing.needs)
+        if all(has_variable(VARIABLES[variable_name]) for variable_name in drawing.needs)
         and (tools_yield or TIP_COMPLIANCE not in drawing.needs)
     }
 
@@ -309,10 +312,12 @@ def result_drawings(has_variable: Callable[[Variable], bool], tools_yield: bool)
 def simulation_drawings(has_variable: Callable[[Variable], bool]) -> dict[str, Drawing]:
     """Return the figures of a simulation whose variables at least one joint has."""
     return {
-        "motion": Drawing((*map(COMMANDS.__getitem__, _FOLLOWED), *_FOLLOWED), _simulated_motion),
+        "motion": Drawing(
+            (*map(COMMANDS.__getitem__, _COMMANDED_LABELS), *_COMMANDED_LABELS), _simulated_motion
+        ),
         **{
-            name: _of_parts(part)
-            for name, part in _OF_SIMULATIONS.items()
+            name: _parts_drawing(part)
+            for name, part in _SIMULATION_PARTS.items()
             if has_variable(SIMULATION_VARIABLES[part[0]])
         },
     }
@@ -401,19 +406,21 @@ def _undrawable(result: StoredResult, variable: Variable) -> str:
     if "joint" not in variable.dims:
         return f"{name} is not a variable of joints, which figures show; `vsacli export` writes it"
     if name not in result.variables:
-        return _missing(result, variable)
+        return _missing_reason(result, variable)
     if not result.existing(variable).any():
         return f"none of {', '.join(result.joint_names)} has {name}"
     return ""
 
 
-def _missing(result: StoredResult, variable: Variable) -> str:
+def _missing_reason(result: StoredResult, variable: Variable) -> str:
     """Return why a file does not hold a variable."""
     name, robot = variable.name, result.robot_name
     if variable.requires in MOTOR_CONSTANTS and not result.has_variable(variable):
         return f"has no {name}: no motor of {robot} has a {variable.requires}"
     if variable.requires not in OF_ANY_ROBOT and not result.has_variable(variable):
         return f"has no {name}: no joint of {robot} has {variable.requires}, or --variables left it out"
-    if name.endswith(ending := deviation("")) and not any(each.endswith(ending) for each in result.variables):
+    if name.endswith(suffix := deviation("")) and not any(
+        stored_name.endswith(suffix) for stored_name in result.variables
+    ):
         return f"has no {name}: no signal of its trajectory was recorded, or --variables left it out"
     return f"was written without {name} (--variables); compute it again without --variables"

@@ -71,15 +71,17 @@ class Look:
         """
         if self.width is None or self.height is None:
             return self
-        room = min(self.width / natural[0], self.height / natural[1]) / CM_PER_INCH
-        return replace(self, font_size=max(FONTS[0], min(self.font_size, USUAL_FONT * SQUEEZE * room)))
+        available_scale = min(self.width / natural[0], self.height / natural[1]) / CM_PER_INCH
+        return replace(
+            self, font_size=max(FONTS[0], min(self.font_size, USUAL_FONT * SQUEEZE * available_scale))
+        )
 
     def size(self, natural: tuple[float, float]) -> tuple[float, float]:
         """Return width and height, inches, of a figure that is declared with these at the usual font size."""
-        wanted = (self.width, self.height)
+        fixed_size = (self.width, self.height)
         width, height = (
             self.scale * inches if cm is None else cm / CM_PER_INCH
-            for inches, cm in zip(natural, wanted, strict=True)
+            for inches, cm in zip(natural, fixed_size, strict=True)
         )
         return width, height
 

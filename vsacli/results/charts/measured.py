@@ -40,17 +40,17 @@ class MeasuredCurve(NamedTuple):
         Args:
             computed: label of the curve compared with the measured one.
         """
-        over = [
-            Line(Curve.reduced(self.time, values), look, label, look, role=role)
-            for look, (label, role, values) in enumerate(
+        overlay = [
+            Line(Curve.reduced(self.time, values), style_index, label, style_index, role=role)
+            for style_index, (label, role, values) in enumerate(
                 ((computed, "computed", self.computed), ("measured", "measured", self.measured))
             )
         ]
         difference = Curve.reduced(self.time, self.measured - self.computed)
-        apart = Line(difference, DIFFERENCE, f"measured minus {computed}", 2, rms=self.rms)
+        difference_line = Line(difference, DIFFERENCE, f"measured minus {computed}", 2, rms=self.rms)
         return (
-            Chart(self.name, self.unit, over, axis=f"[{self.unit}]"),
-            Chart(f"difference, rms {self.rms:.3g} {self.unit}", self.unit, [apart], zero=True),
+            Chart(self.name, self.unit, overlay, axis=f"[{self.unit}]"),
+            Chart(f"difference, rms {self.rms:.3g} {self.unit}", self.unit, [difference_line], zero=True),
         )
 
 
@@ -89,7 +89,7 @@ class AmplitudeSpectrum(NamedTuple):
     above: float
 
 
-class Highest(NamedTuple):
+class HighestDerivative(NamedTuple):
     """The highest derivative of a signal that is needed.
 
     Attributes:
@@ -135,4 +135,4 @@ class RecordedCurve(NamedTuple):
     noise: float
     inside: tuple[float, float]
     spectrum: AmplitudeSpectrum
-    highest: Highest
+    highest: HighestDerivative

@@ -34,7 +34,7 @@ PATH = f"place on the path, as commanded time [{TIME}]"
 SHORT_PATH = f"place on the path [{TIME}]"
 
 
-class Moved(NamedTuple):
+class JointMotion(NamedTuple):
     """Motion of a joint; all arrays (samples,), torques (motors, samples).
 
     Attributes:
@@ -50,15 +50,15 @@ class Moved(NamedTuple):
     upper: FloatArray
     torques: FloatArray
 
-    def stiffness_line(self, look: int) -> Line:
+    def stiffness_line(self, style_index: int) -> Line:
         """Return the stiffness as a line; at the optimum with its attainable range."""
-        band = ShadedArea(self.place, self.lower, self.upper, look)
-        there = look == AFTER and not np.isnan(self.lower).all()
-        return Line(Curve.reduced(self.place, self.stiffness), look, band=band if there else None)
+        band = ShadedArea(self.place, self.lower, self.upper, style_index)
+        has_band = style_index == AFTER and not np.isnan(self.lower).all()
+        return Line(Curve.reduced(self.place, self.stiffness), style_index, band=band if has_band else None)
 
-    def torque_line(self, motor: int, look: int) -> Line:
+    def torque_line(self, motor: int, style_index: int) -> Line:
         """Return the torque of a motor, 1 or 2, as a line."""
-        return Line(Curve.reduced(self.place, self.torques[motor - 1]), look)
+        return Line(Curve.reduced(self.place, self.torques[motor - 1]), style_index)
 
 
 class OptimizedJoint(NamedTuple):
@@ -74,8 +74,8 @@ class OptimizedJoint(NamedTuple):
 
     name: str
     joint_type: str
-    before: Moved
-    after: Moved
+    before: JointMotion
+    after: JointMotion
     limits: FloatArray
 
     @property
@@ -83,14 +83,14 @@ class OptimizedJoint(NamedTuple):
         """Chart of the stiffness within its attainable range; None if the stiffness cannot be commanded."""
         if not np.isfinite(self.after.stiffness).any():
             return None
-        both = np.concatenate([self.before.stiffness, self.after.stiffness])
+        stiffness_values = np.concatenate([self.before.stiffness, self.after.stiffness])
         unit = STIFFNESS.unit(self.joint_type)
         return Chart(
             title=self.name,
             unit=unit,
             lines=[self.before.stiffness_line(BEFORE), self.after.stiffness_line(AFTER)],
             axis=rf"$\sigma$ [{unit}]",
-            shown=visible_range(both, self.after.lower, self.after.upper),
+            shown=visible_range(stiffness_values, self.after.lower, self.after.upper),
             band=ATTAINABLE,
         )
 
@@ -118,11 +118,11 @@ def change_sheet(joints: Sequence[OptimizedJoint], title: str, *, along_path: bo
         title: title of the figure.
         along_path: whether places are positions on the path instead of times.
     """
-    stiffness = [joint.stiffness for joint in joints]
+    stiffness_charts = [joint.stiffness for joint in joints]
     motors = range(1, 1 + max(len(joint.motors) for joint in joints))
     panels = [[joint.torque(motor) for motor in motors] for joint in joints]
-    if any(stiffness):
-        panels = [[chart, *torques] for chart, torques in zip(stiffness, panels, strict=True)]
+    if any(stiffness_charts):
+        panels = [[chart, *torques] for chart, torques in zip(stiffness_charts, panels, strict=True)]
     block = PanelGrid(joints[0].before.place, panels, (ROW_HEIGHT,), MOST_ROWS)
     if along_path:
         block = block._replace(xlabel=SHORT_PATH)
@@ -130,21 +130,24 @@ def change_sheet(joints: Sequence[OptimizedJoint], title: str, *, along_path: bo
     return Sheet(title, size, {"as commanded": BEFORE, "optimum": AFTER}, [block])
 
 
-def pace_sheet(place: FloatArray, speed: FloatArray, uniform: float, title: str) -> Sheet:
+def pace_sheet(path_position: FloatArray, speed: FloatArray, uniform_speed: float, title: str) -> Sheet:
     """Return the figure of the speed along the path at the optimum.
 
     Args:
-        place: position on the path, (samples,), s as commanded.
+        path_position: position on the path, (samples,), s as commanded.
         speed: speed there relative to the commanded motion, (samples,).
-        uniform: relative speed of the fastest uniformly scaled motion; NaN if unknown.
+        uniform_speed: relative speed of the fastest uniformly scaled motion; NaN if unknown.
         title: title of the figure.
     """
-    ends = place[[0, -1]]
-    lines, legend = [Line(Curve.reduced(place, speed), AFTER)], {"optimum": AFTER}
-    for label, look, value in (("as commanded", BEFORE, 1.0), ("fastest uniform scaling", UNIFORM, uniform)):
+    ends = path_position[[0, -1]]
+    lines, legend = [Line(Curve.reduced(path_position, speed), AFTER)], {"optimum": AFTER}
+    for label, style_index, value in (
+        ("as commanded", BEFORE, 1.0),
+        ("fastest uniform scaling", UNIFORM, uniform_speed),
+    ):
         if np.isfinite(value):
-            lines.append(Line(Curve(ends, np.full(2, value)), look))
-            legend[label] = look
+            lines.append(Line(Curve(ends, np.full(2, value)), style_index))
+            legend[label] = style_index
     chart = Chart("", "", lines, "relative speed", from_zero=True)
     block = PanelGrid(ends, [[chart]], (PACE_HEIGHT,), xlabel=PATH)
     return Sheet(title, (2 * PANEL_WIDTH, PACE_HEIGHT + 1), legend, [block])
@@ -161,25 +164,25 @@ class MotorTorqueCurve(NamedTuple):
 
     def chart(self, time: FloatArray) -> Chart:
         """Return the torque with its band, both entirely within the range of the axis."""
-        curve, spread = Curve(time, self.values), DEVIATIONS * self.deviation
-        low, high = np.nanmin(self.values - spread), np.nanmax(self.values + spread)
-        room = 0.05 * (high - low) or 1.0
+        curve, half_width = Curve(time, self.values), DEVIATIONS * self.deviation
+        low, high = np.nanmin(self.values - half_width), np.nanmax(self.values + half_width)
+        margin = 0.05 * (high - low) or 1.0
         unit = TORQUE.unit(self.joint_type)
         return Chart(
             title=f"{self.joint}, motor {self.motor}",
             unit=unit,
-            lines=[Line(curve, 0, band=ShadedArea.around(curve, self.deviation, look=1))],
+            lines=[Line(curve, 0, band=ShadedArea.around(curve, self.deviation, style_index=1))],
             axis=rf"$\tau_{self.motor}$ [{unit}]",
-            shown=(low - room, high + room),
+            shown=(low - margin, high + margin),
         )
 
 
 def band_sheet(time: FloatArray, torques: Sequence[MotorTorqueCurve], title: str) -> Sheet:
     """Return a figure of motor torques with their bands, a row of panels for each joint."""
-    by_joint: dict[str, dict[int, Chart]] = {}
+    charts_by_joint: dict[str, dict[int, Chart]] = {}
     for torque in torques:
-        by_joint.setdefault(torque.joint, {})[torque.motor] = torque.chart(time)
-    rows = [[charts.get(motor) for motor in MOTORS] for charts in by_joint.values()]
+        charts_by_joint.setdefault(torque.joint, {})[torque.motor] = torque.chart(time)
+    rows = [[charts.get(motor) for motor in MOTORS] for charts in charts_by_joint.values()]
     block = PanelGrid(time, rows, (BAND_HEIGHT,), MOST_ROWS)
     size = (block.columns * PANEL_WIDTH, block.height + 1)
     return Sheet(title, size, {"computed": 0}, [block])

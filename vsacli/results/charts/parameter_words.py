@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from vsacli.base import units
 
 AXES, ANGLES = ("x", "y", "z"), ("roll", "pitch", "yaw")
-ENTRIES = {
+ENTRY_NAMES = {
     "gravity": AXES,
     "com": AXES,
     "xyz": AXES,
@@ -17,7 +17,7 @@ ENTRIES = {
 }
 """Names of the entries of lists, by key."""
 
-KEYS = {"com": "center of mass", "dh": "DH", "xyz": "", "rpy": "", "joints": "", "actuator": ""}
+KEY_CAPTIONS = {"com": "center of mass", "dh": "DH", "xyz": "", "rpy": "", "joints": "", "actuator": ""}
 """Words in place of keys; empty for keys that say nothing next to the others."""
 
 SYMBOL_LENGTH = 3
@@ -43,19 +43,19 @@ def parameter_words(path: str, unit: str, joints: Sequence[str]) -> str:
         unit: unit of the parameter, which says what a symbol such as k is; empty if unknown.
         joints: names of the joints, in the order of the robot file.
     """
-    keys, where = path.split("."), ""
-    of_joint = keys[0] == "joints" and len(keys) > 2
-    if of_joint:
-        where, keys = _joint(keys[1], joints), keys[2:]
+    keys, joint_text = path.split("."), ""
+    is_of_joint = keys[0] == "joints" and len(keys) > 2
+    if is_of_joint:
+        joint_text, keys = _joint_caption(keys[1], joints), keys[2:]
     elif keys[-1] in joints and len(keys) > 1:
-        where, keys = keys[-1], keys[:-1]
-    words = [word for place in range(len(keys)) if (word := _word(keys, place))]
-    if of_joint and len(keys[-1]) <= SYMBOL_LENGTH and unit in SYMBOLS and len(words) > 1:
+        joint_text, keys = keys[-1], keys[:-1]
+    words = [caption for index in range(len(keys)) if (caption := _key_caption(keys, index))]
+    if is_of_joint and len(keys[-1]) <= SYMBOL_LENGTH and unit in SYMBOLS and len(words) > 1:
         words = [SYMBOLS[unit].format(" ".join(words[:-1])), keys[-1]]
-    return ", ".join(filter(None, (" ".join(words), where)))
+    return ", ".join(filter(None, (" ".join(words), joint_text)))
 
 
-def _joint(key: str, joints: Sequence[str]) -> str:
+def _joint_caption(key: str, joints: Sequence[str]) -> str:
     """Return the joints to which a key of a path applies: a name, an index from 0, or a pattern."""
     if key == "*":
         return "all joints"
@@ -64,9 +64,9 @@ def _joint(key: str, joints: Sequence[str]) -> str:
     return f"joints {key}" if "*" in key else key
 
 
-def _word(keys: Sequence[str], place: int) -> str:
-    key = keys[place]
-    entries = ENTRIES.get(keys[place - 1], ()) if place else ()
-    if key.isdecimal() and int(key) < len(entries):
-        return entries[int(key)]
-    return KEYS.get(key, key if len(key) <= SYMBOL_LENGTH else key.replace("_", " "))
+def _key_caption(keys: Sequence[str], index: int) -> str:
+    key = keys[index]
+    entry_names = ENTRY_NAMES.get(keys[index - 1], ()) if index else ()
+    if key.isdecimal() and int(key) < len(entry_names):
+        return entry_names[int(key)]
+    return KEY_CAPTIONS.get(key, key if len(key) <= SYMBOL_LENGTH else key.replace("_", " "))

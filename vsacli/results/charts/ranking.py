@@ -57,14 +57,14 @@ class Ranking(NamedTuple):
 def _bars(effects: Sequence[Mapping[str, Any]], joints: Sequence[str]) -> Iterator[EffectBar]:
     """Yield a bar for each parameter that changes a motor torque."""
     for effect in effects:
-        shares = {joint: each["share"] or 0.0 for joint, each in effect["joints"].items()}
+        shares = {joint: joint_effect["share"] or 0.0 for joint, joint_effect in effect["joints"].items()}
         joint = max(shares, key=lambda name: shares[name], default=None)
         if joint is not None and shares[joint] > 0:
             words = parameter_words(effect["path"], effect["unit"], joints)
-            yield EffectBar(f"{_change(effect)} of {words}", shares[joint], joint)
+            yield EffectBar(f"{_change_text(effect)} of {words}", shares[joint], joint)
 
 
-def _change(effect: Mapping[str, Any]) -> str:
+def _change_text(effect: Mapping[str, Any]) -> str:
     """Return the change of a parameter in words."""
     step, words = ABSOLUTE.get(effect["unit"], (math.nan, ""))
     if math.isclose(effect["step"], step):

@@ -32,10 +32,10 @@ for which an envelope is drawn. The ratio is 1 for a monotone curve, and for a w
 panel, whose line is still readable; 5 with 300 periods, a blot; 4 for noise with four samples in an interval,
 and more with more samples."""
 
-SEEN_SHARE = 0.01
+LINE_WIDTH_SHARE = 0.01
 """Width of a line as a fraction of the height of a panel."""
 
-BLOCK = 65536
+BLOCK_SAMPLES = 65536
 """Approximate number of samples read at once."""
 
 
@@ -70,9 +70,9 @@ class Envelope(NamedTuple):
     @classmethod
     def of(cls, time: FloatArray, values: FloatArray, starts: IndexArray) -> Envelope:
         """Return the envelope of values, (..., samples), in columns that begin at these samples."""
-        return cls(time, values, values, values).joined(starts)
+        return cls(time, values, values, values).coarsened(starts)
 
-    def joined(self, starts: IndexArray) -> Envelope:
+    def coarsened(self, starts: IndexArray) -> Envelope:
         """Return an envelope with fewer columns, which begin at these columns."""
         ends = np.append(starts[1:], self.time.size) - 1
         with np.errstate(invalid="ignore"):  # mean of infinities of both signs
@@ -87,14 +87,14 @@ class Envelope(NamedTuple):
 
         This is so if the samples vary visibly within a column, and much more than from column to column.
         """
-        whole = np.isfinite(self.mean)
-        if np.count_nonzero(whole) < 2:
+        finite = np.isfinite(self.mean)
+        if np.count_nonzero(finite) < 2:
             return False
-        high, low = self.high[whole], self.low[whole]
+        high, low = self.high[finite], self.low[finite]
         with np.errstate(over="ignore"):  # a simulation may have diverged
-            steps = np.abs(np.diff(self.mean[whole]))
-            visible = SEEN_SHARE * (high.max() - low.min())
-            return bool(np.median(high - low) > max(visible, RESTLESS * np.median(steps)))
+            mean_steps = np.abs(np.diff(self.mean[finite]))
+            min_range = LINE_WIDTH_SHARE * (high.max() - low.min())
+            return bool(np.median(high - low) > max(min_range, RESTLESS * np.median(mean_steps)))
 
 
 @dataclass(frozen=True)
@@ -114,9 +114,11 @@ class Curve:
     @classmethod
     def reduced(cls, time: FloatArray, values: FloatArray) -> Curve:
         """Return the visible part of a curve given with all its samples, (samples,)."""
-        starts = _starts(time)
-        kept = kept_samples(values, starts)
-        return Curves(time[kept], values[None, kept], Envelope.of(time, values[None], starts))[0]
+        starts = _reduction_starts(time)
+        kept_indices = kept_samples(values, starts)
+        return Curves(
+            time[kept_indices], values[None, kept_indices], Envelope.of(time, values[None], starts)
+        )[0]
 
 
 @dataclass(frozen=True)
@@ -133,30 +135,33 @@ class Curves:
     values: FloatArray
     envelope: Envelope
 
-    def __getitem__(self, curve: int) -> Curve:
+    def __getitem__(self, curve_index: int) -> Curve:
         """Return one of the curves."""
         time, *ranges = self.envelope
-        columns = Envelope(time, *(each[curve] for each in ranges))
-        wide = columns.joined(column_starts(time, WIDE_COLUMNS))
-        return Curve(self.time, self.values[curve], wide if wide.restless else None)
+        columns = Envelope(time, *(values[curve_index] for values in ranges))
+        coarse = columns.coarsened(column_starts(time, WIDE_COLUMNS))
+        return Curve(self.time, self.values[curve_index], coarse if coarse.restless else None)
 
 
 def read_curves(result: Sampled, names: Sequence[str]) -> tuple[Curves, ...]:
     """Read the curves of each joint, in the order of `names`; a variable of motors has two curves."""
     time = result.time
-    pieces = [_block_curves(result, names, time, bounds) for bounds in _blocks(_starts(time), time.size)]
-    return tuple(_joined(of_joint) for of_joint in zip(*pieces, strict=True))
+    blocks = [
+        _block_curves(result, names, time, bounds)
+        for bounds in _block_bounds(_reduction_starts(time), time.size)
+    ]
+    return tuple(_concatenate_blocks(joint_blocks) for joint_blocks in zip(*blocks, strict=True))
 
 
-def _starts(time: FloatArray) -> IndexArray:
+def _reduction_starts(time: FloatArray) -> IndexArray:
     """Return the first sample of each column; in a short run each sample is a column."""
     return column_starts(time) if time.size > FULL_DETAIL else np.arange(time.size)
 
 
-def _blocks(starts: IndexArray, samples: int) -> list[IndexArray]:
+def _block_bounds(starts: IndexArray, samples: int) -> list[IndexArray]:
     """Divide the run into blocks: first samples of their columns, and the sample after the last."""
     bounds = np.append(starts, samples)
-    cuts = np.union1d(np.flatnonzero(np.diff(bounds // BLOCK)) + 1, bounds.size - 1)
+    cuts = np.union1d(np.flatnonzero(np.diff(bounds // BLOCK_SAMPLES)) + 1, bounds.size - 1)
     return [bounds[first : last + 1] for first, last in zip([0, *cuts[:-1]], cuts, strict=True)]
 
 
@@ -169,20 +174,23 @@ def _block_curves(
     variables = [by_joint(result.read(name, start, stop)).reshape(shape) for name in names]
     values, time = np.concatenate(variables, axis=1), time[start:stop]
     starts = bounds[:-1] - start
-    kept = [np.unique(np.concatenate([kept_samples(curve, starts) for curve in joint])) for joint in values]
+    kept_indices = [
+        np.unique(np.concatenate([kept_samples(curve, starts) for curve in joint_values]))
+        for joint_values in values
+    ]
     return [
-        Curves(time[index], joint[:, index], Envelope.of(time, joint, starts))
-        for joint, index in zip(values, kept, strict=True)
+        Curves(time[indices], joint_values[:, indices], Envelope.of(time, joint_values, starts))
+        for joint_values, indices in zip(values, kept_indices, strict=True)
     ]
 
 
-def _joined(pieces: Sequence[Curves]) -> Curves:
+def _concatenate_blocks(blocks: Sequence[Curves]) -> Curves:
     """Concatenate the blocks of a joint."""
-    ranges = zip(*(piece.envelope for piece in pieces), strict=True)
+    ranges = zip(*(block.envelope for block in blocks), strict=True)
     return Curves(
-        np.concatenate([piece.time for piece in pieces]),
-        np.concatenate([piece.values for piece in pieces], axis=-1),
-        Envelope(*(np.concatenate(parts, axis=-1) for parts in ranges)),
+        np.concatenate([block.time for block in blocks]),
+        np.concatenate([block.values for block in blocks], axis=-1),
+        Envelope(*(np.concatenate(arrays, axis=-1) for arrays in ranges)),
     )
 
 
@@ -204,8 +212,8 @@ def kept_samples(values: FloatArray, starts: IndexArray) -> IndexArray:
     """
     lengths = np.diff(starts, append=values.size)
     extremes = [
-        _first_hits(values == np.repeat(extreme.reduceat(values, starts), lengths), starts)
-        for extreme in (np.fmin, np.fmax)
+        _first_true_indices(values == np.repeat(ufunc.reduceat(values, starts), lengths), starts)
+        for ufunc in (np.fmin, np.fmax)
     ]
     kept = np.unique(np.concatenate([starts, starts + lengths - 1, *extremes]))
     gaps = np.append(np.flatnonzero(np.isnan(values)), values.size)
@@ -213,11 +221,11 @@ def kept_samples(values: FloatArray, starts: IndexArray) -> IndexArray:
     return np.union1d(kept, next_gap[next_gap < values.size])
 
 
-def _first_hits(hits: BoolArray, starts: IndexArray) -> IndexArray:
+def _first_true_indices(mask: BoolArray, starts: IndexArray) -> IndexArray:
     """Return the first True of each column that has one."""
-    indices = np.flatnonzero(hits)
-    column = np.searchsorted(starts, indices, side="right")
-    return indices[np.diff(column, prepend=0) > 0]
+    indices = np.flatnonzero(mask)
+    column_indices = np.searchsorted(starts, indices, side="right")
+    return indices[np.diff(column_indices, prepend=0) > 0]
 
 
 def marked_spans(time: FloatArray, marked: BoolArray) -> FloatArray:
@@ -235,8 +243,8 @@ def marked_spans(time: FloatArray, marked: BoolArray) -> FloatArray:
     borders = np.concatenate([time[:1], (time[1:] + time[:-1]) / 2, time[-1:]])
     changes = np.flatnonzero(np.diff(marked, prepend=False, append=False))
     start, end = borders[changes].reshape(-1, 2).T
-    joined = np.flatnonzero(start[1:] - end[:-1] <= (time[-1] - time[0]) / COLUMNS)
-    return np.column_stack([np.delete(start, joined + 1), np.delete(end, joined)])
+    merged = np.flatnonzero(start[1:] - end[:-1] <= (time[-1] - time[0]) / COLUMNS)
+    return np.column_stack([np.delete(start, merged + 1), np.delete(end, merged)])
 
 
 REACH = 0.25
@@ -262,12 +270,12 @@ def visible_range(command: FloatArray, *bounds: FloatArray) -> tuple[float, floa
         return (0.0, 1.0)
     low, high = command.min(), command.max()
     reach = max(high - low, REACH * abs(high))
-    shown = [command]
-    for bound, nearer, end in zip(
+    visible_values = [command]
+    for bound, clip, limit in zip(
         bounds, (np.maximum, np.minimum), (low - reach, high + reach), strict=False
     ):
-        shown.append(nearer(bound[np.isfinite(bound)], end))
-    values = np.concatenate(shown)
+        visible_values.append(clip(bound[np.isfinite(bound)], limit))
+    values = np.concatenate(visible_values)
     margin = MARGIN * np.ptp(values) or reach
     return (float(values.min() - margin), float(values.max() + margin))
 
@@ -280,11 +288,11 @@ GROWING = frozenset({*_OF_MOTORS, COMMANDS["tau_motor"]})
 """Variables that grow without bound near a singular sample, and are undefined at it: deflection rates follow
 from the inverse of the decoupling matrix, and motion and torque of motors from these."""
 
-TOLERATED = 0.5
+TOLERATED_EXCESS = 0.5
 """Share of the range of all other samples by which near-singular samples may exceed it without being cut
 off."""
 
-ROOM = 0.08
+PEAK_MARGIN = 0.08
 """Free space above and below, relative to that range, for the marks of peaks that are cut off."""
 
 
@@ -299,16 +307,26 @@ def calm_range(curves: Sequence[FloatArray], calm: Sequence[BoolArray]) -> tuple
         calm: marks of the points that are not near-singular, (points,) for each curve.
     """
     finite = [np.isfinite(values) for values in curves]
-    steady = np.concatenate([each[there & at] for each, there, at in zip(curves, finite, calm, strict=True)])
-    if not steady.size:
+    calm_values = np.concatenate(
+        [
+            curve[finite_mask & calm_mask]
+            for curve, finite_mask, calm_mask in zip(curves, finite, calm, strict=True)
+        ]
+    )
+    if not calm_values.size:
         return None
-    near = [each[there & ~at] for each, there, at in zip(curves, finite, calm, strict=True)]
-    shown = np.concatenate([steady, [np.median(each) for each in near if each.size]])
-    low, high = float(shown.min()), float(shown.max())
-    every = np.concatenate([steady, *near])
-    least, most = float(every.min()), float(every.max())
-    size = high - low or abs(high) or 1.0
-    below, above = least < low - TOLERATED * size, most > high + TOLERATED * size
+    near_singular_values = [
+        curve[finite_mask & ~calm_mask]
+        for curve, finite_mask, calm_mask in zip(curves, finite, calm, strict=True)
+    ]
+    visible_values = np.concatenate(
+        [calm_values, [np.median(curve) for curve in near_singular_values if curve.size]]
+    )
+    low, high = float(visible_values.min()), float(visible_values.max())
+    all_values = np.concatenate([calm_values, *near_singular_values])
+    least, most = float(all_values.min()), float(all_values.max())
+    extent = high - low or abs(high) or 1.0
+    below, above = least < low - TOLERATED_EXCESS * extent, most > high + TOLERATED_EXCESS * extent
     if not below and not above:
         return None
-    return (low if below else least) - ROOM * size, (high if above else most) + ROOM * size
+    return (low if below else least) - PEAK_MARGIN * extent, (high if above else most) + PEAK_MARGIN * extent

@@ -30,16 +30,16 @@ from vsacli.robot.model import Robot
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-POINTS, LEVELS = 201, 37
+TORQUE_COUNT, LEVEL_COUNT = 201, 37
 """Number of torques of a map, and of stiffness values at each torque for the curves of limits."""
 
-FINE_POINTS = 2001
+DEFLECTION_COUNT = 2001
 """Number of deflections of the torque of a mechanism, enough for its steepest setting."""
 
-BEYOND, BEYOND_TORQUE = 1.5, 1.3
+STIFFNESS_MARGIN, TORQUE_MARGIN = 1.5, 1.3
 """Factors of the ends of both axes before the exact ends are known, larger than a step of the search."""
 
-SEARCHED = np.geomspace(1e-5, 1e7, 121)
+SEARCHED_TORQUES = np.geomspace(1e-5, 1e7, 121)
 """Torques, N m (N), among which the end of the torque axis is searched."""
 
 RATIOS, SHARES = np.geomspace(1 + 1e-6, 1e3, 25)[:, None], np.linspace(0.02, 1 - 1e-6, 13)[:, None]
@@ -54,14 +54,14 @@ FREE_HEIGHT = 2.5
 LOAD_SHARE = 1.5
 """Smallest end of the torque axis relative to the static load."""
 
-ROOM = 1.08
+MARGIN = 1.08
 """Factor by which axes extend beyond their content."""
 
-INSIDE = 1e-6
+END_DISTANCE = 1e-6
 """Relative distance of the lowest and highest levels from the ends of the attainable range, at which
 rounding would make some samples infeasible."""
 
-SETTINGS, ROUNDED = 5, 1e-3
+SETTING_COUNT, ZERO_SHARE = 5, 1e-3
 """Number of settings of motor 2 for which the torque of a mechanism is shown, and share of their range within
 which a setting counts as 0."""
 
@@ -69,7 +69,7 @@ LIMITS = {"tau_motor": "limit of motor torque at rest", "phi": "limit of deflect
 """Meanings of the limits in a map, by the variable that they bound."""
 
 
-ROTORS = ("motor", "coupled_inertia")
+ROTOR_FIELDS = ("motor", "coupled_inertia")
 """Fields of actuators that do not matter at rest, except for their limits."""
 
 
@@ -115,9 +115,9 @@ class StiffnessMap(NamedTuple):
     top: float
 
     @property
-    def within(self) -> BoolArray:
+    def within_limits(self) -> BoolArray:
         """Marks of the values of the levels that keep all limits, (levels, points)."""
-        return _within(self.levels, self.clearance)
+        return _within_limits(self.levels, self.clearance)
 
 
 @dataclass(frozen=True)
@@ -147,14 +147,14 @@ class ActuatorChart:
     @property
     def kind(self) -> str:
         """Kind of the actuator, with its mechanism or the laws of its springs."""
-        words = [self.joints[0].actuator_type]
+        parts = [self.joints[0].actuator_type]
         mechanism = getattr(self.actuator, "mechanism", None)
         if mechanism is not None:
-            words.append(MECHANISMS.name_of(type(mechanism)).replace("_", " "))
+            parts.append(MECHANISMS.name_of(type(mechanism)).replace("_", " "))
         else:
             laws = [element.law for element in self.actuator.spring_elements or ()]
-            words += dict.fromkeys(_law_name(law) for law in laws)
-        return ", ".join(words)
+            parts += dict.fromkeys(_law_name(law) for law in laws)
+        return ", ".join(parts)
 
     @property
     def commanded(self) -> bool:
@@ -164,8 +164,8 @@ class ActuatorChart:
     @property
     def limits(self) -> list[float]:
         """Finite limits of the stiffness in the robot file, of all joints, ascending."""
-        ends = {end for joint in self.joints for end in joint.limits.stiffness if math.isfinite(end)}
-        return sorted(ends)
+        bounds = {bound for joint in self.joints for bound in joint.limits.stiffness if math.isfinite(bound)}
+        return sorted(bounds)
 
     def unit(self, variable: str) -> str:
         """Return the unit of a variable at these joints."""
@@ -182,8 +182,8 @@ class ActuatorChart:
             regular = np.zeros(tau_e.shape, dtype=bool)
             return stiffness, stiffness, regular, regular
         with np.errstate(all="ignore"):
-            found = self.actuator.solve(tau_e, np.ones_like(tau_e), np.full_like(tau_e, self.q))
-        return found.lower, found.upper, found.lower_critical, found.upper_critical
+            solution = self.actuator.solve(tau_e, np.ones_like(tau_e), np.full_like(tau_e, self.q))
+        return solution.lower, solution.upper, solution.lower_critical, solution.upper_critical
 
     def clearance(self, tau_e: FloatArray, levels: FloatArray) -> tuple[dict[str, FloatArray], FloatArray]:
         """Return the distances to limits, and the coordinates of the springs, as in `StiffnessMap`."""
@@ -191,106 +191,120 @@ class ActuatorChart:
         state = self.at_rest(torques, levels.ravel())
         infeasible = has_flag(state.flags, Flag.INFEASIBLE).reshape(levels.shape)
         clearance: dict[str, FloatArray] = {}
-        for check in self.actuator.limits:
-            if check.variable in LIMITS and math.isfinite(check.range[1]):
-                values = np.where(infeasible, np.nan, check.clearance(state.by_name()).reshape(levels.shape))
-                words = LIMITS[check.variable]
-                clearance[words] = np.minimum(clearance.get(words, np.inf), values)
+        for limit in self.actuator.limits:
+            if limit.variable in LIMITS and math.isfinite(limit.range[1]):
+                values = np.where(infeasible, np.nan, limit.clearance(state.by_name()).reshape(levels.shape))
+                caption = LIMITS[limit.variable]
+                clearance[caption] = np.minimum(clearance.get(caption, np.inf), values)
         unknowns = np.stack(list(self.actuator.unknowns(state.phi, state.theta)))
         return clearance, np.where(infeasible, np.nan, unknowns.reshape(-1, *levels.shape))
 
     @cached_property
     def stiffness(self) -> StiffnessMap:
         """Attainable stiffness over torque."""
-        end, top = self._sight()
-        return self._map(*self._extent(self._map(end, top)))
+        max_torque, max_stiffness = self._search_axis_ends()
+        return self._map(*self._axis_ends(self._map(max_torque, max_stiffness)))
 
-    def _map(self, end: float, top: float) -> StiffnessMap:
+    def _map(self, max_torque: float, max_stiffness: float) -> StiffnessMap:
         """Return the map up to these ends of its axes."""
-        tau_e = np.linspace(-end, end, POINTS)
-        lower, upper, at_lower, at_upper = self.ends(tau_e)
-        shares = np.linspace(INSIDE ** (1 / 3), 1 - INSIDE, LEVELS)[:, None] ** 3  # dense at the minimum
-        levels = lower + shares * np.maximum(np.minimum(upper, top) - lower, 0.0)
-        clearance, phi = self.clearance(tau_e, levels)
-        return StiffnessMap(tau_e, lower, upper, at_lower, at_upper, levels, clearance, phi, top)
+        tau_e = np.linspace(-max_torque, max_torque, TORQUE_COUNT)
+        lower, upper, lower_singular, upper_singular = self.ends(tau_e)
+        shares = (
+            np.linspace(END_DISTANCE ** (1 / 3), 1 - END_DISTANCE, LEVEL_COUNT)[:, None] ** 3
+        )  # dense at the minimum
+        levels = lower + shares * np.maximum(np.minimum(upper, max_stiffness) - lower, 0.0)
+        clearance, unknowns = self.clearance(tau_e, levels)
+        return StiffnessMap(
+            tau_e, lower, upper, lower_singular, upper_singular, levels, clearance, unknowns, max_stiffness
+        )
 
-    def _sight(self) -> tuple[float, float]:
+    def _search_axis_ends(self) -> tuple[float, float]:
         """Return ends of both axes beyond which nothing keeps the limits, to within a factor of 1.5.
 
         Where no limit bounds them, the minimum stiffness determines both.
         """
-        tau_e = np.concatenate((-SEARCHED[::-1], SEARCHED))
+        tau_e = np.concatenate((-SEARCHED_TORQUES[::-1], SEARCHED_TORQUES))
         lower, upper, *_ = self.ends(tau_e)
-        most = np.where(np.isinf(upper), lower * RATIOS[-1], upper)
-        levels = np.concatenate((np.minimum(lower * RATIOS, most), lower + SHARES * (most - lower)))
-        within = _within(levels, self.clearance(tau_e, levels)[0])
-        usable, sizes = np.any(within, axis=0), np.abs(tau_e)
-        if usable[[0, -1]].any() or not usable.any():
-            usable = lower <= FREE_GROWTH * np.nanmin(lower)
-        end = BEYOND_TORQUE * float(np.max(sizes, where=usable, initial=0.0))
-        end = max(end, LOAD_SHARE * self.load)
-        seen = within & (sizes <= end)
-        highest = float(np.max(levels, where=seen, initial=0.0))
-        if not highest or np.any(seen & (levels >= lower * RATIOS[-1] * (1 - INSIDE)) & np.isinf(upper)):
-            carried = (sizes <= end) & np.isfinite(lower)
-            highest = FREE_HEIGHT / BEYOND * float(np.max(lower, where=carried, initial=0.0))
-        return end, max([BEYOND * highest or 1.0, *(ROOM * limit for limit in self.limits)])
+        largest = np.where(np.isinf(upper), lower * RATIOS[-1], upper)
+        levels = np.concatenate((np.minimum(lower * RATIOS, largest), lower + SHARES * (largest - lower)))
+        within_limits = _within_limits(levels, self.clearance(tau_e, levels)[0])
+        is_carried, magnitudes = np.any(within_limits, axis=0), np.abs(tau_e)
+        if is_carried[[0, -1]].any() or not is_carried.any():
+            is_carried = lower <= FREE_GROWTH * np.nanmin(lower)
+        max_torque = TORQUE_MARGIN * float(np.max(magnitudes, where=is_carried, initial=0.0))
+        max_torque = max(max_torque, LOAD_SHARE * self.load)
+        visible = within_limits & (magnitudes <= max_torque)
+        max_stiffness = float(np.max(levels, where=visible, initial=0.0))
+        if not max_stiffness or np.any(
+            visible & (levels >= lower * RATIOS[-1] * (1 - END_DISTANCE)) & np.isinf(upper)
+        ):
+            in_range = (magnitudes <= max_torque) & np.isfinite(lower)
+            max_stiffness = FREE_HEIGHT / STIFFNESS_MARGIN * float(np.max(lower, where=in_range, initial=0.0))
+        return max_torque, max(
+            [STIFFNESS_MARGIN * max_stiffness or 1.0, *(MARGIN * limit for limit in self.limits)]
+        )
 
-    def _extent(self, seen: StiffnessMap) -> tuple[float, float]:
+    def _axis_ends(self, stiffness_map: StiffnessMap) -> tuple[float, float]:
         """Return the ends of both axes just beyond the values that keep all limits."""
-        within, sizes = seen.within, np.abs(seen.tau_e)
-        usable = np.any(within, axis=0)
-        end, top = float(sizes[-1]), seen.top
-        if usable.any() and not usable[[0, -1]].any():
-            end = max(ROOM * float(sizes[usable].max()), LOAD_SHARE * self.load)
-        if usable.any() and not within[-1][seen.upper > top].any():
-            top = ROOM * max([*self.limits, float(seen.levels[within].max())])
-            if not np.ptp(seen.levels[within]):  # a linear spring, whose line is in the middle
-                top *= 2
-        return end, top
+        within_limits, magnitudes = stiffness_map.within_limits, np.abs(stiffness_map.tau_e)
+        is_carried = np.any(within_limits, axis=0)
+        max_torque, max_stiffness = float(magnitudes[-1]), stiffness_map.top
+        if is_carried.any() and not is_carried[[0, -1]].any():
+            max_torque = max(MARGIN * float(magnitudes[is_carried].max()), LOAD_SHARE * self.load)
+        if is_carried.any() and not within_limits[-1][stiffness_map.upper > max_stiffness].any():
+            max_stiffness = MARGIN * max([*self.limits, float(stiffness_map.levels[within_limits].max())])
+            if not np.ptp(
+                stiffness_map.levels[within_limits]
+            ):  # a linear spring, whose line is in the middle
+                max_stiffness *= 2
+        return max_torque, max_stiffness
 
     @property
     def torques(self) -> list[TorqueCurve]:
         """Torques of the springs over the deflections that occur in the map within all limits."""
-        within = self.stiffness.within
-        unknowns = np.where(within | ~within.any(), self.stiffness.unknowns, np.nan)
-        curves = self._of_mechanism if self.actuator.spring_elements is None else self._of_springs
-        return list(curves(unknowns))
+        within_limits = self.stiffness.within_limits
+        unknowns = np.where(within_limits | ~within_limits.any(), self.stiffness.unknowns, np.nan)
+        torque_curves = (
+            self._mechanism_curves if self.actuator.spring_elements is None else self._spring_curves
+        )
+        return list(torque_curves(unknowns))
 
-    def _of_springs(self, unknowns: FloatArray) -> Iterator[TorqueCurve]:
+    def _spring_curves(self, unknowns: FloatArray) -> Iterator[TorqueCurve]:
         """Yield the torque of each spring, of equal springs only once."""
         theta = self.actuator.motor_positions(unknowns, np.asarray(self.q))
         elements = self.actuator.spring_elements or ()
         limits = (*self.actuator.max_deflections, *[math.inf] * len(elements))
-        kinds = [(element.law, limit) for element, limit in zip(elements, limits, strict=False)]
-        for index, (element, (law, limit)) in enumerate(zip(elements, kinds, strict=True)):
-            if (law, limit) in kinds[:index]:
+        springs = [(element.law, limit) for element, limit in zip(elements, limits, strict=False)]
+        for index, (element, (law, limit)) in enumerate(zip(elements, springs, strict=True)):
+            if (law, limit) in springs[:index]:
                 continue
-            weights = zip(element.motors, theta, strict=True)
-            deflection = element.joint * self.q + sum(weight * moved for weight, moved in weights)
-            reached = limit if math.isfinite(limit) else ROOM * float(np.nanmax(np.abs(deflection)))
-            low, high = (min(max(end, -reached), reached) for end in law.domain)
-            points = np.linspace(low, high, POINTS)
-            same = [number for number, kind in enumerate(kinds, 1) if kind == (law, limit)]
-            name = "spring between the motors" if element.joint == 0 else _numbered(same)
-            yield TorqueCurve(name, points, law.torque(points), limit)
+            weighted_motors = zip(element.motors, theta, strict=True)
+            deflection = element.joint * self.q + sum(
+                weight * position for weight, position in weighted_motors
+            )
+            max_deflection = limit if math.isfinite(limit) else MARGIN * float(np.nanmax(np.abs(deflection)))
+            low, high = (min(max(bound, -max_deflection), max_deflection) for bound in law.domain)
+            deflections = np.linspace(low, high, TORQUE_COUNT)
+            equal_numbers = [number for number, spring in enumerate(springs, 1) if spring == (law, limit)]
+            label = "spring between the motors" if element.joint == 0 else _spring_label(equal_numbers)
+            yield TorqueCurve(label, deflections, law.torque(deflections), limit)
 
-    def _of_mechanism(self, unknowns: FloatArray) -> Iterator[TorqueCurve]:
+    def _mechanism_curves(self, unknowns: FloatArray) -> Iterator[TorqueCurve]:
         """Yield the torque of a mechanism at several settings of motor 2."""
-        settings = np.linspace(np.nanmin(unknowns[1]), np.nanmax(unknowns[1]), SETTINGS)
-        reached = float(np.nanmax(np.abs(unknowns[0])))
-        points = np.linspace(-reached, reached, FINE_POINTS)
-        springs = self.actuator.elasticity([self.actuator])
-        q = np.full((FINE_POINTS, 1), self.q)
-        settings = np.where(np.abs(settings) < ROUNDED * np.ptp(settings), 0.0, settings)
+        settings = np.linspace(np.nanmin(unknowns[1]), np.nanmax(unknowns[1]), SETTING_COUNT)
+        max_deflection = float(np.nanmax(np.abs(unknowns[0])))
+        deflections = np.linspace(-max_deflection, max_deflection, DEFLECTION_COUNT)
+        elasticity = self.actuator.elasticity([self.actuator])
+        q = np.full((DEFLECTION_COUNT, 1), self.q)
+        settings = np.where(np.abs(settings) < ZERO_SHARE * np.ptp(settings), 0.0, settings)
         for setting in np.unique(settings):
-            theta = np.stack((points + self.q, np.full_like(points, setting)), axis=-1)[:, None]
-            torque = springs.torques(springs.coordinates(q, theta)).tau_e[:, 0]
-            shown = np.abs(torque) <= self.stiffness.tau_e[-1]
-            ranged = np.moveaxis(springs.ranged(q, theta)[:, 0], -1, 0)
-            for values, (low, high) in zip(ranged, self.actuator.phi_ranges, strict=True):
-                shown &= (values >= low - INSIDE) & (values <= high + INSIDE)
-            yield TorqueCurve(f"{setting:.3g}", points, np.where(shown, torque, np.nan))
+            theta = np.stack((deflections + self.q, np.full_like(deflections, setting)), axis=-1)[:, None]
+            torque = elasticity.torques(elasticity.coordinates(q, theta)).tau_e[:, 0]
+            is_shown = np.abs(torque) <= self.stiffness.tau_e[-1]
+            ranged_values = np.moveaxis(elasticity.ranged(q, theta)[:, 0], -1, 0)
+            for values, (low, high) in zip(ranged_values, self.actuator.phi_ranges, strict=True):
+                is_shown &= (values >= low - END_DISTANCE) & (values <= high + END_DISTANCE)
+            yield TorqueCurve(f"{setting:.3g}", deflections, np.where(is_shown, torque, np.nan))
 
 
 def actuator_charts(robot: Robot, loads: Sequence[float]) -> list[ActuatorChart]:
@@ -305,7 +319,7 @@ def actuator_charts(robot: Robot, loads: Sequence[float]) -> list[ActuatorChart]
         if not joint.actuator.sprung:
             continue
         for group in groups:
-            if _interchangeable(robot.joints[group[0]], joint):
+            if _have_equal_charts(robot.joints[group[0]], joint):
                 group.append(index)
                 break
         else:
@@ -320,38 +334,40 @@ def actuator_charts(robot: Robot, loads: Sequence[float]) -> list[ActuatorChart]
     ]
 
 
-def _interchangeable(one: Joint, other: Joint) -> bool:
+def _have_equal_charts(joint: Joint, other_joint: Joint) -> bool:
     """Return whether the charts of two joints are equal: springs and limits, whatever the rotors' inertia."""
-    return one.type == other.type and _drawn(one.actuator) == _drawn(other.actuator)
+    return joint.type == other_joint.type and _charted_parameters(joint.actuator) == _charted_parameters(
+        other_joint.actuator
+    )
 
 
-def _drawn(actuator: Actuator) -> tuple[object, ...]:
+def _charted_parameters(actuator: Actuator) -> tuple[object, ...]:
     """Return the parts of an actuator that its charts show."""
-    parts = [
-        getattr(actuator, each.name)
-        for each in fields(cast("DataclassInstance", actuator))
-        if each.name not in ROTORS
+    parameters = [
+        getattr(actuator, field.name)
+        for field in fields(cast("DataclassInstance", actuator))
+        if field.name not in ROTOR_FIELDS
     ]
-    limits = [check for check in actuator.limits if check.variable in LIMITS]
-    return type(actuator), parts, limits
+    limits = [limit for limit in actuator.limits if limit.variable in LIMITS]
+    return type(actuator), parameters, limits
 
 
-def _within(levels: FloatArray, clearance: dict[str, FloatArray]) -> BoolArray:
+def _within_limits(levels: FloatArray, clearance: dict[str, FloatArray]) -> BoolArray:
     """Return where stiffness values exist and keep all limits."""
-    within = np.isfinite(levels)
-    for distance in clearance.values():
-        within &= distance >= 0
-    return within
+    within_limits = np.isfinite(levels)
+    for limit_clearance in clearance.values():
+        within_limits &= limit_clearance >= 0
+    return within_limits
 
 
 def _law_name(law: SpringLaw) -> str:
     """Return the name of a law in robot files."""
     if law.is_linear:
         return "linear"
-    declared = law.law if isinstance(law, Mirrored) else law  # a tendon that acts on side 2
-    return LAWS.name_of(type(declared)).replace("_", " ")
+    declared_law = law.law if isinstance(law, Mirrored) else law  # a tendon that acts on side 2
+    return LAWS.name_of(type(declared_law)).replace("_", " ")
 
 
-def _numbered(numbers: Sequence[int]) -> str:
+def _spring_label(numbers: Sequence[int]) -> str:
     """Return the names of springs by their numbers."""
     return f"springs {' and '.join(map(str, numbers))}" if len(numbers) > 1 else f"spring {numbers[0]}"

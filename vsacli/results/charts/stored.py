@@ -26,9 +26,9 @@ from vsacli.base.variables import (
     deviation,
 )
 from vsacli.base.wrench import WRENCH_AXES
-from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Chart, Failures, Limit, Line, ShadedArea
+from vsacli.results.charts.chart import ATTAINABLE, LIMIT_STYLE, Chart, Failures, Limit, Line, ShadedArea
 from vsacli.results.charts.reduction import (
-    BLOCK,
+    BLOCK_SAMPLES,
     GROWING,
     Curve,
     Sampled,
@@ -40,12 +40,12 @@ from vsacli.results.charts.tool_charts import tool_charts
 from vsacli.results.store.reader import StoredResult
 from vsacli.robot.joint import existing_columns
 
-BOUNDS = ("stiffness_min", "stiffness_max")
+STIFFNESS_BOUNDS = ("stiffness_min", "stiffness_max")
 
-FULL = 100.0
+FULL_UTILIZATION = 100.0
 """Utilization of a limit that is reached, %."""
 
-SPARE = 1.06
+UTILIZATION_MARGIN = 1.06
 """Upper end of an axis of utilizations, relative to the largest value shown."""
 
 NEGLIGIBLE = 1e-6
@@ -54,7 +54,7 @@ NEGLIGIBLE = 1e-6
 Single precision rounds by 6e-8, and interpolation between 700 samples per second by 2e-8 of a motor torque.
 """
 
-FLAT = 0.01
+FLAT_HALF_RANGE = 0.01
 """Half the range of an axis of negligible differences, relative to the largest value that was subtracted."""
 
 By: TypeAlias = Literal["joint", "file", "role"]
@@ -74,39 +74,41 @@ class ResultDifference:
         start = max(result.time[0], other.time[0])
         end = min(result.time[-1], other.time[-1])
         bounds = (np.searchsorted(result.time, start), np.searchsorted(result.time, end, side="right"))
-        self._first, last = map(int, bounds)
-        self.time: FloatArray = result.time[self._first : max(self._first, last)]
+        self._offset, last = map(int, bounds)
+        self.time: FloatArray = result.time[self._offset : max(self._offset, last)]
         self.joint_names = result.joint_names
 
     def read(self, name: str, start: int = 0, stop: int | None = None) -> FloatArray:
         """Return differences at times start..stop-1, in the shape of the variable; NaN where a value is."""
         stop = self.time.size if stop is None else stop
-        own = np.asarray(self._result.read(name, self._first + start, self._first + stop), dtype=np.float64)
+        result_values = np.asarray(
+            self._result.read(name, self._offset + start, self._offset + stop), dtype=np.float64
+        )
         with np.errstate(over="ignore", invalid="ignore"):  # inf - inf is NaN
-            return own - self._interpolated(name, self.time[start:stop])
+            return result_values - self._interpolated(name, self.time[start:stop])
 
     def _interpolated(self, name: str, time: FloatArray) -> FloatArray:
         """Return values of the other result, interpolated linearly between its samples."""
-        steps = self._other.time
-        before = max(int(np.searchsorted(steps, time[0], side="right")) - 1, 0)
-        after = int(np.searchsorted(steps, time[-1])) + 1
-        values = np.asarray(self._other.read(name, before, after), dtype=np.float64)
-        if np.array_equal(steps[before:after], time):
+        times = self._other.time
+        start = max(int(np.searchsorted(times, time[0], side="right")) - 1, 0)
+        stop = int(np.searchsorted(times, time[-1])) + 1
+        values = np.asarray(self._other.read(name, start, stop), dtype=np.float64)
+        if np.array_equal(times[start:stop], time):
             return values
         columns = values.reshape(len(values), -1)
-        found = [np.interp(time, steps[before:after], column) for column in columns.T]
-        return np.stack(found, axis=-1).reshape(len(time), *values.shape[1:])
+        interpolated_columns = [np.interp(time, times[start:stop], column) for column in columns.T]
+        return np.stack(interpolated_columns, axis=-1).reshape(len(time), *values.shape[1:])
 
     def rms(self, name: str) -> FloatArray:
         """Return the root mean square of all finite differences, in the shape of a sample."""
-        total, count = 0.0, 0
+        sum_of_squares, count = 0.0, 0
         with np.errstate(over="ignore", invalid="ignore"):
-            for start in range(0, self.time.size, BLOCK):
-                block = self.read(name, start, min(start + BLOCK, self.time.size))
+            for start in range(0, self.time.size, BLOCK_SAMPLES):
+                block = self.read(name, start, min(start + BLOCK_SAMPLES, self.time.size))
                 block = np.where(np.isfinite(block), block, np.nan)
-                total = total + np.nansum(block**2, axis=0)
+                sum_of_squares = sum_of_squares + np.nansum(block**2, axis=0)
                 count = count + np.count_nonzero(~np.isnan(block), axis=0)
-            return np.asarray(np.sqrt(np.divide(total, count)))
+            return np.asarray(np.sqrt(np.divide(sum_of_squares, count)))
 
 
 class StoredSignals:
@@ -124,31 +126,50 @@ class StoredSignals:
         self,
         files: Mapping[int, Sampled],
         roles: Mapping[str, str],
-        width: int,
-        spread: str = "",
+        curves_per_joint: int,
+        deviation_name: str = "",
         rms: Mapping[int, FloatArray] | None = None,
     ) -> None:
-        names = [*roles, spread] if spread else list(roles)
+        names = [*roles, deviation_name] if deviation_name else list(roles)
         self._curves = {number: read_curves(file, names) for number, file in files.items()}
-        self._names = next(iter(files.values())).joint_names if files else ()
-        self._roles, self._width, self._spread, self._rms = list(roles.values()), width, spread, rms
+        self._joint_names = next(iter(files.values())).joint_names if files else ()
+        self._roles, self._curves_per_joint, self._deviation_name, self._rms = (
+            list(roles.values()),
+            curves_per_joint,
+            deviation_name,
+            rms,
+        )
 
     def lines(self, column: int, joints: Sequence[int], by: By = "joint") -> list[Line]:
         """Return a line for each file, role and joint."""
         return [
-            self._line(file, at, joint, column, {"joint": joint, "file": file, "role": at}[by])
+            self._line(
+                file, role_index, joint, column, {"joint": joint, "file": file, "role": role_index}[by]
+            )
             for file in self._curves
-            for at in range(len(self._roles))
+            for role_index in range(len(self._roles))
             for joint in joints
         ]
 
-    def _line(self, file: int, at: int, joint: int, column: int, look: int) -> Line:
+    def _line(self, file: int, role_index: int, joint: int, column: int, style_index: int) -> Line:
         curves, band = self._curves[file][joint], None
-        curve = curves[at * self._width + column]
-        if self._spread:
-            band = ShadedArea.around(curve, curves.values[len(self._roles) * self._width + column], look)
+        curve = curves[role_index * self._curves_per_joint + column]
+        if self._deviation_name:
+            band = ShadedArea.around(
+                curve, curves.values[len(self._roles) * self._curves_per_joint + column], style_index
+            )
         rms = None if self._rms is None else float(self._rms[file][joint, column])
-        return Line(curve, look, self._names[joint], joint, joint, file, self._roles[at], band, rms)
+        return Line(
+            curve,
+            style_index,
+            self._joint_names[joint],
+            joint,
+            joint,
+            file,
+            self._roles[role_index],
+            band,
+            rms,
+        )
 
 
 class StoredCharts:
@@ -189,19 +210,27 @@ class StoredCharts:
     def signals(self, roles: Mapping[str, str], *, uncertain: bool = True) -> StoredSignals:
         """Read a variable by the names of its roles, with its standard deviation if `uncertain`."""
         name = next(iter(roles))
-        spread = deviation(name) if uncertain and deviation(name) in self.common else ""
-        width = self.existing(self.first.declared[name]).shape[1]
-        return StoredSignals(dict(enumerate(self.files)), roles, width, spread)
+        deviation_name = deviation(name) if uncertain and deviation(name) in self.common else ""
+        curves_per_joint = self.existing(self.first.declared[name]).shape[1]
+        return StoredSignals(dict(enumerate(self.files)), roles, curves_per_joint, deviation_name)
 
     def differences(self, name: str) -> StoredSignals:
         """Read a variable of the other files minus that of the first file, at common times."""
-        several = {
-            number: ResultDifference(file, self.first) for number, file in enumerate(self.files[1:], 1)
+        all_differences = {
+            file_number: ResultDifference(file, self.first)
+            for file_number, file in enumerate(self.files[1:], 1)
         }
-        apart = {number: each for number, each in several.items() if each.time.size}
-        rms = {number: each.rms(name).reshape(len(each.joint_names), -1) for number, each in apart.items()}
+        differences = {
+            file_number: difference
+            for file_number, difference in all_differences.items()
+            if difference.time.size
+        }
+        rms = {
+            file_number: difference.rms(name).reshape(len(difference.joint_names), -1)
+            for file_number, difference in differences.items()
+        }
         return StoredSignals(
-            apart, {name: "computed"}, self.existing(self.first.declared[name]).shape[1], rms=rms
+            differences, {name: "computed"}, self.existing(self.first.declared[name]).shape[1], rms=rms
         )
 
     def chart(
@@ -209,7 +238,7 @@ class StoredCharts:
     ) -> Chart:
         """Return the chart of a curve of some joints, all of one type, without title."""
         lines = signals.lines(column, joints, by)
-        shown = self.calm(lines) if name in GROWING else None
+        y_limits = self.calm(lines) if name in GROWING else None
         unit = self.first.declared[name].quantity.unit(self.first.joint_types[joints[0]])
         return Chart(
             "",
@@ -217,9 +246,9 @@ class StoredCharts:
             lines,
             name=name,
             limits=self._limits(name, column, joints),
-            shown=shown,
-            cut_off=shown is not None,
-            note=self._undefined(lines),
+            shown=y_limits,
+            cut_off=y_limits is not None,
+            note=self._undefined_note(lines),
         )
 
     def with_utilization(self, chart: Chart, column: int) -> tuple[Chart, Chart | None]:
@@ -228,11 +257,15 @@ class StoredCharts:
         Limits of several joints could not be told apart; the chart is returned without those that the
         utilization shows.
         """
-        used = self._utilization(chart, column) if len({line.joint for line in chart.lines}) > 1 else None
-        if used is None:
+        utilization = (
+            self._utilization(chart, column) if len({line.joint for line in chart.lines}) > 1 else None
+        )
+        if utilization is None:
             return chart, None
-        elsewhere = {line.joint for line in used.lines}
-        return replace(chart, limits=[each for each in chart.limits if each.joint not in elsewhere]), used
+        utilized_joints = {line.joint for line in utilization.lines}
+        return replace(
+            chart, limits=[limit for limit in chart.limits if limit.joint not in utilized_joints]
+        ), utilization
 
     def _utilization(self, chart: Chart, column: int) -> Chart | None:
         """Return the utilization of the limits of a chart; None if no joint has a lower and an upper limit.
@@ -245,49 +278,59 @@ class StoredCharts:
         for line in chart.lines:
             low, high = bounds[line.joint].tolist()
             if np.isfinite(high - low) and high > low:
-                share = np.abs(2 * line.curve.values - high - low) / (high - low)
-                lines.append(line._replace(curve=Curve(line.curve.time, FULL * share), band=None))
+                utilization = np.abs(2 * line.curve.values - high - low) / (high - low)
+                lines.append(
+                    line._replace(curve=Curve(line.curve.time, FULL_UTILIZATION * utilization), band=None)
+                )
         if not lines:
             return None
-        shown = self.calm(lines) if chart.name in GROWING else None
-        peaks = [np.nanmax(line.curve.values, initial=0) for line in lines] if shown is None else [shown[1]]
+        y_limits = self.calm(lines) if chart.name in GROWING else None
+        peaks = (
+            [np.nanmax(line.curve.values, initial=0) for line in lines] if y_limits is None else [y_limits[1]]
+        )
         return Chart(
             "",
             "%",
             lines,
             axis="utilization [%]",
             name=chart.name,
-            limits=[Limit(LIMIT_LOOK, 0, FULL)],
-            shown=(0.0, SPARE * max(FULL, *peaks)),
-            cut_off=shown is not None,
+            limits=[Limit(LIMIT_STYLE, 0, FULL_UTILIZATION)],
+            shown=(0.0, UTILIZATION_MARGIN * max(FULL_UTILIZATION, *peaks)),
+            cut_off=y_limits is not None,
         )
 
-    def _undefined(self, lines: Sequence[Line]) -> str:
+    def _undefined_note(self, lines: Sequence[Line]) -> str:
         """Return a sentence that names the joints without a value at any time; empty if there are none."""
-        missing = [line for line in lines if not np.isfinite(line.curve.values).any()]
-        failed = any(self.failures[line.file].infeasible[line.joint].any() for line in missing)
-        names = ", ".join(dict.fromkeys(line.label for line in missing))
-        return f"undefined{' because of infeasible samples' if failed else ''}: {names}" if missing else ""
+        undefined_lines = [line for line in lines if not np.isfinite(line.curve.values).any()]
+        has_infeasible = any(
+            self.failures[line.file].infeasible[line.joint].any() for line in undefined_lines
+        )
+        names = ", ".join(dict.fromkeys(line.label for line in undefined_lines))
+        return (
+            f"undefined{' because of infeasible samples' if has_infeasible else ''}: {names}"
+            if undefined_lines
+            else ""
+        )
 
-    def calm(self, lines: Sequence[Line], *others: int) -> tuple[float, float] | None:
+    def calm(self, lines: Sequence[Line], *other_files: int) -> tuple[float, float] | None:
         """Return the range of an axis without near-singular peaks; None if they do not matter.
 
         Args:
             lines: lines of joints.
-            others: numbers of further files that must be calm, as for differences.
+            other_files: numbers of further files that must be calm, as for differences.
         """
-        calm = []
+        masks = []
         for line in lines:
             assert line.joint is not None, "as of all variables that grow"
-            of_files = [
-                self.failures[file].calm(line.joint, line.curve.time) for file in (line.file, *others)
+            file_masks = [
+                self.failures[file].calm(line.joint, line.curve.time) for file in (line.file, *other_files)
             ]
-            calm.append(np.all(of_files, axis=0))
-        return calm_range([line.curve.values for line in lines], calm)
+            masks.append(np.all(file_masks, axis=0))
+        return calm_range([line.curve.values for line in lines], masks)
 
     def corridors(self) -> Iterator[Chart]:
         """Yield the stiffness of each joint within its attainable range, if that is stored."""
-        bounds = BOUNDS if set(BOUNDS) <= set(self.common) else ()
+        bounds = STIFFNESS_BOUNDS if set(STIFFNESS_BOUNDS) <= set(self.common) else ()
         curves = read_curves(self.first, ["stiffness", *bounds])
         quantity = VARIABLES["stiffness"].quantity
         for joint in self.compliant:
@@ -324,31 +367,36 @@ class StoredCharts:
         if name == TIP_COMPLIANCE:
             return list(tool_charts(self.files))
         if "joint" not in variable.dims:
-            return list(self._of_wrench(variable)) if isinstance(variable.quantity, WrenchQuantity) else []
+            return (
+                list(self._wrench_charts(variable)) if isinstance(variable.quantity, WrenchQuantity) else []
+            )
         columns = list(self._columns(variable))
-        if name == "stiffness" and set(BOUNDS) <= set(self.common) and len(self.files) == 1:
-            return [replace(each, title=f"{variable.long_name}, {each.title}") for each in self.corridors()]
+        if name == "stiffness" and set(STIFFNESS_BOUNDS) <= set(self.common) and len(self.files) == 1:
+            return [
+                replace(corridor, title=f"{variable.long_name}, {corridor.title}")
+                for corridor in self.corridors()
+            ]
         roles = self._roles(name)
         charts = []
         if roles:
             signals = self.signals(roles)
             for column, title, joints in columns:
-                chart, used = self.with_utilization(self.chart(name, signals, column, joints), column)
+                chart, utilization = self.with_utilization(self.chart(name, signals, column, joints), column)
                 charts.append(replace(chart, title=title))
-                if used is not None:
-                    charts.append(replace(used, title=f"{title}: utilization of limits"))
-        for outcome in roles if len(self.files) > 1 else ():
-            apart = self.differences(outcome)
+                if utilization is not None:
+                    charts.append(replace(utilization, title=f"{title}: utilization of limits"))
+        for stored_name in roles if len(self.files) > 1 else ():
+            differences = self.differences(stored_name)
             for column, title, joints in columns:
                 unit = variable.quantity.unit(self.first.joint_types[joints[0]])
-                lines = apart.lines(column, joints)
-                shown = flat_range(lines, signals.lines(column, joints))
-                note = "" if shown is None else f"equal within {NEGLIGIBLE:g} of the largest value"
+                lines = differences.lines(column, joints)
+                y_limits = flat_range(lines, signals.lines(column, joints))
+                note = "" if y_limits is None else f"equal within {NEGLIGIBLE:g} of the largest value"
                 if lines:
-                    apart_chart = Chart(
-                        f"difference: {title}", unit, lines, name=name, shown=shown, note=note
+                    difference_chart = Chart(
+                        f"difference: {title}", unit, lines, name=name, shown=y_limits, note=note
                     )
-                    charts.append(apart_chart)
+                    charts.append(difference_chart)
         return charts
 
     def _roles(self, name: str) -> dict[str, str]:
@@ -356,36 +404,40 @@ class StoredCharts:
         simulated = self.first.kind == "simulation" and name in SIMULATED
         roles = {COMMANDS[name]: "commanded"} if simulated and name in COMMANDS else {}
         roles |= {name: "simulated" if simulated else "computed", measured(name): "measured"}
-        wanted = roles if len(self.files) == 1 else (name,)
-        return {stored: roles[stored] for stored in wanted if stored in self.common}
+        names = roles if len(self.files) == 1 else (name,)
+        return {stored_name: roles[stored_name] for stored_name in names if stored_name in self.common}
 
     def _columns(self, variable: Variable) -> Iterator[tuple[int, str, list[int]]]:
         """Yield each column of a variable and type of joint, with a title and the joints that have it."""
-        there, types = self.existing(variable), self.first.joint_types
+        existing, joint_types = self.existing(variable), self.first.joint_types
         words = variable.long_name
-        for column in range(there.shape[1]):
-            motor = f", motor {MOTORS[column]}" if "motor" in variable.dims else ""
-            for joint_type in dict.fromkeys(types):
-                joints = [at for at, each in enumerate(types) if each == joint_type and there[at, column]]
-                kind = f" ({joint_type} joints)" if len(set(types)) > 1 else ""
+        for column in range(existing.shape[1]):
+            motor_text = f", motor {MOTORS[column]}" if "motor" in variable.dims else ""
+            for joint_type in dict.fromkeys(joint_types):
+                joints = [
+                    joint
+                    for joint, other_type in enumerate(joint_types)
+                    if other_type == joint_type and existing[joint, column]
+                ]
+                type_text = f" ({joint_type} joints)" if len(set(joint_types)) > 1 else ""
                 if joints:
-                    yield column, f"{words}{motor}{kind}", joints
+                    yield column, f"{words}{motor_text}{type_text}", joints
 
-    def _of_wrench(self, variable: Variable) -> Iterator[Chart]:
+    def _wrench_charts(self, variable: Variable) -> Iterator[Chart]:
         """Yield charts of forces and of moments, on each of several tools."""
         assert isinstance(variable.quantity, WrenchQuantity), "see WRENCH_AXES"
         curves = [read_curves(_Components(file, variable), [variable.name]) for file in self.files]
-        tools = [f" on {tool}" for tool in self.first.tool_names] if "tool" in variable.dims else [""]
-        for number, on_tool in enumerate(tools):
-            before = number * len(WRENCH_AXES)
+        tool_texts = [f" on {tool}" for tool in self.first.tool_names] if "tool" in variable.dims else [""]
+        for tool_index, tool_text in enumerate(tool_texts):
+            first_component = tool_index * len(WRENCH_AXES)
             for words, axes in (("forces", range(3)), ("moments", range(3, 6))):
                 lines = [
-                    Line(of_file[before + axis][0], axis, WRENCH_AXES[axis], axis % 3, file=file)
-                    for file, of_file in enumerate(curves)
+                    Line(file_curves[first_component + axis][0], axis, WRENCH_AXES[axis], axis % 3, file=file)
+                    for file, file_curves in enumerate(curves)
                     for axis in axes
                 ]
                 unit = variable.quantity.of_axis(axes[0])
-                yield Chart(f"{variable.long_name}, {words}{on_tool}", unit, lines, name=variable.name)
+                yield Chart(f"{variable.long_name}, {words}{tool_text}", unit, lines, name=variable.name)
 
 
 class _Components:
@@ -410,14 +462,18 @@ def flat_range(differences: Sequence[Line], lines: Sequence[Line]) -> tuple[floa
         differences: differences of curves.
         lines: the curves.
     """
-    apart, peak = (
-        max((float(np.nanmax(np.abs(line.curve.values), initial=0.0)) for line in each), default=0.0)
-        for each in (differences, lines)
+    largest_difference, largest_value = (
+        max((float(np.nanmax(np.abs(line.curve.values), initial=0.0)) for line in curves), default=0.0)
+        for curves in (differences, lines)
     )
-    return (-FLAT * peak, FLAT * peak) if 0 < peak < np.inf and apart <= NEGLIGIBLE * peak else None
+    return (
+        (-FLAT_HALF_RANGE * largest_value, FLAT_HALF_RANGE * largest_value)
+        if 0 < largest_value < np.inf and largest_difference <= NEGLIGIBLE * largest_value
+        else None
+    )
 
 
 def compliant_joints(actuators: Sequence[str]) -> list[int]:
     """Return the joints with a stiffness, by the types of their actuators."""
-    there = existing_columns(VARIABLES["stiffness"], actuators)
-    return [joint for joint, [has_stiffness] in enumerate(there) if has_stiffness]
+    existing = existing_columns(VARIABLES["stiffness"], actuators)
+    return [joint for joint, [has_stiffness] in enumerate(existing) if has_stiffness]

@@ -41,14 +41,14 @@ COSTS = {
 """Columns that hold the cost of a motion, in order of preference, with their labels; `{}` stands for the
 table's."""
 
-OF_OPTIMUM = " of the optimum"
+OPTIMUM_SUFFIX = " of the optimum"
 """End of the description of a cost after the optimization."""
 
-ADDED = "J"
+SUMMED_UNIT = "J"
 """Unit of costs that are summed over the joints; of other costs the maximum counts."""
 
 
-ROOM_BESIDE, LEAST_ROOM = 0.04, 0.002
+MARGIN_SHARE, MIN_MARGIN = 0.04, 0.002
 """Space next to the smallest and the largest margin, relative to their distance, and its minimum."""
 
 
@@ -64,9 +64,9 @@ class Shares(NamedTuple):
         """Return the shares of counts in a number of runs, with Wilson's intervals (1927)."""
         values, square = counts / runs, NORMAL_95**2
         center = (values + square / (2 * runs)) / (1 + square / runs)
-        spread = np.sqrt(values * (1 - values) / runs + square / (4 * runs**2))
-        half = NORMAL_95 * spread / (1 + square / runs)
-        return cls(values, np.maximum(0.0, center - half), np.minimum(1.0, center + half))
+        standard_error = np.sqrt(values * (1 - values) / runs + square / (4 * runs**2))
+        half_width = NORMAL_95 * standard_error / (1 + square / runs)
+        return cls(values, np.maximum(0.0, center - half_width), np.minimum(1.0, center + half_width))
 
 
 def count_verdicts(verdicts: Sequence[str]) -> dict[str, int]:
@@ -88,8 +88,8 @@ def verdict_counts_text(counts: Mapping[str, int]) -> str:
 def runs_are_independent(table: StoredStudy) -> bool:
     """Return whether the runs are independent random draws, so that shares of them have intervals."""
     # each trajectory has the same draws, so that runs of several are not independent
-    drawn = str(table.attributes.get("method", "")) in DRAWN
-    return drawn and len(set(table.texts("trajectory"))) == 1
+    is_random = str(table.attributes.get("method", "")) in DRAWN
+    return is_random and len(set(table.texts("trajectory"))) == 1
 
 
 def ok_share(counts: Mapping[str, int]) -> tuple[float, float, float]:
@@ -100,11 +100,13 @@ def ok_share(counts: Mapping[str, int]) -> tuple[float, float, float]:
 
 def verdict_shares_lines(counts: Mapping[str, int], *, random: bool) -> list[str]:
     """Return the share of ok runs, with its interval for random draws, and those of other verdicts."""
-    share, low, high = (100 * each for each in ok_share(counts))
+    share, low, high = (100 * value for value in ok_share(counts))
     interval = f" ({low:.3g} to {high:.3g} %)" if random else ""
     percent = {verdict: 100 * count / sum(counts.values()) for verdict, count in counts.items()}
-    others = [f"{verdict_label(verdict)} {percent[verdict]:.3g} %" for verdict in counts if verdict != OK]
-    return [f"{OK} {share:.3g} %{interval}", *([", ".join(others)] if others else [])]
+    other_shares = [
+        f"{verdict_label(verdict)} {percent[verdict]:.3g} %" for verdict in counts if verdict != OK
+    ]
+    return [f"{OK} {share:.3g} %{interval}", *([", ".join(other_shares)] if other_shares else [])]
 
 
 class StudyPoints:
@@ -129,16 +131,16 @@ class StudyPoints:
             what = "no runs" if not table.rows else "no margin; put it into `keep:` of the study"
             raise InputError.one(f"nothing can be drawn: it has {what}", table.path)
         self.name, self.runs, self._table = table.study_name, table.read("run"), table
-        self.margin = _least(table.read("margin"))
+        self.margin = _smallest_margins(table.read("margin"))
         self.verdicts, self.first_limits = table.texts("verdict"), table.texts(FIRST_LIMIT)
         self.counts = count_verdicts(self.verdicts)
-        self.ok: BoolArray = self.having(OK)
+        self.ok: BoolArray = self.has_verdict(OK)
         self.random = runs_are_independent(table)
         self._method = str(table.attributes.get("method", ""))
 
-    def having(self, verdict: str) -> BoolArray:
+    def has_verdict(self, verdict: str) -> BoolArray:
         """Return whether each run has a verdict, (rows,)."""
-        return np.array([each == verdict for each in self.verdicts], dtype=np.bool_)
+        return np.array([run_verdict == verdict for run_verdict in self.verdicts], dtype=np.bool_)
 
     @property
     def title(self) -> str:
@@ -150,8 +152,10 @@ class StudyPoints:
     def varying(self) -> dict[str, FloatArray]:
         """Values of the numeric parameters that are not the same in all rows, by path."""
         table = self._table
-        found = {path: table.read(path) for path in table.parameters if not table.parameter_is_text(path)}
-        return {path: values for path, values in found.items() if np.ptp(values) > 0}
+        numeric_values = {
+            path: table.read(path) for path in table.parameters if not table.parameter_is_text(path)
+        }
+        return {path: values for path, values in numeric_values.items() if np.ptp(values) > 0}
 
     @cached_property
     def cost(self) -> tuple[str, FloatArray] | None:
@@ -172,20 +176,20 @@ class StudyPoints:
     def cost_words(self) -> str:
         """Label of the cost, without saying of which motion; requires a cost."""
         assert self.cost is not None, "a label requires a cost"
-        return self.cost[0].replace(OF_OPTIMUM, "")
+        return self.cost[0].replace(OPTIMUM_SUFFIX, "")
 
     @property
-    def shown(self) -> list[tuple[str, FloatArray]]:
+    def drawn_columns(self) -> list[tuple[str, FloatArray]]:
         """Columns to draw over the parameters: margin and cost, or for optima the costs before and after."""
         cost = [] if self.cost is None else [self.cost]
         first = self.cost_before if self.optimized else ("smallest margin [%]", 100 * self.margin)
         return [first, *cost]
 
     def _cost(self, name: str) -> tuple[str, FloatArray]:
-        values, column = _there(self._table.read(name)), self._table.column(name)
+        values, column = _without_empty_columns(self._table.read(name)), self._table.column(name)
         unit = column.quantity.revolute
         words = COSTS.get(name, "{}").format(column.long_name)
-        return f"{words} [{unit}]", values.sum(axis=1) if unit == ADDED else values.max(axis=1)
+        return f"{words} [{unit}]", values.sum(axis=1) if unit == SUMMED_UNIT else values.max(axis=1)
 
     @property
     def shares_lines(self) -> list[str]:
@@ -204,12 +208,12 @@ class StudyPoints:
         finite = np.isfinite(self.margin)
         if not finite.any():
             return np.empty(0), Shares.of(np.empty(0), len(finite))
-        least, largest = (float(end(self.margin[finite])) for end in (np.min, np.max))
-        room = max(ROOM_BESIDE * (largest - least), LEAST_ROOM)
+        least, largest = (float(ufunc(self.margin[finite])) for ufunc in (np.min, np.max))
+        margin = max(MARGIN_SHARE * (largest - least), MIN_MARGIN)
         margins = np.sort(self.margin[finite & counted_runs])
         counts = [len(margins), *range(len(margins), -1, -1)]
-        ends = np.concatenate(([least - room], margins, [largest + room]))
-        return ends, Shares.of(np.array(counts, dtype=float), len(finite))
+        extended_margins = np.concatenate(([least - margin], margins, [largest + margin]))
+        return extended_margins, Shares.of(np.array(counts, dtype=float), len(finite))
 
     def words(self, path: str) -> str:
         """Return a parameter in words."""
@@ -233,18 +237,18 @@ class StudyPoints:
         rows = np.flatnonzero(self.ok & np.isfinite(self.cost[1]) & np.isfinite(self.margin))
         rows = rows[np.lexsort((self.cost[1][rows], -self.margin[rows]))]
         cost = self.cost[1][rows]
-        before = np.concatenate([[np.inf], np.minimum.accumulate(cost)[:-1]])
-        return rows[cost < before][::-1]
+        cheapest_before = np.concatenate([[np.inf], np.minimum.accumulate(cost)[:-1]])
+        return rows[cost < cheapest_before][::-1]
 
 
-def _least(margins: FloatArray) -> FloatArray:
+def _smallest_margins(margins: FloatArray) -> FloatArray:
     """Return the smallest margin of all joints; joints without an attainable range are ignored."""
     least: FloatArray = np.where(np.isnan(margins), np.inf, margins).min(axis=1)
     return np.where(np.isinf(least), np.nan, least)
 
 
-def _there(costs: FloatArray) -> FloatArray:
+def _without_empty_columns(costs_by_run: FloatArray) -> FloatArray:
     """Return costs (rows, ...) as (rows, columns), without columns that are NaN in every row."""
-    costs = costs.reshape(len(costs), -1)
-    there = ~np.isnan(costs).all(axis=0)
-    return costs[:, there] if there.any() else costs
+    costs_by_run = costs_by_run.reshape(len(costs_by_run), -1)
+    has_cost = ~np.isnan(costs_by_run).all(axis=0)
+    return costs_by_run[:, has_cost] if has_cost.any() else costs_by_run

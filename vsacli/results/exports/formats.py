@@ -22,7 +22,7 @@ from vsacli.base.arrays import AnyArray
 from vsacli.base.errors import InputError
 from vsacli.base.variables import VARIABLES, Labels, row_shape, variables_by_tool
 from vsacli.results.exports.result_format import ResultFormat
-from vsacli.results.exports.selection import Chosen, ExportSamples, Selection
+from vsacli.results.exports.selection import ExportSamples, ExportVariable, Selection
 from vsacli.results.store.schema import storage_type, variable_attributes
 
 if TYPE_CHECKING:
@@ -30,17 +30,19 @@ if TYPE_CHECKING:
     import xarray
 
 
-def write_csv(selection: Selection, stream: TextIO, done: Callable[[int], object]) -> None:
+def write_csv(selection: Selection, stream: TextIO, advance: Callable[[int], object]) -> None:
     """Write a header line and a line for each sample; open a file with newline=""."""
     labels = selection.result.labels
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["time", *(column for each in selection.chosen for column in each.columns(labels))])
+    writer.writerow(
+        ["time", *(column for variable in selection.variables for column in variable.columns(labels))]
+    )
     for block in selection.blocks():
         columns = [block.time.tolist()]
-        for each in selection.chosen:
-            columns += _cells(each.of_columns(block.values[each.name]))
+        for variable in selection.variables:
+            columns += _cells(variable.column_values(block.values[variable.name]))
         writer.writerows(zip(*columns, strict=True))
-        done(len(block.time) * len(selection.chosen))
+        advance(len(block.time) * len(selection.variables))
 
 
 def _cells(columns: npt.NDArray[Any]) -> list[list[Any]]:
@@ -60,23 +62,23 @@ MAX_VARIABLE_BYTES = 2**31 - 2**16
 """Maximum size of a variable: the format counts bytes in 32 bits, readers in 31; less the header."""
 
 
-def write_mat(selection: Selection, stream: IO[bytes], done: Callable[[int], object]) -> None:
+def write_mat(selection: Selection, stream: IO[bytes], advance: Callable[[int], object]) -> None:
     """Write `time`, each variable (samples, joints[, 2]), or by tool, and names and units.
 
     Each variable is read when it is written, so that only one is in memory.
     """
     scipy.io.savemat(
-        cast("Any", stream), _Variables(selection, done), oned_as="column", long_field_names=True
+        cast("Any", stream), _Variables(selection, advance), oned_as="column", long_field_names=True
     )
 
 
 def check_sizes(selection: Selection) -> None:
     """Refuse a variable that is too large for the format."""
-    for chosen in selection.chosen:
-        size = len(selection.time) * chosen.there.size * np.dtype(np.float64).itemsize
+    for variable in selection.variables:
+        size = len(selection.time) * variable.existing.size * np.dtype(np.float64).itemsize
         if size > MAX_VARIABLE_BYTES:
             reason = (
-                f"{chosen.name} has {size:,} bytes, and a variable of a MATLAB file of version 5 must stay "
+                f"{variable.name} has {size:,} bytes, and a variable of a MATLAB file of version 5 must stay "
                 "below 2 GB; take a lower --rate, or read the result itself, whose variables h5read gives"
             )
             raise InputError.one(reason, selection.result.path)
@@ -85,32 +87,34 @@ def check_sizes(selection: Selection) -> None:
 class _Variables(Mapping[str, Any]):
     """The variables of the file by name, each created on access."""
 
-    def __init__(self, selection: Selection, done: Callable[[int], object]) -> None:
-        tools = {"tool_names": lambda: _cell_array(selection.result.tool_names)}
-        by_tool = any("tool" in each.variable.dims for each in selection.chosen)
-        self._made: dict[str, Callable[[], Any]] = {
+    def __init__(self, selection: Selection, advance: Callable[[int], object]) -> None:
+        tool_entry = {"tool_names": lambda: _cell_array(selection.result.tool_names)}
+        by_tool = any("tool" in variable.variable.dims for variable in selection.variables)
+        self._readers: dict[str, Callable[[], Any]] = {
             "joint_names": lambda: _cell_array(selection.result.joint_names),
             "joint_types": lambda: _cell_array(selection.result.joint_types),
-            **(tools if by_tool else {}),
+            **(tool_entry if by_tool else {}),
             "units": lambda: _units(selection),
             "time": lambda: selection.time,
-            **{each.name: _reading(selection, each, done) for each in selection.chosen},
+            **{variable.name: _reader(selection, variable, advance) for variable in selection.variables},
         }
 
     def __getitem__(self, name: str) -> Any:
-        return self._made[name]()
+        return self._readers[name]()
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._made)
+        return iter(self._readers)
 
     def __len__(self) -> int:
-        return len(self._made)
+        return len(self._readers)
 
 
-def _reading(selection: Selection, chosen: Chosen, done: Callable[[int], object]) -> Callable[[], Any]:
+def _reader(
+    selection: Selection, variable: ExportVariable, advance: Callable[[int], object]
+) -> Callable[[], Any]:
     def read() -> Any:
-        values = selection.read(chosen, 0, len(selection.time))
-        done(len(values))
+        values = selection.read(variable, 0, len(selection.time))
+        advance(len(values))
         return values
 
     return read
@@ -124,8 +128,8 @@ def _cell_array(texts: Sequence[str]) -> Any:
 def _units(selection: Selection) -> dict[str, Any]:
     """Return the units of each variable by name: one for each joint, or each axis of the wrench, by tool."""
     types, labels = selection.result.joint_types, selection.result.labels
-    units = {each.name: _cell_array(each.units(types)) for each in selection.chosen}
-    for variable in (each.variable for each in selection.chosen if "tool" in each.variable.dims):
+    units = {variable.name: _cell_array(variable.units(types)) for variable in selection.variables}
+    for variable in (chosen.variable for chosen in selection.variables if "tool" in chosen.variable.dims):
         units[variable.name] = units[variable.name].reshape(row_shape(variable, labels))
     return {"time": "s", **units}
 
@@ -133,11 +137,11 @@ def _units(selection: Selection) -> dict[str, Any]:
 MAT = ResultFormat(write_mat, binary=True, missing="NaN", check=check_sizes)
 
 
-OF_RESULT = ("robot_name", "trajectory_name", "verdict")
+RESULT_ATTRIBUTES = ("robot_name", "trajectory_name", "verdict")
 """Attributes of the result that are stored in the metadata of the table."""
 
 
-def write_parquet(selection: Selection, stream: IO[bytes], done: Callable[[int], object]) -> None:
+def write_parquet(selection: Selection, stream: IO[bytes], advance: Callable[[int], object]) -> None:
     """Write the columns of the CSV in row groups, one of which is in memory at a time."""
     from pyarrow import Table, array, parquet
 
@@ -145,11 +149,11 @@ def write_parquet(selection: Selection, stream: IO[bytes], done: Callable[[int],
     with parquet.ParquetWriter(stream, schema) as writer:
         for block in selection.blocks():
             columns = [block.time]
-            for each in selection.chosen:
-                columns += list(each.of_columns(block.values[each.name]))
+            for variable in selection.variables:
+                columns += list(variable.column_values(block.values[variable.name]))
             arrays = [array(column, mask=np.isnan(column)) for column in columns]
             writer.write_table(Table.from_arrays(arrays, schema=schema))
-            done(len(block.time) * len(selection.chosen))
+            advance(len(block.time) * len(selection.variables))
 
 
 def check_installed(_selection: Selection) -> None:
@@ -164,24 +168,24 @@ def check_installed(_selection: Selection) -> None:
 def _schema(selection: Selection) -> pyarrow.Schema:
     import pyarrow
 
-    of_result: dict[Any, Any] = {name: getattr(selection.result, name) for name in OF_RESULT}
+    metadata: dict[Any, Any] = {name: getattr(selection.result, name) for name in RESULT_ATTRIBUTES}
     return pyarrow.schema(
         [
-            pyarrow.field(name, pyarrow.from_numpy_dtype(kind), metadata={"unit": unit})
-            for name, kind, unit in _columns(selection)
+            pyarrow.field(name, pyarrow.from_numpy_dtype(dtype), metadata={"unit": unit})
+            for name, dtype, unit in _column_fields(selection)
         ],
-        metadata=of_result,
+        metadata=metadata,
     )
 
 
-def _columns(selection: Selection) -> Iterator[tuple[str, np.dtype[Any], str]]:
+def _column_fields(selection: Selection) -> Iterator[tuple[str, np.dtype[Any], str]]:
     """Yield name, type and unit of each column."""
     result = selection.result
     yield "time", np.dtype(np.float64), "s"
-    for each in selection.chosen:
-        units = np.repeat(each.units(result.joint_types), each.there.sum(axis=1)).tolist()
-        for name, unit in zip(each.columns(result.labels), units, strict=True):
-            yield name, storage_type(each.variable), unit
+    for variable in selection.variables:
+        units = np.repeat(variable.units(result.joint_types), variable.existing.sum(axis=1)).tolist()
+        for name, unit in zip(variable.columns(result.labels), units, strict=True):
+            yield name, storage_type(variable.variable), unit
 
 
 PARQUET = ResultFormat(write_parquet, binary=True, missing="nulls", check=check_installed)
@@ -203,24 +207,24 @@ LONGEST = 2**31 - 1
 
 def check_fields(selection: Selection) -> None:
     """Refuse variables without a field, a selection without positions, and times that are too long."""
-    names = {each.name for each in selection.chosen}
-    strange = sorted(names - set(FIELDS.values()))
-    if strange:
-        *others, last = FIELDS.values()
-        held = f"{', '.join(others)} and {last}"
+    names = {variable.name for variable in selection.variables}
+    without_field = sorted(names - set(FIELDS.values()))
+    if without_field:
+        *first_names, last_name = FIELDS.values()
+        fields_text = f"{', '.join(first_names)} and {last_name}"
         raise InputError.one(
-            f"--variables: a JointTrajectory cannot hold {', '.join(strange)}; it holds {held}"
+            f"--variables: a JointTrajectory cannot hold {', '.join(without_field)}; it holds {fields_text}"
         )
     if FIELDS["positions"] not in names:
         raise InputError.one(f"a JointTrajectory needs positions: add {FIELDS['positions']} to --variables")
     if selection.time.size and selection.time[-1] - selection.time[0] > LONGEST:
-        lasts = f"lasts {selection.time[-1] - selection.time[0]:.4g} s"
+        duration_text = f"lasts {selection.time[-1] - selection.time[0]:.4g} s"
         raise InputError.one(
-            f"{lasts}, and a JointTrajectory counts seconds up to {LONGEST}", selection.result.path
+            f"{duration_text}, and a JointTrajectory counts seconds up to {LONGEST}", selection.result.path
         )
 
 
-def write_joint_trajectory(selection: Selection, stream: TextIO, done: Callable[[int], object]) -> None:
+def write_joint_trajectory(selection: Selection, stream: TextIO, advance: Callable[[int], object]) -> None:
     """Write the message, a line for each point; `time_from_start` counts from the first sample."""
     names = json.dumps(list(selection.result.joint_names))
     stream.write('{"header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},\n')
@@ -230,18 +234,18 @@ def write_joint_trajectory(selection: Selection, stream: TextIO, done: Callable[
         points = ",\n".join(map(json.dumps, _points(selection, block)))
         stream.write(separator + WITHOUT_POINT.sub(r"\1.0e", points))
         separator = ",\n"
-        done(len(block.time) * len(selection.chosen))
+        advance(len(block.time) * len(selection.variables))
     stream.write("\n]}\n")
 
 
 def _points(selection: Selection, block: ExportSamples) -> Iterator[dict[str, Any]]:
     values = block.values
-    present = {field: values[name].tolist() for field, name in FIELDS.items() if name in values}
-    since = np.rint((block.time - selection.time[0]) * NANOSECONDS).astype(np.int64).tolist()
-    for time, *point in zip(since, *present.values(), strict=True):
-        seconds, nanoseconds = divmod(time, NANOSECONDS)
+    columns = {field: values[name].tolist() for field, name in FIELDS.items() if name in values}
+    elapsed_ns = np.rint((block.time - selection.time[0]) * NANOSECONDS).astype(np.int64).tolist()
+    for point_ns, *point in zip(elapsed_ns, *columns.values(), strict=True):
+        seconds, nanoseconds = divmod(point_ns, NANOSECONDS)
         stamp = {"sec": seconds, "nanosec": nanoseconds}
-        yield {**dict(zip(present, point, strict=True)), "time_from_start": stamp}
+        yield {**dict(zip(columns, point, strict=True)), "time_from_start": stamp}
 
 
 JOINT_TRAJECTORY = ResultFormat(
@@ -274,6 +278,6 @@ def labeled_dataset(
         attributes = variable_attributes(declared[name], joint_types)
         attributes.pop("coordinates", None)  # xarray derives it from the dataset
         variables[name] = (("time", *declared[name].dims), array, attributes)
-    used = {dim for dims, _, _ in variables.values() for dim in dims}
-    coordinates = {name: list(label) for name, label in labels.items() if name in used}
+    used_dims = {dim for dims, _, _ in variables.values() for dim in dims}
+    coordinates = {name: list(label) for name, label in labels.items() if name in used_dims}
     return xarray.Dataset(variables, {**coordinates, "joint_type": ("joint", list(joint_types))})

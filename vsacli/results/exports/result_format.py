@@ -12,7 +12,7 @@ import numpy as np
 from vsacli.base.errors import InputError, VsacliError
 from vsacli.base.progress import Progress, unseen
 from vsacli.base.units import time_text
-from vsacli.results.exports.selection import FAULTS, INFINITE, MISSING, Chosen, Selection, Side
+from vsacli.results.exports.selection import FAULTS, INFINITE, MISSING, ExportVariable, Selection, Side
 from vsacli.results.store.reader import StoredResult
 
 TORQUES = {"result": ("tau_motor",), "simulation": ("q", "stiffness", "tau_motor")}
@@ -55,8 +55,8 @@ class Gap:
     count: int
 
     def __str__(self) -> str:
-        samples = "1 sample" if self.count == 1 else f"{self.count} samples"
-        return f"{self.place} {self.fault} at {samples}, first at t = {time_text(self.time)}"
+        samples_text = "1 sample" if self.count == 1 else f"{self.count} samples"
+        return f"{self.place} {self.fault} at {samples_text}, first at t = {time_text(self.time)}"
 
 
 class UndefinedSamplesError(VsacliError):
@@ -65,12 +65,12 @@ class UndefinedSamplesError(VsacliError):
     def __init__(self, path: Path, gaps: Iterable[Gap], missing: str | None) -> None:
         self.gaps = tuple(gaps)
         faults = {gap.fault for gap in self.gaps}
-        otherwise = f", or get {missing} with --allow-nan" if missing else ""
-        as_they_are = "export them as they are with --allow-nan" if missing else "leave the variable out"
-        advice = {MISSING: f"fix the steps that the report names{otherwise}", INFINITE: as_they_are}
-        said = "; ".join(words for fault, words in advice.items() if fault in faults)
+        nan_advice = f", or get {missing} with --allow-nan" if missing else ""
+        infinite_advice = "export them as they are with --allow-nan" if missing else "leave the variable out"
+        advice = {MISSING: f"fix the steps that the report names{nan_advice}", INFINITE: infinite_advice}
+        advice_text = "; ".join(words for fault, words in advice.items() if fault in faults)
         super().__init__(
-            "\n".join([*(f"{path}: {gap}" for gap in self.gaps), f"nothing was exported; {said}"])
+            "\n".join([*(f"{path}: {gap}" for gap in self.gaps), f"nothing was exported; {advice_text}"])
         )
 
 
@@ -104,27 +104,31 @@ def export_result(
             gear ratio is unknown, or a package is missing.
         UndefinedSamplesError: a sample is NaN or infinite and `allow_nan` is false.
     """
-    wanted = form.variables[result.kind] if variables is None else variables
-    selection = Selection(result, wanted, rate, side)
+    names = form.variables[result.kind] if variables is None else variables
+    selection = Selection(result, names, rate, side)
     form.check(selection)
     if allow_nan and form.missing is None:
         raise InputError.one(
             "--allow-nan cannot be used with joint-trajectory, which cannot represent missing values; use csv"
         )
-    gaps = [] if allow_nan else [gap for chosen in selection.chosen for gap in _gaps(selection, chosen)]
+    gaps = (
+        []
+        if allow_nan
+        else [gap for variable in selection.variables for gap in _variable_gaps(selection, variable)]
+    )
     if gaps:
         raise UndefinedSamplesError(result.path, gaps, form.missing)
     with progress(selection.steps) as bar:
         form.write(selection, stream, bar.update)
 
 
-def _gaps(selection: Selection, chosen: Chosen) -> Iterator[Gap]:
+def _variable_gaps(selection: Selection, variable: ExportVariable) -> Iterator[Gap]:
     """Yield the non-finite samples of a variable, for each joint that has it."""
     faults = np.concatenate(
-        [chosen.faults(selection.read(chosen, *span)) for span in selection.spans([chosen])]
+        [variable.faults(selection.read(variable, *span)) for span in selection.spans([variable])]
     )
-    for place, of_joint in zip(chosen.places(selection.result.labels), faults.T, strict=True):
+    for row_name, row_faults in zip(variable.row_names(selection.result.labels), faults.T, strict=True):
         for fault in (MISSING, INFINITE):
-            steps = of_joint == FAULTS.index(fault)
-            if steps.any():
-                yield Gap(place, fault, float(selection.time[steps.argmax()]), int(steps.sum()))
+            mask = row_faults == FAULTS.index(fault)
+            if mask.any():
+                yield Gap(row_name, fault, float(selection.time[mask.argmax()]), int(mask.sum()))

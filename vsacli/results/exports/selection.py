@@ -21,10 +21,10 @@ from vsacli.results.store.reader import StoredResult
 Side: TypeAlias = Literal["joint", "motor"]
 """Side of the gear of a motor."""
 
-CELLS = 2**18
+MAX_BLOCK_VALUES = 2**18
 """Number of values of a variable in memory at a time."""
 
-MOST_TRIED = 1000
+MAX_STRIDES_TRIED = 1000
 """Number of decimation factors among which a rate that is easily typed is looked for."""
 
 RATE_TOLERANCE = 1e-6
@@ -42,19 +42,19 @@ FAULTS = ("", MISSING, INFINITE)
 
 
 @dataclass(frozen=True)
-class Chosen:
+class ExportVariable:
     """A variable of an export.
 
     Attributes:
         variable: declaration of the variable; on the motor side its name ends in `_shaft`.
         stored: name of the variable in the result.
-        there: mask of existing columns, (joints, columns of each), or (columns, 1) of other variables.
+        existing: mask of existing columns, (joints, columns of each), or (columns, 1) of other variables.
         scale: factor for the stored values; None if they are exported unchanged.
     """
 
     variable: Variable
     stored: str
-    there: BoolArray
+    existing: BoolArray
     scale: FloatArray | None
 
     @property
@@ -69,32 +69,33 @@ class Chosen:
 
     def columns(self, labels: Labels) -> Iterator[str]:
         """Return the names of the existing columns."""
-        return compress(column_names(self.variable, labels), self.there.flat)
+        return compress(column_names(self.variable, labels), self.existing.flat)
 
     def units(self, joint_types: Iterable[str]) -> list[str]:
         """Return the unit at each joint, or of each column of another variable."""
         quantity = self.variable.quantity
         if "joint" not in self.variable.dims:
-            return [quantity.of_axis(column) for column in range(len(self.there))]
-        return [quantity.unit("revolute" if self.on_shaft else each) for each in joint_types]
+            return [quantity.of_axis(column) for column in range(len(self.existing))]
+        return [quantity.unit("revolute" if self.on_shaft else joint_type) for joint_type in joint_types]
 
-    def of_columns(self, values: FloatArray | FlagArray) -> npt.NDArray[Any]:
+    def column_values(self, values: FloatArray | FlagArray) -> npt.NDArray[Any]:
         """Return the existing columns, (columns, samples), of values (samples, ...)."""
-        return values.reshape(len(values), -1).T[self.there.ravel()]
+        return values.reshape(len(values), -1).T[self.existing.ravel()]
 
-    def places(self, labels: Labels) -> list[str]:
-        """Return names of the rows of `there`: the variable at each joint, or the columns of the wrench."""
+    def row_names(self, labels: Labels) -> list[str]:
+        """Return names of the rows of `existing`: the variable at each joint, or the axes of the wrench."""
         if "joint" not in self.variable.dims:
             return column_names(self.variable, labels)
         return [f"{joint}.{self.name}" for joint in labels["joint"]]
 
     def faults(self, values: FloatArray | FlagArray) -> npt.NDArray[np.uint8]:
         """Return the worst fault of the existing values as an index of `FAULTS`, (samples, places)."""
-        shape = len(values), *self.there.shape
-        faulty = [
-            np.any(np.reshape(test(values), shape) & self.there, axis=-1) for test in (np.isnan, np.isinf)
+        shape = len(values), *self.existing.shape
+        is_faulty = [
+            np.any(np.reshape(predicate(values), shape) & self.existing, axis=-1)
+            for predicate in (np.isnan, np.isinf)
         ]
-        return np.select(faulty, [FAULTS.index(MISSING), FAULTS.index(INFINITE)]).astype(np.uint8)
+        return np.select(is_faulty, [FAULTS.index(MISSING), FAULTS.index(INFINITE)]).astype(np.uint8)
 
 
 class ExportSamples(NamedTuple):
@@ -116,7 +117,7 @@ class Selection:
 
     Attributes:
         result: result or simulation file as given.
-        chosen: selected variables.
+        variables: selected variables.
 
     Raises:
         InputError: a variable is unknown, the rate is not possible, or a gear ratio is unknown.
@@ -135,7 +136,9 @@ class Selection:
         on_shaft = {variable.name for variable in selected if side == "motor" and variable.geared}
         if on_shaft:
             _check_geared(result)
-        self.chosen = tuple(_chosen(result, each, each.name in on_shaft) for each in selected)
+        self.variables = tuple(
+            _export_variable(result, variable, variable.name in on_shaft) for variable in selected
+        )
 
     @property
     def time(self) -> FloatArray:
@@ -145,39 +148,40 @@ class Selection:
     @property
     def steps(self) -> int:
         """Number of samples, summed over all variables."""
-        return len(self.time) * len(self.chosen)
+        return len(self.time) * len(self.variables)
 
-    def spans(self, together: Sequence[Chosen]) -> Iterator[tuple[int, int]]:
+    def spans(self, variables: Sequence[ExportVariable]) -> Iterator[tuple[int, int]]:
         """Yield at least one range of consecutive samples, each small enough to bound memory use."""
-        widest = max((each.there.size for each in together), default=1)
-        length = max(1, CELLS // (widest * self._stride))
-        count = len(self.time)
-        for start in range(0, max(1, count), length):
-            yield start, min(start + length, count)
+        max_columns = max((variable.existing.size for variable in variables), default=1)
+        span_length = max(1, MAX_BLOCK_VALUES // (max_columns * self._stride))
+        sample_count = len(self.time)
+        for start in range(0, max(1, sample_count), span_length):
+            yield start, min(start + span_length, sample_count)
 
     def blocks(self) -> Iterator[ExportSamples]:
         """Yield all samples in blocks that fit into memory; at least one block."""
-        for start, stop in self.spans(self.chosen):
+        for start, stop in self.spans(self.variables):
             yield ExportSamples(
-                self.time[start:stop], {each.name: self.read(each, start, stop) for each in self.chosen}
+                self.time[start:stop],
+                {variable.name: self.read(variable, start, stop) for variable in self.variables},
             )
 
-    def read(self, chosen: Chosen, start: int, stop: int) -> FloatArray | FlagArray:
+    def read(self, variable: ExportVariable, start: int, stop: int) -> FloatArray | FlagArray:
         """Read samples start..stop-1 of a variable, (samples, ...)."""
         span = start * self._stride, min(stop * self._stride, self.result.samples)
-        values = self.result.read(chosen.stored, *span)[:: self._stride]
-        return values if chosen.scale is None else values * chosen.scale
+        values = self.result.read(variable.stored, *span)[:: self._stride]
+        return values if variable.scale is None else values * variable.scale
 
 
-def _chosen(result: StoredResult, variable: Variable, on_shaft: bool) -> Chosen:
-    there = _existing(result, variable)
+def _export_variable(result: StoredResult, variable: Variable, on_shaft: bool) -> ExportVariable:
+    existing = _existing_mask(result, variable)
     if not on_shaft:
-        return Chosen(variable, variable.name, there, None)
+        return ExportVariable(variable, variable.name, existing, None)
     scale = result.gear_ratio**variable.geared
-    return Chosen(variable._replace(name=f"{variable.name}_shaft"), variable.name, there, scale)
+    return ExportVariable(variable._replace(name=f"{variable.name}_shaft"), variable.name, existing, scale)
 
 
-def _existing(result: StoredResult, variable: Variable) -> BoolArray:
+def _existing_mask(result: StoredResult, variable: Variable) -> BoolArray:
     """Return a mask of existing columns, (joints, columns of each), or (columns, 1) of other variables."""
     if "joint" not in variable.dims:
         return np.ones((len(column_names(variable, result.labels)), 1), dtype=bool)
@@ -186,10 +190,10 @@ def _existing(result: StoredResult, variable: Variable) -> BoolArray:
 
 def _check_geared(result: StoredResult) -> None:
     """Refuse values on the motor side if a gear ratio is unknown."""
-    there = _existing(result, VARIABLES["tau_motor"])
-    unknown = np.any(np.isnan(result.gear_ratio) & there, axis=1).tolist()
-    if any(unknown):
-        joints = ", ".join(compress(result.joint_names, unknown))
+    existing = _existing_mask(result, VARIABLES["tau_motor"])
+    is_unknown = np.any(np.isnan(result.gear_ratio) & existing, axis=1).tolist()
+    if any(is_unknown):
+        joints = ", ".join(compress(result.joint_names, is_unknown))
         message = (
             f"--side motor needs the gear_ratio of {joints} in the robot file (1 without a gear); add it and "
             f"run {result.command} again, or use --side joint"
@@ -269,4 +273,4 @@ def _stored_rate(result: StoredResult, again: str) -> float:
         place = f"near t = {time_text(float(time[error.argmax()]))}"
         message = f"the stored times are not equally spaced ({place}); {again}"
         raise InputError.one(message, result.path)
-    return 1 / step
+    return 1 / interval

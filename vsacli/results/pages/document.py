@@ -65,7 +65,7 @@ def plotting_library() -> ScriptLibrary:
     folder = Path(str(installed.locate_file("bokeh/server/static/js")))
     scripts = (folder / name for name in LIBRARY_SCRIPTS)
     return ScriptLibrary(
-        f"Bokeh {installed.version}", tuple(each.read_text(encoding="utf-8") for each in scripts)
+        f"Bokeh {installed.version}", tuple(path.read_text(encoding="utf-8") for path in scripts)
     )
 
 
@@ -121,7 +121,7 @@ class InputText(NamedTuple):
     instead: str
 
 
-def rendered(
+def render_page(
     library: ScriptLibrary, title: str, texts: Sequence[PageTexts], data: Mapping[str, Any], packed: Packed
 ) -> str:
     """Return the page as HTML.
@@ -133,12 +133,12 @@ def rendered(
         data: JSON values for the scripts.
         packed: arrays for the scripts.
     """
-    scripts = [*library.scripts, *map(own_file, SCRIPTS)]
-    named = {**data, "library": library.name}
-    return filled(TEMPLATE, scripts, named, title=title, texts=texts, arrays=packed.texts)
+    scripts = [*library.scripts, *map(package_file, SCRIPTS)]
+    page_data = {**data, "library": library.name}
+    return fill_template(TEMPLATE, scripts, page_data, title=title, texts=texts, arrays=packed.texts)
 
 
-def filled(template: str, scripts: Sequence[str], data: Mapping[str, Any], **values: Any) -> str:
+def fill_template(template: str, scripts: Sequence[str], data: Mapping[str, Any], **values: Any) -> str:
     """Return a template of this package filled with values, every text escaped.
 
     Args:
@@ -150,26 +150,26 @@ def filled(template: str, scripts: Sequence[str], data: Mapping[str, Any], **val
     import jinja2  # a dependency of bokeh
 
     environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(own_file),
+        loader=jinja2.FunctionLoader(package_file),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
     )
     return environment.get_template(template).render(
-        style=own_file(STYLE),
+        style=package_file(STYLE),
         scripts=scripts,
-        allowed=" ".join(map(_hash, scripts)),
+        allowed=" ".join(map(_policy_hash, scripts)),
         data=as_script(data),
         **values,
     )
 
 
-def own_file(name: str) -> str:
+def package_file(name: str) -> str:
     """Return a file of this package: a template, a style sheet or a script."""
     return (files(__package__) / name).read_text(encoding="utf-8")
 
 
-def _hash(script: str) -> str:
+def _policy_hash(script: str) -> str:
     """Return the hash of a script for the Content Security Policy, which blocks all other scripts."""
     digest = hashlib.sha256(script.encode("utf-8")).digest()
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
@@ -185,15 +185,19 @@ def provenance_rows(provenance: Mapping[str, Any]) -> list[tuple[str, str]]:
     rows = []
     for name, value in provenance.items():
         if name != "inputs" and value not in ("", {}):
-            rows.append((name.replace("_", " "), _words(value)))
-    changed = {each["path"]: each["changes"] for each in provenance["inputs"] if "changes" in each}
-    return rows + [("--set", f"{path}: {_words(changes)}") for path, changes in changed.items()]
+            rows.append((name.replace("_", " "), _value_text(value)))
+    changes_by_path = {
+        record["path"]: record["changes"] for record in provenance["inputs"] if "changes" in record
+    }
+    return rows + [("--set", f"{path}: {_value_text(changes)}") for path, changes in changes_by_path.items()]
 
 
-def _words(value: Any) -> str:
+def _value_text(value: Any) -> str:
     """Return a value of the provenance as text; of a mapping without keys that have no value."""
     if isinstance(value, Mapping):
-        return ", ".join(f"{name} = {_words(each)}" for name, each in value.items() if each is not None)
+        return ", ".join(
+            f"{name} = {_value_text(entry)}" for name, entry in value.items() if entry is not None
+        )
     return value if isinstance(value, str) else json.dumps(value)
 
 
@@ -201,15 +205,15 @@ def input_text(file: StoredInput) -> InputText:
     """Return a stored input as a page shows it."""
     text = None if file.content is None else file.content.decode("utf-8", "backslashreplace")
     instead = f"{TOO_LONG}; vsacli info --extract gets it from the file"
-    return InputText(one_line(file.path), file.sha256, _shown(text), instead)
+    return InputText(one_line(file.path), file.sha256, _printable_lines(text), instead)
 
 
 def source_text(file: Source) -> InputText:
     """Return an input file as a page shows it."""
-    return InputText(one_line(file.path), file.sha256, _shown(file.text), TOO_LONG)
+    return InputText(one_line(file.path), file.sha256, _printable_lines(file.text), TOO_LONG)
 
 
-def _shown(text: str | None) -> str | None:
+def _printable_lines(text: str | None) -> str | None:
     """Return a text in printable lines; None if it is too long for a page."""
     if text is None or len(text) > LARGEST_SHOWN:
         return None

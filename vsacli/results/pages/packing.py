@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from vsacli.base.arrays import FloatArray
 from vsacli.base.json_records import json_value
 from vsacli.results.charts.arm_chart import direction_of
-from vsacli.results.charts.chart import ATTAINABLE, LIMIT_LOOK, Chart, ShadedArea
+from vsacli.results.charts.chart import ATTAINABLE, LIMIT_STYLE, Chart, ShadedArea
 from vsacli.robot.joint import Pose
 from vsacli.robot.kinematics import Geometry, rotation_matrix
 
@@ -30,19 +30,19 @@ class Packed:
     """
 
     def __init__(self) -> None:
-        self._numbers: dict[bytes, int] = {}
+        self._array_numbers: dict[bytes, int] = {}
 
     def add(self, values: ArrayLike) -> int:
         """Return the number of an array of any shape; values not finite in single precision become NaN."""
         with np.errstate(over="ignore"):
             single = np.asarray(values, dtype="<f4")
         content = np.where(np.isfinite(single), single, np.float32(np.nan)).astype("<f4").tobytes()
-        return self._numbers.setdefault(content, len(self._numbers))
+        return self._array_numbers.setdefault(content, len(self._array_numbers))
 
     @property
     def texts(self) -> list[str]:
         """Arrays in base64, by number."""
-        return [base64.b64encode(content).decode("ascii") for content in self._numbers]
+        return [base64.b64encode(content).decode("ascii") for content in self._array_numbers]
 
     def chart(self, chart: Chart, start: float) -> dict[str, Any]:
         """Return a chart for `charts.js`, with arrays replaced by their numbers.
@@ -73,7 +73,7 @@ class Packed:
             "unit": chart.unit,
             "series": series,
             "limits": [
-                {"joint": None if limit.look == LIMIT_LOOK else limit.joint, "value": limit.value}
+                {"joint": None if limit.style_index == LIMIT_STYLE else limit.joint, "value": limit.value}
                 for limit in chart.limits
             ],
             "shown": chart.shown,
@@ -85,8 +85,8 @@ class Packed:
         """Return the numbers of lower and upper edge; an attainable range is cut off far outside the view."""
         low, high = band.low, band.high
         if chart.band == ATTAINABLE and chart.shown is not None:
-            spare = BEYOND * (chart.shown[1] - chart.shown[0])
-            low, high = np.maximum(low, chart.shown[0] - spare), np.minimum(high, chart.shown[1] + spare)
+            margin = BEYOND * (chart.shown[1] - chart.shown[0])
+            low, high = np.maximum(low, chart.shown[0] - margin), np.minimum(high, chart.shown[1] + margin)
         return self.add(low), self.add(high)
 
 

@@ -24,14 +24,14 @@ from vsacli.results.charts.comparison import check_comparable, distinct_labels
 from vsacli.results.charts.figures import result_title
 from vsacli.results.charts.measured import MeasuredCurve
 from vsacli.results.charts.reduction import marked_spans
-from vsacli.results.charts.stored import BOUNDS, StoredCharts
+from vsacli.results.charts.stored import STIFFNESS_BOUNDS, StoredCharts
 from vsacli.results.pages.document import (
     FixText,
     PageTexts,
     input_text,
     plotting_library,
     provenance_rows,
-    rendered,
+    render_page,
     tone_of,
 )
 from vsacli.results.pages.packing import Packed, arm_values
@@ -42,7 +42,7 @@ MOST_FRAMES = 1000
 """Maximum number of instants of the animated robot; the page interpolates between them at 60 frames a
 second."""
 
-OPEN = 4
+OPEN_SECTIONS = 4
 """Number of sections of measured signals that are open initially, as many as for a result."""
 
 TROUBLES = {
@@ -107,31 +107,33 @@ def result_page(
     check_comparable(files)
     packed, labels, charts = Packed(), distinct_labels(files), StoredCharts(files)
     start = min(float(file.time[0]) for file in files)
-    wanted = list(sections_of(charts.common))
-    if not wanted:
-        what = "hold no variable in common" if len(files) > 1 else "holds no variable"
-        raise InputError.one(f"nothing can be plotted: {what} that has a plot", files[0].path)
+    open_sections = list(sections_of(charts.common))
+    if not open_sections:
+        lack = "hold no variable in common" if len(files) > 1 else "holds no variable"
+        raise InputError.one(f"nothing can be plotted: {lack} that has a plot", files[0].path)
     sections = []
-    with progress(sum(len(section.names) for section in wanted)) as bar:
-        for section in wanted:
-            drawn: list[Any] = []
+    with progress(sum(len(section.names) for section in open_sections)) as bar:
+        for section in open_sections:
+            packed_charts: list[Any] = []
             for name in section.names:
-                drawn += [packed.chart(chart, start) for chart in charts.charts_of(name)]
+                packed_charts += [packed.chart(chart, start) for chart in charts.charts_of(name)]
                 bar.update(1)
-            if drawn:
-                sections.append({"heading": section.heading, "shown": section.shown, "charts": drawn})
+            if packed_charts:
+                sections.append({"heading": section.heading, "shown": section.shown, "charts": packed_charts})
     joints = zip(files[0].joint_names, files[0].joint_types, strict=True)
     data = {
         "kind": "over time",
         "joints": [{"name": name, "type": joint_type} for name, joint_type in joints],
-        "files": [_file(file, label, start, packed) for file, label in zip(files, labels, strict=True)],
+        "files": [
+            _file_values(file, label, start, packed) for file, label in zip(files, labels, strict=True)
+        ],
         "start": start,
         "span": [0.0, max(float(file.time[-1]) for file in files) - start],
         "sections": sections,
     }
-    texts = [_texts(*each) for each in zip(files, labels, reports, fixes, strict=True)]
+    texts = [_page_texts(*page) for page in zip(files, labels, reports, fixes, strict=True)]
     titles = [result_title(file, label) for file, label in zip(files, labels, strict=True)]
-    return rendered(library, " / ".join(titles), texts, data, packed)
+    return render_page(library, " / ".join(titles), texts, data, packed)
 
 
 def sections_of(variables: Collection[str]) -> Iterator[Section]:
@@ -139,42 +141,42 @@ def sections_of(variables: Collection[str]) -> Iterator[Section]:
 
     Standard deviations and bounds of the stiffness are drawn with their variable, flags as time intervals.
     """
-    with_others = {*FLAG_BITS, *BOUNDS, *map(deviation, variables)}
-    own = dict.fromkeys(SIMULATED_NAMES.get(name, name) for name in variables if name not in with_others)
+    without_plot = {*FLAG_BITS, *STIFFNESS_BOUNDS, *map(deviation, variables)}
+    plotted = dict.fromkeys(SIMULATED_NAMES.get(name, name) for name in variables if name not in without_plot)
     for section in SECTIONS:
-        names = tuple(name for name in section.names if name in own)
+        names = tuple(name for name in section.names if name in plotted)
         if names:
             yield section._replace(names=names)
-    rest = tuple(name for name in own if not any(name in section.names for section in SECTIONS))
-    if rest:
-        yield Section("Further variables", rest)
+    remaining = tuple(name for name in plotted if not any(name in section.names for section in SECTIONS))
+    if remaining:
+        yield Section("Further variables", remaining)
 
 
-def _file(file: StoredResult, label: str, start: float, packed: Packed) -> dict[str, Any]:
+def _file_values(file: StoredResult, label: str, start: float, packed: Packed) -> dict[str, Any]:
     """Return the values of a file for the scripts."""
 
-    def after(spans: Sequence[Sequence[float]]) -> list[list[float]]:
+    def since_start(spans: Sequence[Sequence[float]]) -> list[list[float]]:
         return [[time - start for time in span] for span in spans]
 
     return {
         "label": label,
-        "troubles": {kind: list(map(after, joints)) for kind, joints in troubles(file).items()},
-        "unreliable": after(unreliable(file)),
+        "troubles": {kind: list(map(since_start, joints)) for kind, joints in troubles(file).items()},
+        "unreliable": since_start(unreliable(file)),
         "arm": arm_motion(file, start, packed),
     }
 
 
-def _texts(file: StoredResult, label: str, report: ReportText, fix: FixText | None) -> PageTexts:
+def _page_texts(file: StoredResult, label: str, report: ReportText, fix: FixText | None) -> PageTexts:
     first, last = file.time[[0, -1]].tolist()
-    extent = f"{counted(file.samples, 'sample')}, {first:.4g} to {last:.4g} s"
+    extent_text = f"{counted(file.samples, 'sample')}, {first:.4g} to {last:.4g} s"
     return PageTexts(
-        title=f"{result_title(file, label)}; {extent}",
+        title=f"{result_title(file, label)}; {extent_text}",
         label=label,
         verdict=file.verdict.replace("_", " "),
         tone=tone_of(file.verdict),
         report=report,
         provenance=provenance_rows(file.provenance()),
-        inputs=[input_text(each) for each in file.inputs()],
+        inputs=[input_text(stored_input) for stored_input in file.inputs()],
         fix=fix,
     )
 
@@ -184,11 +186,11 @@ def troubles(result: StoredResult) -> dict[str, list[list[list[float]]]]:
     if "flags" not in result.variables:
         return {}
     flags = np.asarray(result.read("flags"), dtype=FLAG_TYPE)
-    marked = {kind: has_flag(flags, bits) for kind, bits in TROUBLES.items()}
+    masks = {kind: has_flag(flags, bits) for kind, bits in TROUBLES.items()}
     return {
-        kind: [marked_spans(result.time, of_joint).tolist() for of_joint in where.T]
-        for kind, where in marked.items()
-        if where.any()
+        kind: [marked_spans(result.time, joint_mask).tolist() for joint_mask in mask.T]
+        for kind, mask in masks.items()
+        if mask.any()
     }
 
 
@@ -205,10 +207,10 @@ def unreliable(result: StoredResult) -> list[list[float]]:
     if not start and not end:
         return []
     first, last = result.whole_span()
-    shown = float(result.time[0]), float(result.time[-1])
+    visible_span = float(result.time[0]), float(result.time[-1])
     spans = (first, first + start), (last - end, last)
-    clipped = [[max(ends[0], shown[0]), min(ends[1], shown[1])] for ends in spans]
-    return [span for span in clipped if span[0] < span[1]]
+    clipped_spans = [[max(ends[0], visible_span[0]), min(ends[1], visible_span[1])] for ends in spans]
+    return [span for span in clipped_spans if span[0] < span[1]]
 
 
 def arm_motion(result: StoredResult, start: float, packed: Packed) -> dict[str, Any] | None:
@@ -225,10 +227,10 @@ def arm_motion(result: StoredResult, start: float, packed: Packed) -> dict[str, 
     """
     if "q" not in result.variables:
         return None
-    steps = evenly(result.samples, MOST_FRAMES)
+    sample_indices = evenly(result.samples, MOST_FRAMES)
     motion = {
-        "time": packed.add(result.time[steps] - start),
-        "q": packed.add(np.asarray(result.read("q"), dtype=np.float64)[steps]),
+        "time": packed.add(result.time[sample_indices] - start),
+        "q": packed.add(np.asarray(result.read("q"), dtype=np.float64)[sample_indices]),
     }
     return {**arm_values(result.geometry(), result.gravity(), result.tool_names), "motion": motion}
 
@@ -247,32 +249,32 @@ def measured_page(
         InputError: a library that pages need is not installed.
     """
     library, packed = plotting_library(), Packed()
-    every = [curve for section in curves.values() for curve in section]
+    all_curves = [curve for section in curves.values() for curve in section]
     data = {
         "kind": "over time",
         "joints": [],
         "files": [{"label": texts.label, "troubles": {}, "unreliable": [], "arm": None}],
         "start": 0.0,
         "span": [
-            min((float(curve.time[0]) for curve in every), default=0.0),
-            max((float(curve.time[-1]) for curve in every), default=0.0),
+            min((float(curve.time[0]) for curve in all_curves), default=0.0),
+            max((float(curve.time[-1]) for curve in all_curves), default=0.0),
         ],
         "sections": [
             {
                 "heading": one_line(heading),
-                "shown": number < OPEN,
+                "shown": number < OPEN_SECTIONS,
                 "paired": True,
-                "charts": [chart for curve in section for chart in _measured(curve, computed, packed)],
+                "charts": [chart for curve in section for chart in _measured_charts(curve, computed, packed)],
             }
             for number, (heading, section) in enumerate(curves.items())
         ],
     }
-    return rendered(library, texts.label, [texts], data, packed)
+    return render_page(library, texts.label, [texts], data, packed)
 
 
-def _measured(curve: MeasuredCurve, computed: str, packed: Packed) -> Iterator[dict[str, Any]]:
+def _measured_charts(curve: MeasuredCurve, computed: str, packed: Packed) -> Iterator[dict[str, Any]]:
     """Yield a plot of both curves, and one of measured minus computed values."""
-    over, apart = curve.charts(computed)
+    overlay, difference = curve.charts(computed)
     name = one_line(curve.name)
-    yield packed.chart(replace(over, title=name), 0.0)
-    yield packed.chart(replace(apart, title=f"difference: {name}"), 0.0)
+    yield packed.chart(replace(overlay, title=name), 0.0)
+    yield packed.chart(replace(difference, title=f"difference: {name}"), 0.0)

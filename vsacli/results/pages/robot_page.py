@@ -11,7 +11,7 @@ import numpy as np
 
 from vsacli.base.texts import for_terminal, one_line
 from vsacli.results.charts.arm_chart import arm_chart, home_position
-from vsacli.results.pages.document import InputText, filled, own_file
+from vsacli.results.pages.document import InputText, fill_template, package_file
 from vsacli.results.pages.packing import arm_values
 from vsacli.robot.joint import UNBOUNDED, Joint
 from vsacli.robot.model import Robot
@@ -38,9 +38,9 @@ def robot_page(robot: Robot, figures: Mapping[str, bytes], text: str, inputs: Se
         "joints": [_slider(joint, size) for joint in robot.joints],
         "files": [{"troubles": {}, "arm": {**arm, "motion": None}}],
     }
-    return filled(
+    return fill_template(
         TEMPLATE,
-        [own_file(name) for name in SCRIPTS],
+        [package_file(name) for name in SCRIPTS],
         data,
         title=one_line(robot.name),
         figures={words: base64.b64encode(image).decode("ascii") for words, image in figures.items()},
@@ -54,6 +54,6 @@ def _slider(joint: Joint, size: float) -> dict[str, Any]:
 
     A slider ends at the position limits; without them, half a turn, or the size of the arm (m), from home.
     """
-    free = math.pi if joint.is_revolute else size
-    ends = joint.limits.position if joint.limits.position != UNBOUNDED else (-free, free)
-    return {"name": joint.name, "type": joint.type, "home": home_position(joint), "range": ends}
+    half_range = math.pi if joint.is_revolute else size
+    limits = joint.limits.position if joint.limits.position != UNBOUNDED else (-half_range, half_range)
+    return {"name": joint.name, "type": joint.type, "home": home_position(joint), "range": limits}

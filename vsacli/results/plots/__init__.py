@@ -20,7 +20,7 @@ from vsacli.results.plots.figures import (
 )
 from vsacli.results.plots.recorded_figure import recorded_figure
 from vsacli.results.plots.robot_figures import actuators_figure, stiffness_figure
-from vsacli.results.plots.sheets import drawn
+from vsacli.results.plots.sheets import draw_sheet
 from vsacli.results.plots.sizing_figure import MotorLimits, TorqueSpeed, torque_speed_figure
 from vsacli.results.plots.study_figures import compared_studies, ranking_figure, study_figures
 
@@ -34,8 +34,8 @@ __all__ = [
     "arm_figure",
     "compare_files",
     "compared_studies",
+    "draw_sheet",
     "draw_stored",
-    "drawn",
     "plot_stored",
     "ranking_figure",
     "recorded_figure",

@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.base.arrays import FloatArray
-from vsacli.results.charts.arm_chart import ROOM, ArmChart, View
+from vsacli.results.charts.arm_chart import VIEW_WIDTH, ArmChart, View
 from vsacli.results.charts.chart import PANEL_WIDTH
 from vsacli.results.charts.look import CM_PER_INCH, current_look
 from vsacli.results.charts.tool_charts import ToolPath
@@ -68,10 +68,10 @@ NAME_SIZE, ARROW_SIZE = 9, 8
 NAME_LINE = 1.5
 """Height of the line of a name relative to its size."""
 
-EDGE = 0.7
+EDGE_WIDTH = 0.7
 """Width of edges, points."""
 
-ROUND = 24
+CYLINDER_SIDES = 24
 """Number of sides of a cylinder."""
 
 FILLS = {"antagonistic": "#8fb8de", "serial": "#f0b27a", "elastic": "#c8e6c0", "rigid": "0.85"}
@@ -94,15 +94,15 @@ def arm_figure(chart: ArmChart) -> Figure:
     windows[0][1, 0] += LABEL_WIDTH * chart.size
     extents: list[list[float]] = np.array([high - low for low, high in windows]).T.tolist()
     widths, heights = extents
-    look, larger = current_look(), _crowding(chart)
+    look, growth = current_look(), _crowding(chart)
 
     def view_scale(columns: int) -> float:
         """Return the inches of a meter, at the usual font size."""
         if look.width is None or look.height is not None:
-            return larger * PANEL_WIDTH / (ROOM * chart.size)
+            return growth * PANEL_WIDTH / (VIEW_WIDTH * chart.size)
         rows = (widths,) if columns == len(widths) else (widths[:1], widths[1:])
-        room = look.width / CM_PER_INCH / look.scale
-        return min(max(room - LABELED * len(row), room / 2) / sum(row) for row in rows)
+        available_width = look.width / CM_PER_INCH / look.scale
+        return min(max(available_width - LABELED * len(row), available_width / 2) / sum(row) for row in rows)
 
     def first_height(columns: int) -> float:
         """Return the height of the first view, m, in which all names fit."""
@@ -110,19 +110,21 @@ def arm_figure(chart: ArmChart) -> Figure:
 
     def natural(columns: int) -> tuple[float, float]:
         if columns == len(widths):
-            broad, high, rows = sum(widths), max(first_height(columns), *heights), 1
+            width, height, rows = sum(widths), max(first_height(columns), *heights), 1
         else:
-            broad, high, rows = max(widths[0], sum(widths[1:])), first_height(columns) + max(heights[1:]), 2
+            width, height, rows = max(widths[0], sum(widths[1:])), first_height(columns) + max(heights[1:]), 2
         return (
-            view_scale(columns) * broad + LABELED * (len(widths) + 1 - rows),
-            view_scale(columns) * high + LABELED * rows + AROUND,
+            view_scale(columns) * width + LABELED * (len(widths) + 1 - rows),
+            view_scale(columns) * height + LABELED * rows + AROUND,
         )
 
-    columns = columns_of_panels(len(widths), natural, NARROWEST_VIEW * (1 + LABEL_WIDTH / ROOM / len(widths)))
+    columns = columns_of_panels(
+        len(widths), natural, NARROWEST_VIEW * (1 + LABEL_WIDTH / VIEW_WIDTH / len(widths))
+    )
     with new_figure(natural(columns)) as figure:
         windows[0][:, 1] += (first_height(columns) - heights[0]) / 2 * np.array([-1, 1])
-        shares = [first_height(columns), max(heights[1:])]
-        panels = panels_of_views(figure, widths, shares, stacked=columns < len(widths))
+        row_heights = [first_height(columns), max(heights[1:])]
+        panels = panels_of_views(figure, widths, row_heights, stacked=columns < len(widths))
         for axes, view, window in zip(panels, chart.views, windows, strict=True):
             frame_view(axes, view, window)
             _draw_arm(axes, chart, view)
@@ -132,14 +134,17 @@ def arm_figure(chart: ArmChart) -> Figure:
 
 def _window(chart: ArmChart, view: View) -> FloatArray:
     """Return the lower left and the upper right corner of what a view shows, (2, 2), m."""
-    points, arrow = chart.points, 1.4 * ARROW_SHARE * chart.size * (SEVERAL if chart.tool_names else 1.0)
+    points, arrow_length = (
+        chart.points,
+        1.4 * ARROW_SHARE * chart.size * (SEVERAL if chart.tool_names else 1.0),
+    )
     axes = AXIS_LENGTH * chart.joint_length * points.axes[0]
-    tips = points.tools[0][..., None] + arrow * points.tool_axes[0]
+    tips = points.tools[0][..., None] + arrow_length * points.tool_axes[0]
     faces = [corners for solid in _solids(chart) for corners in solid.faces]
-    drawn = [*chart.lines, chart.centers + axes, chart.centers - axes, *faces]
-    drawn.append(np.swapaxes(tips, -1, -2).reshape(-1, 3))
-    places = view.project(np.concatenate(drawn))
-    low, high = places.min(axis=0) - MARGIN * chart.size, places.max(axis=0) + MARGIN * chart.size
+    point_sets = [*chart.lines, chart.centers + axes, chart.centers - axes, *faces]
+    point_sets.append(np.swapaxes(tips, -1, -2).reshape(-1, 3))
+    projected = view.project(np.concatenate(point_sets))
+    low, high = projected.min(axis=0) - MARGIN * chart.size, projected.max(axis=0) + MARGIN * chart.size
     if np.linalg.norm(view.project(chart.down)) > SHORTEST_ARROW:
         low[0] -= BESIDE_GRAVITY * chart.size
         high[1] = max(high[1], low[1] + 1.7 * ARROW_SHARE * chart.size)
@@ -152,9 +157,9 @@ def panels_of_views(
     """Return panels of these widths side by side, or the first above the others in rows of these heights."""
     if not stacked:
         return list(figure.subplots(1, len(widths), width_ratios=widths, squeeze=False)[0])
-    places = figure.add_gridspec(2, len(widths) - 1, width_ratios=widths[1:], height_ratios=heights)
-    first = figure.add_subplot(places[0, :])
-    return [first, *(figure.add_subplot(places[1, column]) for column in range(len(widths) - 1))]
+    gridspec = figure.add_gridspec(2, len(widths) - 1, width_ratios=widths[1:], height_ratios=heights)
+    first = figure.add_subplot(gridspec[0, :])
+    return [first, *(figure.add_subplot(gridspec[1, column]) for column in range(len(widths) - 1))]
 
 
 def frame_view(axes: Axes, view: View, window: FloatArray) -> None:
@@ -179,25 +184,25 @@ def frame_view(axes: Axes, view: View, window: FloatArray) -> None:
 
 def _draw_arm(axes: Axes, chart: ArmChart, view: View) -> None:
     """Draw links, joints from the farthest to the nearest, axes, tool frame and gravity."""
-    length, arrow, points = chart.joint_length, ARROW_SHARE * chart.size, chart.points
+    length, arrow_length, points = chart.joint_length, ARROW_SHARE * chart.size, chart.points
     for line in chart.lines:
         axes.plot(*view.project(line).T, **scaled(_LINK), zorder=2)
     for seat, center in zip(points.seats[0], chart.centers, strict=True):  # joints moved along their axes
-        moved = view.project(np.stack((seat, center))).T
-        axes.plot(*moved, **scaled({**_LINK, "linewidth": 2.5}), zorder=2)
+        segment = view.project(np.stack((seat, center))).T
+        axes.plot(*segment, **scaled({**_LINK, "linewidth": 2.5}), zorder=2)
     solids = sorted(_solids(chart), key=lambda solid: float(solid.middle @ view.toward))
     for rank, solid in enumerate(solids):
         _draw_solid(axes, solid, view, 3 + rank / len(solids))
     for center, axis in zip(chart.centers, points.axes[0], strict=True):
-        ends = np.stack((center - AXIS_LENGTH * length * axis, center + AXIS_LENGTH * length * axis))
-        axes.plot(*view.project(ends).T, **scaled(_AXIS), zorder=4.2)
-    share = SEVERAL if chart.tool_names else 1.0
+        axis_ends = np.stack((center - AXIS_LENGTH * length * axis, center + AXIS_LENGTH * length * axis))
+        axes.plot(*view.project(axis_ends).T, **scaled(_AXIS), zorder=4.2)
+    arrow_scale = SEVERAL if chart.tool_names else 1.0
     for origin, tool_axes in zip(points.tools[0], points.tool_axes[0], strict=True):
         for direction, name in zip(tool_axes.T, "xyz", strict=True):
-            _draw_arrow(axes, view, origin, share * arrow * direction, name, share)
+            _draw_arrow(axes, view, origin, arrow_scale * arrow_length * direction, name, arrow_scale)
     corner = (axes.get_xlim()[0] + BESIDE_GRAVITY / 2 * chart.size, axes.get_ylim()[1] - MARGIN * chart.size)
     start = corner[0] * view.right + corner[1] * view.up
-    _draw_arrow(axes, view, start, arrow * chart.down, "g")
+    _draw_arrow(axes, view, start, arrow_length * chart.down, "g")
 
 
 class _Solid(NamedTuple):
@@ -211,38 +216,40 @@ class _Solid(NamedTuple):
 def _solids(chart: ArmChart) -> Iterator[_Solid]:
     """Yield base, joints and motors."""
     length = chart.joint_length
-    foot, up = _base(chart)
+    foot, up = _base_pose(chart)
     yield _prism(foot - PLATE_HEIGHT * length * up, foot, PLATE * length, 4, _BASE_FILL)
     for center, axis, joint in zip(chart.centers, chart.points.axes[0], chart.joints, strict=True):
         half, fill = length / 2 * axis, FILLS.get(joint.actuator_type, _OTHER_FILL)
-        yield _prism(center - half, center + half, RADIUS * length, ROUND if joint.is_revolute else 4, fill)
+        yield _prism(
+            center - half, center + half, RADIUS * length, CYLINDER_SIDES if joint.is_revolute else 4, fill
+        )
         motor = MOTOR_LENGTH * length * axis
         ends = ((center - half - motor, center - half), (center + half, center + half + motor))
         for low, high in ends[: joint.actuator.motor_count]:
-            yield _prism(low, high, MOTOR_RADIUS * length, ROUND, _MOTOR_FILL)
+            yield _prism(low, high, MOTOR_RADIUS * length, CYLINDER_SIDES, _MOTOR_FILL)
 
 
-def _base(chart: ArmChart) -> tuple[FloatArray, FloatArray]:
+def _base_pose(chart: ArmChart) -> tuple[FloatArray, FloatArray]:
     """Return place and normal of the base: the base frame, or below the first joint if that is near."""
     origin, up = chart.points.origins[0, 0], chart.points.base[0, :, 2]
     if np.linalg.norm(origin) > chart.joint_length:
         return np.zeros(3), np.array([0.0, 0.0, 1.0])
-    below = (0.5 + MOTOR_LENGTH) * chart.joint_length
-    return origin + min(0.0, float((chart.centers[0] - origin) @ up) - below) * up, up
+    offset = (0.5 + MOTOR_LENGTH) * chart.joint_length
+    return origin + min(0.0, float((chart.centers[0] - origin) @ up) - offset) * up, up
 
 
 def _prism(low: FloatArray, high: FloatArray, radius: float, sides: int, color: str) -> _Solid:
     """Return a regular prism between the centers of its ends."""
     axis = (high - low) / np.linalg.norm(high - low)
-    least = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    across = np.cross(axis, least)
-    across /= np.linalg.norm(across)
+    least_aligned = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    normal = np.cross(axis, least_aligned)
+    normal /= np.linalg.norm(normal)
     angles = 2 * math.pi * (np.arange(sides) + 0.5) / sides
-    directions = np.cos(angles)[:, None] * across + np.sin(angles)[:, None] * np.cross(axis, across)
+    directions = np.cos(angles)[:, None] * normal + np.sin(angles)[:, None] * np.cross(axis, normal)
     ring = radius / math.cos(math.pi / sides) * directions if sides == 4 else radius * directions
     bottom, top = low + ring, high + ring
-    after = np.roll(np.arange(sides), -1)
-    walls = np.stack((bottom, bottom[after], top[after], top), axis=1)
+    next_side = np.roll(np.arange(sides), -1)
+    walls = np.stack((bottom, bottom[next_side], top[next_side], top), axis=1)
     return _Solid([*walls, top, bottom[::-1]], (low + high) / 2, color)
 
 
@@ -252,17 +259,19 @@ def _draw_solid(axes: Axes, solid: _Solid, view: View, order: float) -> None:
     Black edges of all faces lie below, so that only their outer half is seen, which is the outline.
     """
     projected = [view.project(face) for face in solid.faces]
-    shown = [face for face in projected if _area(face) > 0]
-    smooth = len(solid.faces) > ROUND
-    walls, ends = ([face for face in shown if (len(face) == 4) == flat] for flat in (True, False))
-    layers = (
-        (shown, "black", 2 * EDGE),
-        (walls, solid.color if smooth else "black", EDGE),
-        (ends, "black", EDGE),
+    visible_faces = [face for face in projected if _area(face) > 0]
+    smooth = len(solid.faces) > CYLINDER_SIDES
+    walls, ends = (
+        [face for face in visible_faces if (len(face) == 4) == is_wall] for is_wall in (True, False)
     )
-    for rank, (faces, edges, width) in enumerate(layers):
-        look: dict[str, Any] = {"facecolor": solid.color, "edgecolor": edges, "linewidth": width}
-        axes.add_collection(PolyCollection(faces, **scaled(look), zorder=order + 1e-4 * rank))
+    layers = (
+        (visible_faces, "black", 2 * EDGE_WIDTH),
+        (walls, solid.color if smooth else "black", EDGE_WIDTH),
+        (ends, "black", EDGE_WIDTH),
+    )
+    for rank, (faces, edge_color, width) in enumerate(layers):
+        style: dict[str, Any] = {"facecolor": solid.color, "edgecolor": edge_color, "linewidth": width}
+        axes.add_collection(PolyCollection(faces, **scaled(style), zorder=order + 1e-4 * rank))
 
 
 def _area(face: FloatArray) -> float:
@@ -278,8 +287,8 @@ def _draw_arrow(
     tail, tip = view.project(start), view.project(start + arrow)
     if np.linalg.norm(tip - tail) <= SHORTEST_ARROW * np.linalg.norm(arrow):
         return
-    drawn = axes.annotate("", tuple(tip), tuple(tail), arrowprops=_ARROW, zorder=5)
-    drawn.set_fontsize(share * float(drawn.get_fontsize()))  # the size of its head
+    annotation = axes.annotate("", tuple(tip), tuple(tail), arrowprops=_ARROW, zorder=5)
+    annotation.set_fontsize(share * float(annotation.get_fontsize()))  # the size of its head
     x, y = tail + 1.25 * (tip - tail)
     size = current_look().points(ARROW_SIZE * share**0.5)
     axes.text(x, y, name, fontsize=size, ha="center", va="center", zorder=5)
@@ -296,15 +305,15 @@ def _name_joints(axes: Axes, chart: ArmChart, view: View, gap: float) -> None:
     """
     (_, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     size = current_look().points(NAME_SIZE / _crowding(chart))
-    every = math.ceil(len(_names(chart)) / _most_names(chart))
+    stride = math.ceil(len(_names(chart)) / _most_names(chart))
     tools = chart.points.tools[0, : len(chart.tool_names)]
-    places = view.project(np.concatenate((chart.centers, tools)))[::every]
-    names = [shortened(name, NAME_LENGTH) for name in _names(chart)[::every]]
-    column = right - LABEL_WIDTH * chart.size
-    heights = _spread(places[:, 1], gap, bottom + gap / 2, top - gap / 2)
-    for (x, y), height, name in zip(places, heights, names, strict=True):
-        axes.plot([x, column, column + gap / 2], [y, height, height], **scaled(_LEADER), zorder=1)
-        axes.text(column + 0.7 * gap, height, name, fontsize=size, va="center", parse_math=False)
+    points = view.project(np.concatenate((chart.centers, tools)))[::stride]
+    names = [shortened(name, NAME_LENGTH) for name in _names(chart)[::stride]]
+    column_x = right - LABEL_WIDTH * chart.size
+    heights = _spaced_heights(points[:, 1], gap, bottom + gap / 2, top - gap / 2)
+    for (x, y), height, name in zip(points, heights, names, strict=True):
+        axes.plot([x, column_x, column_x + gap / 2], [y, height, height], **scaled(_LEADER), zorder=1)
+        axes.text(column_x + 0.7 * gap, height, name, fontsize=size, va="center", parse_math=False)
 
 
 def _names(chart: ArmChart) -> list[str]:
@@ -328,16 +337,19 @@ def _crowding(chart: ArmChart) -> float:
     return 1.0 if len(chart.lines) == 1 else max(1.0, len(_names(chart)) / MOST_NAMES) ** 0.5
 
 
-def _spread(heights: FloatArray, gap: float, low: float, high: float) -> FloatArray:
+def _spaced_heights(heights: FloatArray, gap: float, low: float, high: float) -> FloatArray:
     """Return heights at least a gap apart, in the same order and between two ends, near the given ones."""
     order = np.argsort(heights, kind="stable")
     offsets = gap * np.arange(len(heights))
     # Without the offsets any ascending order will do; the mean of both bounds keeps clusters centered.
-    free = heights[order] - offsets
-    rising, falling = np.maximum.accumulate(free), np.minimum.accumulate(free[::-1])[::-1]
-    spread = np.empty_like(heights)
-    spread[order] = np.clip((rising + falling) / 2, low, max(low, high - offsets[-1])) + offsets
-    return spread
+    without_offsets = heights[order] - offsets
+    rising, falling = (
+        np.maximum.accumulate(without_offsets),
+        np.minimum.accumulate(without_offsets[::-1])[::-1],
+    )
+    spaced = np.empty_like(heights)
+    spaced[order] = np.clip((rising + falling) / 2, low, max(low, high - offsets[-1])) + offsets
+    return spaced
 
 
 def _handles(chart: ArmChart) -> list[Artist]:
@@ -345,16 +357,19 @@ def _handles(chart: ArmChart) -> list[Artist]:
     kinds = dict.fromkeys(joint.actuator_type for joint in chart.joints)
     handles: list[Artist] = [
         Patch(
-            facecolor=FILLS.get(kind, _OTHER_FILL), edgecolor="black", linewidth=EDGE, label=f"{kind} joint"
+            facecolor=FILLS.get(kind, _OTHER_FILL),
+            edgecolor="black",
+            linewidth=EDGE_WIDTH,
+            label=f"{kind} joint",
         )
         for kind in kinds
     ]
     return [
         *handles,
-        Patch(facecolor=_MOTOR_FILL, edgecolor="black", linewidth=EDGE, label="motor"),
+        Patch(facecolor=_MOTOR_FILL, edgecolor="black", linewidth=EDGE_WIDTH, label="motor"),
         Line2D([], [], **scaled(_AXIS), label="joint axis"),
         Line2D([], [], **scaled(_LINK), label="link"),
-        Patch(facecolor=_BASE_FILL, edgecolor="black", linewidth=EDGE, label="base"),
+        Patch(facecolor=_BASE_FILL, edgecolor="black", linewidth=EDGE_WIDTH, label="base"),
     ]
 
 
@@ -369,31 +384,33 @@ def tool_path_figure(path: ToolPath) -> Figure:
     with new_figure(natural(2 if stacked else views)) as figure:
         panels = panels_of_views(figure, [1.0] * views, stacked=stacked)
         for axes, view in zip(panels, path.views, strict=True):
-            frame_view(axes, view, view.project(path.middle) + ROOM / 2 * path.size * np.array([[-1], [1]]))
+            frame_view(
+                axes, view, view.project(path.middle) + VIEW_WIDTH / 2 * path.size * np.array([[-1], [1]])
+            )
             for line in path.links:
                 axes.plot(*view.project(line).T, **scaled(_PATH_LINK), zorder=1)
-            for look, points in enumerate(path.paths.values()):
-                axes.plot(*view.project(points).T, **scaled(_PATH), color=line_style(look).color, zorder=2)
-                _draw_ellipses(axes, path, look, np.stack((view.right, view.up)))
+            for tool, points in enumerate(path.paths.values()):
+                axes.plot(*view.project(points).T, **scaled(_PATH), color=line_style(tool).color, zorder=2)
+                _draw_ellipses(axes, path, tool, np.stack((view.right, view.up)))
         return complete(figure, path.title, _path_handles(path))
 
 
 def _draw_ellipses(axes: Axes, path: ToolPath, tool: int, projection: FloatArray) -> None:
     """Draw the outlines of the displacements of a tool in a view, a projection (2, 3)."""
-    for place, displacement in zip(path.places[tool], path.displacements[tool], strict=True):
+    for origin, displacement in zip(path.origins[tool], path.displacements[tool], strict=True):
         if np.isfinite(displacement).all():
-            seen = projection @ displacement
-            squares, directions = np.linalg.eigh(seen @ seen.T)
+            projected = projection @ displacement
+            squares, directions = np.linalg.eigh(projected @ projected.T)
             outline = directions @ (np.sqrt(np.maximum(squares, 0.0))[:, None] * CIRCLE)
-            corners = (projection @ place)[:, None] + outline
+            corners = (projection @ origin)[:, None] + outline
             axes.plot(*corners, **scaled(_ELLIPSE), color=line_style(tool).color, zorder=3)
 
 
 def _path_handles(path: ToolPath) -> list[Artist]:
     """Return the legend: tools, links, and the force that the ellipses are for."""
     tools = [
-        Line2D([], [], **scaled(_PATH), color=line_style(look).color, label=f"path of {name}")
-        for look, name in enumerate(path.paths)
+        Line2D([], [], **scaled(_PATH), color=line_style(tool).color, label=f"path of {name}")
+        for tool, name in enumerate(path.paths)
     ]
     ellipse = f"ellipses: displacement by {path.force:g} N"
     return [

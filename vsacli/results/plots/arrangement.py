@@ -59,18 +59,22 @@ class Arrangement(NamedTuple):
     shares: list[float]
 
 
-def arranged(sheet: Sheet) -> Arrangement:
+def arrange_blocks(sheet: Sheet) -> Arrangement:
     """Arrange the blocks of a sheet for the current look: as declared, unless its width is fixed."""
     look = current_look()
     declared = Arrangement(sheet.size, list(sheet.blocks), stacked=False, shares=list(sheet.widths))
     if look.width is None:
         return declared
     if look.height is None:
-        columns = _fitting()
-        fits = sum(block.columns for block in sheet.blocks) <= columns
-        return declared if fits and look.scale * sheet.size[1] <= HIGHEST else _in_columns(sheet, columns)
-    others = (_in_columns(sheet, columns) for columns in range(1, MOST_COLUMNS + 1))
-    return _largest_font((declared, *others), lambda option: option.natural)
+        panel_columns = _columns_that_fit()
+        fits = sum(block.columns for block in sheet.blocks) <= panel_columns
+        return (
+            declared
+            if fits and look.scale * sheet.size[1] <= HIGHEST
+            else _stacked_blocks(sheet, panel_columns)
+        )
+    stacked_options = (_stacked_blocks(sheet, panel_columns) for panel_columns in range(1, MOST_COLUMNS + 1))
+    return _largest_font((declared, *stacked_options), lambda option: option.natural)
 
 
 def columns_of_panels(declared: int, natural: Callable[[int], Size], narrowest: float = NARROWEST) -> int:
@@ -85,7 +89,7 @@ def columns_of_panels(declared: int, natural: Callable[[int], Size], narrowest: 
     if look.width is None:
         return declared
     if look.height is None:
-        return min(declared, _fitting(narrowest))
+        return min(declared, _columns_that_fit(narrowest))
     columns: int = _largest_font((declared, *range(1, MOST_COLUMNS + 1)), natural)
     return columns
 
@@ -116,52 +120,53 @@ def _largest_font(options: Sequence[Option], natural: Callable[[Option], Size]) 
     return options[best if fonts[best] > WORTHWHILE * fonts[0] else 0]
 
 
-def _fitting(narrowest: float = NARROWEST) -> int:
+def _columns_that_fit(narrowest: float = NARROWEST) -> int:
     """Return the number of panels that fit side by side into the fixed width."""
     look = current_look()
     assert look.width is not None, "a width is fixed"
     return max(1, int(look.width / CM_PER_INCH / (narrowest * look.scale)))
 
 
-def _in_columns(sheet: Sheet, columns: int) -> Arrangement:
+def _stacked_blocks(sheet: Sheet, columns: int) -> Arrangement:
     """Arrange a sheet with at most this number of panels side by side: blocks below each other."""
-    blocks = [_refolded(block, columns) for block in sheet.blocks]
+    blocks = [_fold_to_columns(block, columns) for block in sheet.blocks]
     heights = [block.height for block in blocks]
-    names = LEGEND_WIDTH if any(block.beside for block in blocks) else 0.0
-    width = PANEL_WIDTH * max(2, *(block.columns for block in blocks)) + names
+    names_width = LEGEND_WIDTH if any(block.beside for block in blocks) else 0.0
+    width = PANEL_WIDTH * max(2, *(block.columns for block in blocks)) + names_width
     height = sum(heights) + AROUND + BETWEEN * (len(blocks) - 1)
     return Arrangement((width, height), blocks, stacked=True, shares=heights)
 
 
-def _refolded(block: PanelGrid, columns: int) -> PanelGrid:
+def _fold_to_columns(block: PanelGrid, columns: int) -> PanelGrid:
     """Return a block with at most this number of panels side by side."""
-    block = _divided(block, columns)
+    block = _divide_rows(block, columns)
     if block.most_rows is None:
         return block
-    groups = len(block.rows) // len(block.heights)
-    folds = max(1, min(groups, columns // len(block.rows[0])))
-    return block._replace(most_rows=math.ceil(groups / folds))
+    group_count = len(block.rows) // len(block.heights)
+    group_columns = max(1, min(group_count, columns // len(block.rows[0])))
+    return block._replace(most_rows=math.ceil(group_count / group_columns))
 
 
-def _divided(block: PanelGrid, columns: int) -> PanelGrid:
+def _divide_rows(block: PanelGrid, columns: int) -> PanelGrid:
     """Return a block whose rows are divided where they have more panels than that; the first part is short.
 
     Groups of rows stay together, so that a difference remains below its curves.
     """
-    wide, each = len(block.rows[0]), len(block.heights)
-    if wide <= columns:
+    row_length, group_rows = len(block.rows[0]), len(block.heights)
+    if row_length <= columns:
         return block
-    parts = math.ceil(wide / columns)
+    part_count = math.ceil(row_length / columns)
     padded = [
-        [*row[: wide % columns], *[None] * (-wide % columns), *row[wide % columns :]] for row in block.rows
+        [*row[: row_length % columns], *[None] * (-row_length % columns), *row[row_length % columns :]]
+        for row in block.rows
     ]
-    groups = [padded[first : first + each] for first in range(0, len(padded), each)]
+    groups = [padded[first : first + group_rows] for first in range(0, len(padded), group_rows)]
     rows = [
         row[columns * part : columns * (part + 1)]
         for group in groups
-        for part in range(parts)
+        for part in range(part_count)
         for row in group
     ]
-    beside = [block.beside[first : first + each] for first in range(0, len(block.beside), each)]
-    named = list(chain.from_iterable(list(names) * parts for names in beside))
-    return block._replace(rows=rows, heights=[*block.heights] * parts, beside=named)
+    beside = [block.beside[first : first + group_rows] for first in range(0, len(block.beside), group_rows)]
+    legends = list(chain.from_iterable(list(names) * part_count for names in beside))
+    return block._replace(rows=rows, heights=[*block.heights] * part_count, beside=legends)

@@ -19,7 +19,7 @@ from vsacli.results.charts.comparison import comparison_sheets
 from vsacli.results.charts.figures import sheets_of
 from vsacli.results.charts.look import current_look
 from vsacli.results.plots.arm_figure import tool_path_figure
-from vsacli.results.plots.sheets import drawn
+from vsacli.results.plots.sheets import draw_sheet
 from vsacli.results.plots.styles import house_style
 from vsacli.results.store.reader import StoredResult
 
@@ -48,7 +48,7 @@ _METADATA: dict[str, dict[str, str | None]] = {
 def draw_stored(stored: StoredResult, variables: Sequence[str] | None = None) -> Iterator[tuple[str, Figure]]:
     """Draw the figures of `plot_stored` lazily, since those of many joints are large."""
     for name, sheet in sheets_of(stored, variables):
-        figure = drawn(sheet) if isinstance(sheet, Sheet) else tool_path_figure(sheet)
+        figure = draw_sheet(sheet) if isinstance(sheet, Sheet) else tool_path_figure(sheet)
         large = np.prod(figure.get_size_inches()) > LARGE
         yield name, figure
         del figure, sheet  # frees memory before the next one is drawn
@@ -71,7 +71,7 @@ def plot_stored(stored: StoredResult, variables: Sequence[str] | None = None) ->
 
 def compare_files(files: Sequence[StoredResult], variables: Sequence[str] | None = None) -> Figures:
     """Draw results, or simulations, of the same joints on the same axes; see `comparison_sheets`."""
-    return {name: drawn(sheet) for name, sheet in comparison_sheets(files, variables)}
+    return {name: draw_sheet(sheet) for name, sheet in comparison_sheets(files, variables)}
 
 
 class FigureFiles:
@@ -97,9 +97,9 @@ class FigureFiles:
             StorageError: the disk is full or fails.
         """
         for name, figure in figures.items():
-            shown = drawn(figure) if isinstance(figure, Sheet) else figure
+            drawn_figure = draw_sheet(figure) if isinstance(figure, Sheet) else figure
             file = self._files[name]
-            file.write_bytes(rendered_figure(shown, file.path.suffix.removeprefix(".")))
+            file.write_bytes(rendered_figure(drawn_figure, file.path.suffix.removeprefix(".")))
 
 
 def save_figures(

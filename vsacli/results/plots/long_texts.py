@@ -24,12 +24,12 @@ SEPARATORS = (r"(?<=,) ", " ", r"(?<=\.)(?=[a-z])")
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 
-FEWEST = 8
+MIN_LINE_LENGTH = 8
 """Smallest length of a line, characters."""
 
 POINTS_PER_INCH = 72.0
 
-LINE = 0.17
+LINE_HEIGHT = 0.17
 """Height of a line at the usual font size, inches."""
 
 OVERHANG, SAFE = 1.1, 0.95
@@ -49,55 +49,60 @@ def fit_texts(figure: Figure) -> None:
     for axes in figure.axes:  # else the number of ticks depends on the settings when the figure is saved
         axes.tick_params(labelsize=look.points(TICK_SIZE))
     figure.draw_without_rendering()
-    added: dict[int, int] = defaultdict(int)
+    added_lines: dict[int, int] = defaultdict(int)
     for axes in figure.axes:
         _thin_ticks(axes, figure.dpi)
-        for text, room, upright in _texts(axes):
-            extent = text.get_window_extent()
-            taken = extent.height if upright else extent.width
-            if taken > SAFE * room:
-                before = text.get_text()
-                text.set_text(broken(before, max(FEWEST, int(_longest(before) * SAFE * room / taken))))
+        for text, available, upright in _texts_with_room(axes):
+            bbox = text.get_window_extent()
+            text_length = bbox.height if upright else bbox.width
+            if text_length > SAFE * available:
+                original = text.get_text()
+                text.set_text(
+                    wrapped(
+                        original,
+                        max(MIN_LINE_LENGTH, int(_longest_line(original) * SAFE * available / text_length)),
+                    )
+                )
                 if not upright:
-                    added[round(axes.bbox.x0)] += text.get_text().count("\n") - before.count("\n")
+                    added_lines[round(axes.bbox.x0)] += text.get_text().count("\n") - original.count("\n")
     _keep_inside(figure)
     if look.height is None:
-        lines = max(added.values(), default=0)
-        figure.set_figheight(figure.get_figheight() + LINE * look.scale * lines)
+        lines = max(added_lines.values(), default=0)
+        figure.set_figheight(figure.get_figheight() + LINE_HEIGHT * look.scale * lines)
 
 
-def broken(text: str, length: int) -> str:
+def wrapped(text: str, length: int) -> str:
     """Break a text into lines of limited length between words; shorten words that are longer than a line."""
     lines: list[str] = []
     for line in text.split("\n"):
-        whole = UNDIVIDED.sub(lambda found: found[0].replace(" ", NO_BREAK), line)
-        lines += _lines(whole, length, SEPARATORS)
+        unbroken = UNDIVIDED.sub(lambda match: match[0].replace(" ", NO_BREAK), line)
+        lines += _divided_lines(unbroken, length, SEPARATORS)
     return "\n".join(lines).replace(NO_BREAK, " ")
 
 
-def _lines(text: str, length: int, separators: tuple[str, ...]) -> list[str]:
+def _divided_lines(text: str, length: int, separators: tuple[str, ...]) -> list[str]:
     """Return the lines of a text that is divided at the first separators as far as that is enough."""
     if len(text) <= length:
         return [text]
     if not separators:
         return [text if "$" in text else shortened(text, length)]
-    between = " " if separators[0].endswith(" ") else ""
+    separator = " " if separators[0].endswith(" ") else ""
     lines: list[str] = []
     for part in re.split(separators[0], text):
-        if lines and len(lines[-1]) + len(between) + len(part) <= length:
-            lines[-1] += between + part
+        if lines and len(lines[-1]) + len(separator) + len(part) <= length:
+            lines[-1] += separator + part
         else:
-            lines += _lines(part, length, separators[1:])
+            lines += _divided_lines(part, length, separators[1:])
     return lines
 
 
 def _keep_inside(figure: Figure) -> None:
     """Leave space at the right for labels of ticks there, which some columns have outside of the layout."""
     ends = [label.get_window_extent().x1 for axes in figure.axes for label in _shown_labels(axes)]
-    beyond = max(ends, default=0.0) / figure.bbox.width - 1
+    overhang = max(ends, default=0.0) / figure.bbox.width - 1
     engine = figure.get_layout_engine()
-    if beyond > 0 and isinstance(engine, ConstrainedLayoutEngine):
-        engine.set(rect=(0.0, 0.0, 1.0 - beyond, 1.0))
+    if overhang > 0 and isinstance(engine, ConstrainedLayoutEngine):
+        engine.set(rect=(0.0, 0.0, 1.0 - overhang, 1.0))
 
 
 def _thin_ticks(axes: Axes, dpi: float) -> None:
@@ -116,21 +121,21 @@ def _thin_ticks(axes: Axes, dpi: float) -> None:
 def _shown_labels(axes: Axes) -> list[Text]:
     """Return the labels of the ticks of the horizontal axis that are drawn."""
     low, high = sorted(axes.get_xlim())
-    room = 1e-6 * (high - low)
+    tolerance = 1e-6 * (high - low)
     axes.get_xticklabels()  # places the ticks
-    shown = [
+    visible_labels = [
         tick.label1
         for tick in axes.xaxis.get_major_ticks()
-        if -room <= tick.get_loc() - low <= high - low + room
+        if -tolerance <= tick.get_loc() - low <= high - low + tolerance
     ]
-    return [label for label in shown if label.get_visible() and label.get_text()]
+    return [label for label in visible_labels if label.get_visible() and label.get_text()]
 
 
-def _longest(text: str) -> int:
+def _longest_line(text: str) -> int:
     return max(map(len, text.split("\n")))
 
 
-def _texts(axes: Axes) -> Iterator[tuple[Text, float, bool]]:
+def _texts_with_room(axes: Axes) -> Iterator[tuple[Text, float, bool]]:
     """Yield titles, labels and notes of a panel, each with its room in pixels and whether it is upright."""
     box = axes.get_window_extent()
     for text in axes.get_children():

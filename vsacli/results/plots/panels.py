@@ -70,7 +70,7 @@ def draw_chart(axes: Axes, chart: Chart) -> list[Artist]:
     corridors = _draw_corridors(axes, chart) if chart.band == ATTAINABLE else None
     handles: list[Artist] = []
     for line in chart.lines:
-        handles += draw_curve(axes, line.curve, line_style(line.look), line.look)
+        handles += draw_curve(axes, line.curve, line_style(line.style_index), line.style_index)
     handles += _draw_spreads(axes, chart.lines) if corridors is None else corridors
     if chart.shown is not None:
         axes.set_ylim(chart.shown)
@@ -99,10 +99,10 @@ def _write_note(axes: Axes, note: str, *, empty: bool) -> None:
         axes.set_yticks([])
 
 
-def _write_inside(axes: Axes, place: tuple[float, float], text: str, *, ha: str, va: str) -> None:
+def _write_inside(axes: Axes, position: tuple[float, float], text: str, *, ha: str, va: str) -> None:
     """Write small gray text at a place relative to the panel."""
     size = current_look().points(SMALL)
-    axes.text(*place, text, ha=ha, va=va, fontsize=size, color="0.35", transform=axes.transAxes)
+    axes.text(*position, text, ha=ha, va=va, fontsize=size, color="0.35", transform=axes.transAxes)
 
 
 def add_title(axes: Axes, title: str) -> None:
@@ -126,11 +126,13 @@ def draw_curve(axes: Axes, curve: Curve, style: LineStyle, index: int = 0) -> li
     """
     time, values = (curve.time, curve.values) if curve.envelope is None else curve.envelope[:2]
     markers = _marker_points(time, index * MARKER_STAGGER % 1)
-    axes.plot(time, values, **style.words, markevery=markers)
+    axes.plot(time, values, **style.line_kwargs, markevery=markers)
     gap = np.pad(np.isnan(values), 1, constant_values=True)
-    alone = ~gap[1:-1] & gap[:-2] & gap[2:]
-    if alone.any():
-        axes.plot(time[alone], values[alone], color=style.color, linestyle="none", marker=".", markersize=4)
+    isolated = ~gap[1:-1] & gap[:-2] & gap[2:]
+    if isolated.any():
+        axes.plot(
+            time[isolated], values[isolated], color=style.color, linestyle="none", marker=".", markersize=4
+        )
     if curve.envelope is None:
         return []
     axes.fill_between(time, curve.envelope.low, curve.envelope.high, color=style.color, **_ENVELOPE)
@@ -139,8 +141,8 @@ def draw_curve(axes: Axes, curve: Curve, style: LineStyle, index: int = 0) -> li
 
 def _marker_points(time: FloatArray, shift: float) -> list[int]:
     """Return the points nearest to `MARKERS_PER_CURVE` equidistant times."""
-    wanted = time[0] + (np.arange(MARKERS_PER_CURVE) + shift) / MARKERS_PER_CURVE * (time[-1] - time[0])
-    return [int(point) for point in np.unique(np.searchsorted(time, wanted))]
+    marker_times = time[0] + (np.arange(MARKERS_PER_CURVE) + shift) / MARKERS_PER_CURVE * (time[-1] - time[0])
+    return [int(point) for point in np.unique(np.searchsorted(time, marker_times))]
 
 
 def _draw_spreads(axes: Axes, lines: Sequence[Line]) -> list[Artist]:
@@ -150,12 +152,12 @@ def _draw_spreads(axes: Axes, lines: Sequence[Line]) -> list[Artist]:
     than inside.
     """
     bands = [line.band for line in lines if line.band is not None]
-    shown = axes.get_ylim() if bands else None
+    y_limits = axes.get_ylim() if bands else None
     for band in bands:
-        axes.fill_between(band.time, band.low, band.high, color=line_style(band.look).color, **_SPREAD)
-    if shown is None:
+        axes.fill_between(band.time, band.low, band.high, color=line_style(band.style_index).color, **_SPREAD)
+    if y_limits is None:
         return []
-    axes.set_ylim(shown)
+    axes.set_ylim(y_limits)
     return [Patch(facecolor="0.5", **_SPREAD, label=UNCERTAIN)]
 
 
@@ -175,20 +177,20 @@ def _draw_limits(axes: Axes, limits: Sequence[Limit]) -> list[Artist]:
     """Draw bounds of curves already drawn; extend the axis for bounds nearly in sight, write distant ones."""
     low, high = axes.get_ylim()
     reach = LIMIT_SIGHT * (high - low)
-    bounds = sorted({(limit.look, limit.value) for limit in limits})
-    seen = [(look, value) for look, value in bounds if low - reach <= value <= high + reach]
-    for look, value in seen:
+    bounds = sorted({(limit.style_index, limit.value) for limit in limits})
+    visible = [(look, value) for look, value in bounds if low - reach <= value <= high + reach]
+    for look, value in visible:
         axes.axhline(value, color=line_style(look).color, **scaled(_LIMIT))
         low, high = min(low, value - LIMIT_ROOM * reach), max(high, value + LIMIT_ROOM * reach)
-    if seen:
+    if visible:
         axes.set_ylim(low, high)
-    distant = [value for bound in bounds if bound not in seen for value in bound[1:]]
+    distant = [value for bound in bounds if bound not in visible for value in bound[1:]]
     if distant:
         words = "limits" if len(distant) > 1 else "limit"
         text = f"{words} beyond the axis: {', '.join(f'{value:.4g}' for value in distant)}"
-        place, aligned = _free_corner(axes)
-        _write_inside(axes, place, text, **aligned)
-    return [Line2D([], [], color="0.4", **scaled(_LIMIT), label="limit")] if seen else []
+        position, alignment = _free_corner(axes)
+        _write_inside(axes, position, text, **alignment)
+    return [Line2D([], [], color="0.4", **scaled(_LIMIT), label="limit")] if visible else []
 
 
 def _free_corner(axes: Axes) -> tuple[tuple[float, float], dict[str, str]]:
@@ -197,17 +199,20 @@ def _free_corner(axes: Axes) -> tuple[tuple[float, float], dict[str, str]]:
     lines = [np.asarray(line.get_xydata()) for line in axes.lines]
     points = [to_panel.transform(line) for line in lines if len(line) > 2]
 
-    def occupied(corner: tuple[str, str]) -> int:
-        x, y = (0.5 - NOTE_SIZE[0], 0.5 - NOTE_SIZE[1])
+    def points_in_corner(corner: tuple[str, str]) -> int:
+        x_threshold, y_threshold = (0.5 - NOTE_SIZE[0], 0.5 - NOTE_SIZE[1])
         signs = np.array([1 if corner[0] == "right" else -1, 1 if corner[1] == "top" else -1])
-        return sum(int(((each - 0.5) * signs > (x, y)).all(axis=1).sum()) for each in points)
+        return sum(
+            int(((curve_points - 0.5) * signs > (x_threshold, y_threshold)).all(axis=1).sum())
+            for curve_points in points
+        )
 
-    ha, va = min(product(("right", "left"), ("top", "bottom")), key=occupied)
-    place = (0.98 if ha == "right" else 0.02, 0.97 if va == "top" else 0.03)
-    return place, {"ha": ha, "va": va}
+    ha, va = min(product(("right", "left"), ("top", "bottom")), key=points_in_corner)
+    position = (0.98 if ha == "right" else 0.02, 0.97 if va == "top" else 0.03)
+    return position, {"ha": ha, "va": va}
 
 
-class _Failing(NamedTuple):
+class _JointFailures(NamedTuple):
     """Failures of one joint in one file, with the color of its curve."""
 
     time: FloatArray
@@ -216,7 +221,7 @@ class _Failing(NamedTuple):
     color: str
 
     @classmethod
-    def of(cls, failures: Failures, joint: int, color: str) -> _Failing:
+    def of(cls, failures: Failures, joint: int, color: str) -> _JointFailures:
         return cls(failures.time, failures.infeasible[joint], failures.singular[joint], color)
 
 
@@ -225,39 +230,58 @@ def _mark_failures(axes: Axes, chart: Chart) -> list[Artist]:
 
     A band over the full height would make all joints of the panel look infeasible.
     """
-    colors = {(line.file, line.joint): line_style(line.look).color for line in chart.lines}
-    several = [
-        _Failing.of(failures, joint, colors[file, joint])
+    colors = {(line.file, line.joint): line_style(line.style_index).color for line in chart.lines}
+    all_failing = [
+        _JointFailures.of(failures, joint, colors[file, joint])
         for file, (failures, joints) in enumerate(chart.failures)
         for joint in joints
         if (file, joint) in colors
     ]
-    failing = [each for each in several if each.infeasible.any() or each.singular.any()]
-    if len(several) == 1:
-        return [handle for each in failing for handle in _shade(axes, each, (0.0, 1.0), _INFEASIBLE)]
+    failing = [
+        joint_failing
+        for joint_failing in all_failing
+        if joint_failing.infeasible.any() or joint_failing.singular.any()
+    ]
+    if len(all_failing) == 1:
+        return [
+            handle
+            for joint_failing in failing
+            for handle in _shade(axes, joint_failing, (0.0, 1.0), _INFEASIBLE)
+        ]
     low, high = axes.get_ylim()
     if failing:
         axes.set_ylim(
             low - (high - low) * STRIP * (len(failing) + 1) / (1 - STRIP * (len(failing) + 1)), high
         )
     handles: list[Artist] = []
-    for at, each in enumerate(reversed(failing)):
-        look = {**_INFEASIBLE, "facecolor": each.color, "edgecolor": each.color, "linewidth": 0.8}
-        handles += _shade(axes, each, (STRIP * (at + 0.1), STRIP * 0.8), look, ", by color of joint")
+    for rank, joint_failing in enumerate(reversed(failing)):
+        style = {
+            **_INFEASIBLE,
+            "facecolor": joint_failing.color,
+            "edgecolor": joint_failing.color,
+            "linewidth": 0.8,
+        }
+        handles += _shade(
+            axes, joint_failing, (STRIP * (rank + 0.1), STRIP * 0.8), style, ", by color of joint"
+        )
     return handles
 
 
 def _shade(
-    axes: Axes, failing: _Failing, place: tuple[float, float], infeasible: dict[str, Any], whose: str = ""
+    axes: Axes,
+    failing: _JointFailures,
+    band_extent: tuple[float, float],
+    infeasible: dict[str, Any],
+    color_clause: str = "",
 ) -> list[Artist]:
     """Draw bands at samples that are infeasible (filled) or singular (hatched).
 
     Args:
         axes: panel to draw into.
         failing: failures to mark.
-        place: lower edge and height of the bands, relative to the height of the panel.
+        band_extent: lower edge and height of the bands, relative to the height of the panel.
         infeasible: appearance of infeasible samples.
-        whose: clause on the color, for the legend.
+        color_clause: clause on the color, for the legend.
 
     Returns:
         Legend entries of the bands.
@@ -267,11 +291,13 @@ def _shade(
         (failing.infeasible, infeasible, _INFEASIBLE, "infeasible"),
         (failing.singular, _SINGULAR, _SINGULAR, "singular"),
     )
-    for marked, look, of_legend, label in kinds:
+    for marked, style, legend_style, label in kinds:
         if marked.any():
-            extents = [(start, end - start) for start, end in marked_spans(failing.time, marked).tolist()]
-            axes.broken_barh(extents, place, transform=axes.get_xaxis_transform(), label=label, **look)
-            handles.append(Patch(**of_legend, label=label + whose))
+            time_spans = [(start, end - start) for start, end in marked_spans(failing.time, marked).tolist()]
+            axes.broken_barh(
+                time_spans, band_extent, transform=axes.get_xaxis_transform(), label=label, **style
+            )
+            handles.append(Patch(**legend_style, label=label + color_clause))
     return handles
 
 
@@ -298,27 +324,27 @@ def _mark_peaks(axes: Axes, lines: Sequence[Line], floor: float) -> list[Artist]
 
 def _peaks(line: Line, sign: int, end: float) -> list[_ClippedPeak]:
     """Return the extreme point of each interval beyond one end of the panel."""
-    time, values, color = line.curve.time, line.curve.values, line_style(line.look).color
+    time, values, color = line.curve.time, line.curve.values, line_style(line.style_index).color
     heights = np.where(np.isnan(values), -np.inf, sign * values)
     changes = np.flatnonzero(np.diff(heights > sign * end, prepend=False, append=False))
-    stretches = changes.reshape(-1, 2).tolist()
-    points = [start + int(np.argmax(heights[start:stop])) for start, stop in stretches]
-    return [_ClippedPeak(float(time[at]), float(values[at]), color) for at in points]
+    spans = changes.reshape(-1, 2).tolist()
+    points = [start + int(np.argmax(heights[start:stop])) for start, stop in spans]
+    return [_ClippedPeak(float(time[index]), float(values[index]), color) for index in points]
 
 
 def _mark_at_edge(axes: Axes, peaks: Sequence[_ClippedPeak], sign: int, middle: float, edge: float) -> None:
     """Draw a triangle for each peak at an edge of the panel, and write the value of the largest."""
-    place = axes.get_xaxis_transform()
+    transform = axes.get_xaxis_transform()
     marker = "^" if sign > 0 else "v"
     for peak in peaks:
-        axes.plot([peak.time], [edge], transform=place, color=peak.color, marker=marker, **scaled(_MARK))
+        axes.plot([peak.time], [edge], transform=transform, color=peak.color, marker=marker, **scaled(_MARK))
     farthest = max(peaks, key=lambda peak: sign * peak.value)
     at_right, value = farthest.time > middle, farthest.value
     axes.annotate(
         f"{value:.0f}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}",  # avoids exponents
         (farthest.time, edge),
         (-6 if at_right else 6, 0),
-        xycoords=place,
+        xycoords=transform,
         textcoords="offset points",
         ha="right" if at_right else "left",
         va="top" if sign > 0 else "bottom",

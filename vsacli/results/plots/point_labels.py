@@ -22,7 +22,7 @@ _LEADER: dict[str, Any] = {"arrowstyle": "-", "color": "0.4", "linewidth": 0.6, 
 SIZE = 8
 """Size of the font at the usual font size, points."""
 
-LETTER, LINE = 0.075, 0.14
+LETTER_WIDTH, LINE_HEIGHT = 0.075, 0.14
 """Width of a character and height of a line at that size, inches."""
 
 GAP = 5.0
@@ -45,9 +45,9 @@ class _Side(NamedTuple):
 
     def box(self, point: FloatArray, width: float, distance: float) -> FloatArray:
         """Return the corners of a label some gaps from a point, [[left, bottom], [right, top]], inches."""
-        gap, size = distance * GAP / POINTS_PER_INCH, np.array([width, LINE])
-        center = point + np.array([self.across, self.up]) * (gap + size / 2)
-        return np.array([center - size / 2, center + size / 2])
+        gap, box_size = distance * GAP / POINTS_PER_INCH, np.array([width, LINE_HEIGHT])
+        center = point + np.array([self.across, self.up]) * (gap + box_size / 2)
+        return np.array([center - box_size / 2, center + box_size / 2])
 
 
 _RIGHT, _LEFT = _Side(1, 0, "left", "center"), _Side(-1, 0, "right", "center")
@@ -55,15 +55,18 @@ _ABOVE, _BELOW = _Side(0, 1, "center", "bottom"), _Side(0, -1, "center", "top")
 _ABOVE_LEFT, _ABOVE_RIGHT = _Side(-1, 1, "right", "bottom"), _Side(1, 1, "left", "bottom")
 _BELOW_LEFT, _BELOW_RIGHT = _Side(-1, -1, "right", "top"), _Side(1, -1, "left", "top")
 
-BESIDE = (_RIGHT, _LEFT, _ABOVE, _BELOW, _ABOVE_LEFT, _ABOVE_RIGHT, _BELOW_LEFT, _BELOW_RIGHT)
+SIDES_OF_POINT = (_RIGHT, _LEFT, _ABOVE, _BELOW, _ABOVE_LEFT, _ABOVE_RIGHT, _BELOW_LEFT, _BELOW_RIGHT)
 """Sides of single points, the preferred ones first."""
 
-BELOW = (_BELOW_RIGHT, _ABOVE_LEFT, _RIGHT, _LEFT)
+SIDES_BELOW_LINE = (_BELOW_RIGHT, _ABOVE_LEFT, _RIGHT, _LEFT)
 """Sides on which labels are clear of a rising line through the points."""
 
 
 def label_points(
-    axes: Axes, places: Sequence[tuple[float, float]], labels: Sequence[str], sides: Sequence[_Side] = BESIDE
+    axes: Axes,
+    positions: Sequence[tuple[float, float]],
+    labels: Sequence[str],
+    sides: Sequence[_Side] = SIDES_OF_POINT,
 ) -> None:
     """Write a label next to each point, on a side where it overlaps no other; else leave it out.
 
@@ -73,7 +76,7 @@ def label_points(
 
     Args:
         axes: panel with linear axes.
-        places: points in coordinates of the data.
+        positions: points in coordinates of the data.
         labels: labels of the points, the most important first.
         sides: sides to try, the preferred ones first.
     """
@@ -81,25 +84,29 @@ def label_points(
     assert figure is not None, "panels belong to figures"
     figure.draw_without_rendering()
     size = np.asarray(axes.get_position().size) * figure.get_size_inches() / _scale()
-    points = [axes.transLimits.transform(place) * size for place in places]
-    taken = list(map(_mark_box, points))
-    marked = [line.get_xydata() for line in axes.get_lines() if line.get_marker() != "None"]
-    marks = [
-        _mark_box(axes.transLimits.transform(place) * size) for line in marked for place in np.asarray(line)
+    points = [axes.transLimits.transform(position) * size for position in positions]
+    label_boxes = list(map(_mark_box, points))
+    mark_arrays = [line.get_xydata() for line in axes.get_lines() if line.get_marker() != "None"]
+    mark_boxes = [
+        _mark_box(axes.transLimits.transform(position) * size)
+        for line in mark_arrays
+        for position in np.asarray(line)
     ]
-    for text, members in _grouped(points, labels):
-        own = members[0]
-        others = [each for number, each in enumerate(taken) if number not in members]
-        free = []
+    for text, members in _group_coincident(points, labels):
+        point = members[0]
+        other_boxes = [box_of_other for index, box_of_other in enumerate(label_boxes) if index not in members]
+        candidates = []
         for distance, side in product(DISTANCES, sides):
-            box = side.box(points[own], LETTER * len(text), distance)
+            box = side.box(points[point], LETTER_WIDTH * len(text), distance)
             inside = (box[0] >= 0).all() and (box[1] <= size).all()
-            if inside and not _count_overlapping(box, others):
-                free.append((_count_overlapping(box, marks) + distance / FARTHER, distance, side, box))
-        if free:
-            _, distance, side, box = min(free, key=lambda place: place[0])
-            taken.append(box)
-            _write_label(axes, text, places[own], side, distance)
+            if inside and not _count_overlapping(box, other_boxes):
+                candidates.append(
+                    (_count_overlapping(box, mark_boxes) + distance / FARTHER, distance, side, box)
+                )
+        if candidates:
+            _, distance, side, box = min(candidates, key=lambda place: place[0])
+            label_boxes.append(box)
+            _write_label(axes, text, positions[point], side, distance)
 
 
 def _mark_box(point: FloatArray) -> FloatArray:
@@ -112,15 +119,17 @@ def _scale() -> float:
     return current_look().points(SIZE) / SIZE
 
 
-def _grouped(points: Sequence[FloatArray], labels: Sequence[str]) -> Iterator[tuple[str, list[int]]]:
+def _group_coincident(points: Sequence[FloatArray], labels: Sequence[str]) -> Iterator[tuple[str, list[int]]]:
     """Yield the common label of points at the same place, and the numbers of these points."""
-    left = list(range(len(points)))
-    while left:
+    ungrouped = list(range(len(points)))
+    while ungrouped:
         members = [
-            at for at in left if np.abs(points[at] - points[left[0]]).max() < GAP / POINTS_PER_INCH / 2
+            index
+            for index in ungrouped
+            if np.abs(points[index] - points[ungrouped[0]]).max() < GAP / POINTS_PER_INCH / 2
         ]
-        left = [at for at in left if at not in members]
-        yield ", ".join(labels[at] for at in members), members
+        ungrouped = [index for index in ungrouped if index not in members]
+        yield ", ".join(labels[index] for index in members), members
 
 
 def _count_overlapping(box: FloatArray, boxes: Sequence[FloatArray]) -> int:
@@ -129,17 +138,17 @@ def _count_overlapping(box: FloatArray, boxes: Sequence[FloatArray]) -> int:
     return int(np.count_nonzero((box[0] < high).all(axis=1) & (low < box[1]).all(axis=1)))
 
 
-def _write_label(axes: Axes, text: str, place: tuple[float, float], side: _Side, distance: float) -> None:
-    aligned: dict[str, Any] = {"ha": side.align, "va": side.valign, "zorder": BELOW_MARKS}
+def _write_label(axes: Axes, text: str, position: tuple[float, float], side: _Side, distance: float) -> None:
+    alignment: dict[str, Any] = {"ha": side.align, "va": side.valign, "zorder": BELOW_MARKS}
     gap = distance * GAP * _scale()
     offset = (gap * side.across, gap * side.up)
-    written = axes.annotate(
+    annotation = axes.annotate(
         text,
-        place,
+        position,
         offset,
         textcoords="offset points",
         fontsize=SIZE * _scale(),
         arrowprops=_LEADER if distance > DISTANCES[0] else None,
-        **aligned,
+        **alignment,
     )
-    written.set_path_effects([withStroke(linewidth=2 * _scale(), foreground="white")])
+    annotation.set_path_effects([withStroke(linewidth=2 * _scale(), foreground="white")])

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from vsacli.results.charts.chart import DIFFERENCE, PANEL_WIDTH, folding
-from vsacli.results.charts.measured import AmplitudeSpectrum, Highest, RecordedCurve
+from vsacli.results.charts.measured import AmplitudeSpectrum, HighestDerivative, RecordedCurve
 from vsacli.results.plots.arrangement import columns_of_panels
 from vsacli.results.plots.panels import ZERO, add_title, draw_curve
 from vsacli.results.plots.sheets import AxesGrid, complete, share_time
@@ -39,10 +39,10 @@ _FIT = LineStyle(line_style(1).color, "-", "")
 def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
     """Draw four panels for each component: samples and spline, their difference, and two spectra."""
     rows, folds = folding(len(curves), MOST_ROWS)
-    across = _panels_across(rows, folds)
-    folds = folds if across == COLUMNS else 1
-    with new_figure(_natural(len(curves), folds, across)) as figure:
-        panels = _panels(figure, curves, folds, across)
+    panel_columns = _panel_columns(rows, folds)
+    folds = folds if panel_columns == COLUMNS else 1
+    with new_figure(_natural_size(len(curves), folds, panel_columns)) as figure:
+        panels = _panels(figure, curves, folds, panel_columns)
         handles: list[Artist] = [
             Line2D([], [], **scaled(_SAMPLES), label="recorded"),
             line_handle(_FIT, "spline"),
@@ -52,40 +52,42 @@ def recorded_figure(curves: Sequence[RecordedCurve], title: str) -> Figure:
             handles += _draw_residual(residual, curve)
             handles += _draw_spectrum(spectrum, curve, 0, curve.unit)
             handles += _draw_spectrum(highest, curve, curve.highest.order, curve.highest.unit)
-            add_title(spectrum, _followed(curve))
-            add_title(highest, _determined(curve.highest))
+            add_title(spectrum, _spectrum_title(curve))
+            add_title(highest, _highest_title(curve.highest))
         return complete(figure, title, handles)
 
 
-def _natural(count: int, folds: int, across: int) -> tuple[float, float]:
-    """Return the size of the figure with `across` of the panels of a component side by side, inches."""
+def _natural_size(count: int, folds: int, panel_columns: int) -> tuple[float, float]:
+    """Return the size of the figure, inches, with `panel_columns` panels of a component side by side."""
     rows = math.ceil(count / folds)
-    labels = 0.0 if across == COLUMNS else LABEL_HEIGHT
-    return across * folds * PANEL_WIDTH, (ROW_HEIGHT + labels) * rows * COLUMNS / across + 1.2
+    label_height = 0.0 if panel_columns == COLUMNS else LABEL_HEIGHT
+    return panel_columns * folds * PANEL_WIDTH, (
+        ROW_HEIGHT + label_height
+    ) * rows * COLUMNS / panel_columns + 1.2
 
 
-def _panels_across(rows: int, folds: int) -> int:
+def _panel_columns(rows: int, folds: int) -> int:
     """Return the number of panels of a component side by side: 4, or 2 or 1 where the figure is narrow."""
     count = rows * folds
-    natural = {4 * folds: (folds, 4), 2: (1, 2), 1: (1, 1)}
+    layout_by_columns = {4 * folds: (folds, 4), 2: (1, 2), 1: (1, 1)}
 
-    def size(columns: int) -> tuple[float, float]:
-        return _natural(count, *natural.get(columns, (folds, 4)))
+    def figure_size(columns: int) -> tuple[float, float]:
+        return _natural_size(count, *layout_by_columns.get(columns, (folds, 4)))
 
-    columns = columns_of_panels(COLUMNS * folds, size)
+    columns = columns_of_panels(COLUMNS * folds, figure_size)
     return COLUMNS if columns >= COLUMNS else min(columns, 2)
 
 
-def _panels(figure: Figure, curves: Sequence[RecordedCurve], folds: int, across: int) -> AxesGrid:
+def _panels(figure: Figure, curves: Sequence[RecordedCurve], folds: int, panel_columns: int) -> AxesGrid:
     """Return panels with labels of time and frequency, (components, 4)."""
-    rows, parts = math.ceil(len(curves) / folds), COLUMNS // across
-    grid = figure.add_gridspec(rows * parts, folds * across).subplots(squeeze=False)
-    grid = grid.reshape(rows, parts, folds, across).transpose(2, 0, 1, 3)
+    rows, row_parts = math.ceil(len(curves) / folds), COLUMNS // panel_columns
+    grid = figure.add_gridspec(rows * row_parts, folds * panel_columns).subplots(squeeze=False)
+    grid = grid.reshape(rows, row_parts, folds, panel_columns).transpose(2, 0, 1, 3)
     panels: AxesGrid = grid.reshape(-1, COLUMNS)
     for unused in panels[len(curves) :].flat:
         unused.remove()
     # Panels of other axes lie between those of one kind unless all are side by side: each is labeled.
-    _label_axes(panels[: len(curves)], curves, rows if parts == 1 else 1)
+    _label_axes(panels[: len(curves)], curves, rows if row_parts == 1 else 1)
     return panels
 
 
@@ -93,11 +95,11 @@ def _label_axes(panels: AxesGrid, curves: Sequence[RecordedCurve], rows: int) ->
     """Share the time axis of the panels of a column of so many rows, and label it below the last."""
     times = [time for curve in curves for time in curve.recorded.time[[0, -1]].tolist()]
     span = np.array([min(times), max(times)])
-    for first in range(0, len(panels), rows):
-        fold = panels[first : first + rows]
-        for column in fold[:, :2].T:
+    for start in range(0, len(panels), rows):
+        group = panels[start : start + rows]
+        for column in group[:, :2].T:
             share_time(column, span)
-        for axes in fold[-1, 2:]:
+        for axes in group[-1, 2:]:
             axes.set_xlabel("frequency [Hz]")
 
 
@@ -105,8 +107,8 @@ def _draw_signal(axes: Axes, curve: RecordedCurve) -> list[Artist]:
     axes.plot(curve.recorded.time, curve.recorded.values, **scaled(_SAMPLES))
     handles = draw_curve(axes, curve.fitted, _FIT)
     if not np.any(curve.spectrum.recorded):  # at rest: rounding errors must not set the scale
-        middle = float(np.mean(curve.recorded.values))
-        axes.set_ylim(middle - 0.1 * (abs(middle) or 1.0), middle + 0.1 * (abs(middle) or 1.0))
+        mean = float(np.mean(curve.recorded.values))
+        axes.set_ylim(mean - 0.1 * (abs(mean) or 1.0), mean + 0.1 * (abs(mean) or 1.0))
     add_title(axes, curve.name)
     axes.set_ylabel(f"[{curve.unit}]")
     return handles
@@ -146,17 +148,19 @@ def _draw_spectrum(axes: Axes, curve: RecordedCurve, order: int, unit: str) -> l
     spectrum = curve.spectrum
     axes.set_ylabel(rf"[{unit}/$\sqrt{{\mathrm{{Hz}}}}$]")
     factor = (2 * np.pi * spectrum.frequencies) ** order
-    recorded, fitted, noise = (factor * each for each in (spectrum.recorded, spectrum.fitted, spectrum.noise))
-    top = float(np.max(recorded))
-    if top == 0:
+    recorded, fitted, noise = (
+        factor * density for density in (spectrum.recorded, spectrum.fitted, spectrum.noise)
+    )
+    largest = float(np.max(recorded))
+    if largest == 0:
         return []
     handles: list[Artist] = []
     axes.loglog(spectrum.frequencies, recorded, **scaled(_SAMPLES))
-    axes.loglog(spectrum.frequencies, fitted, **_FIT.words)
+    axes.loglog(spectrum.frequencies, fitted, **_FIT.line_kwargs)
     if spectrum.noise > LEAST_DENSITY * float(np.max(spectrum.recorded)):
         axes.loglog(spectrum.frequencies, noise, **scaled(_NOISE))
         handles.append(_noise_handle())
-    axes.set_ylim(max(LEAST_DENSITY * float(np.max(fitted)), float(np.min(recorded)) / 3), 3 * top)
+    axes.set_ylim(max(LEAST_DENSITY * float(np.max(fitted)), float(np.min(recorded)) / 3), 3 * largest)
     axes.set_xlim(spectrum.frequencies[0], spectrum.frequencies[-1])
     return [*handles, *_draw_bands(axes, spectrum)]
 
@@ -166,9 +170,9 @@ def _draw_bands(axes: Axes, spectrum: AmplitudeSpectrum) -> list[Artist]:
     first, last = float(spectrum.frequencies[0]), float(spectrum.frequencies[-1])
     handles: list[Artist] = []
     end = last if math.isnan(spectrum.cutoff) else spectrum.cutoff
-    motion = float(np.fmin(spectrum.cutoff, spectrum.above))
-    if not math.isnan(motion):
-        axes.axvspan(first, motion, **_BAND)
+    motion_end = float(np.fmin(spectrum.cutoff, spectrum.above))
+    if not math.isnan(motion_end):
+        axes.axvspan(first, motion_end, **_BAND)
         handles.append(Patch(**_BAND, label="frequencies of the motion"))
     if spectrum.above < end:
         axes.axvspan(spectrum.above, end, **_FILTERED)
@@ -179,14 +183,18 @@ def _draw_bands(axes: Axes, spectrum: AmplitudeSpectrum) -> list[Artist]:
     return handles
 
 
-def _followed(curve: RecordedCurve) -> str:
+def _spectrum_title(curve: RecordedCurve) -> str:
     cutoff, above = curve.spectrum.cutoff, curve.spectrum.above
     if not np.any(curve.spectrum.recorded):
         return "at rest"
-    end = np.fmin(cutoff, above)
-    return "motion at all frequencies" if math.isnan(end) else f"motion to {end:.3g} Hz, {curve.knots} knots"
+    motion_end = np.fmin(cutoff, above)
+    return (
+        "motion at all frequencies"
+        if math.isnan(motion_end)
+        else f"motion to {motion_end:.3g} Hz, {curve.knots} knots"
+    )
 
 
-def _determined(highest: Highest) -> str:
-    stated = "" if math.isnan(highest.deviation) else f" +- {100 * highest.deviation:.2g} %"
-    return f"{highest.name}{stated}"
+def _highest_title(highest: HighestDerivative) -> str:
+    deviation_text = "" if math.isnan(highest.deviation) else f" +- {100 * highest.deviation:.2g} %"
+    return f"{highest.name}{deviation_text}"

@@ -51,27 +51,27 @@ _LIMIT: dict[str, dict[str, Any]] = {
 
 def actuators_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
     """Draw the torque over deflection of the springs, a panel for joints with equal actuators."""
-    return _figure(charts, f"{title}: torque of springs", _draw_torques)
+    return _panels_figure(charts, f"{title}: torque of springs", _draw_torques)
 
 
 def stiffness_figure(charts: Sequence[ActuatorChart], title: str) -> Figure:
     """Draw the attainable stiffness over torque, a panel for joints with equal actuators."""
-    return _figure(charts, f"{title}: attainable stiffness at rest", _draw_map)
+    return _panels_figure(charts, f"{title}: attainable stiffness at rest", _draw_map)
 
 
-def _figure(
+def _panels_figure(
     charts: Sequence[ActuatorChart], title: str, draw: Callable[[Axes, ActuatorChart], list[Artist]]
 ) -> Figure:
     """Draw a panel for each chart, with one legend."""
     with panel_grid(len(charts), PANEL_HEIGHT) as (figure, panels):
         handles: list[Artist] = []
         for axes, chart in zip(panels, charts, strict=True):
-            _name(axes, chart)
+            _set_panel_title(axes, chart)
             handles += draw(axes, chart)
         return complete(figure, title, handles)
 
 
-def _name(axes: Axes, chart: ActuatorChart) -> None:
+def _set_panel_title(axes: Axes, chart: ActuatorChart) -> None:
     """Set the title of a panel: names of the joints, and kind of their actuators."""
     title = "\n".join(shortened(line, TITLE_LENGTH) for line in (chart.title, chart.kind))
     axes.set_title(title, loc="left", parse_math=False)
@@ -87,11 +87,11 @@ def _draw_torques(axes: Axes, chart: ActuatorChart) -> list[Artist]:
     axes.axhline(0.0, **scaled(ZERO))
     axes.axvline(0.0, **scaled(ZERO))
     curves = chart.torques
-    for look, curve in enumerate(curves):
-        style = line_style(look)
-        marked = {**style.words, "markevery": max(1, np.isfinite(curve.torque).sum() // 8)}
-        shown = np.isfinite(curve.torque)
-        axes.plot(curve.deflection[shown], curve.torque[shown], **marked, label=curve.label)
+    for index, curve in enumerate(curves):
+        style = line_style(index)
+        style_with_markers = {**style.line_kwargs, "markevery": max(1, np.isfinite(curve.torque).sum() // 8)}
+        finite = np.isfinite(curve.torque)
+        axes.plot(curve.deflection[finite], curve.torque[finite], **style_with_markers, label=curve.label)
         if math.isfinite(curve.limit):
             axes.axvline(curve.limit, **scaled(_LIMIT[LIMITS["phi"]]))
             axes.axvline(-curve.limit, **scaled(_LIMIT[LIMITS["phi"]]))
@@ -116,62 +116,73 @@ def _legend(axes: Axes, chart: ActuatorChart, curves: Sequence[TorqueCurve]) -> 
 
 def _draw_map(axes: Axes, chart: ActuatorChart) -> list[Artist]:
     """Draw the attainable stiffness into a panel; return the legend entries."""
-    seen = chart.stiffness
+    stiffness_map = chart.stiffness
     handles: list[Artist] = []
     if chart.commanded:
-        handles += _draw_area(axes, seen)
-        handles += _draw_limits(axes, seen)
-        handles += _draw_ends(axes, seen)
+        handles += _draw_area(axes, stiffness_map)
+        handles += _draw_limits(axes, stiffness_map)
+        handles += _draw_ends(axes, stiffness_map)
     else:
-        handles += _draw_only(axes, seen)
-    for size in (-chart.load, chart.load) if chart.load else ():
-        axes.axvline(size, **scaled(_LOAD))
+        handles += _draw_fixed_stiffness(axes, stiffness_map)
+    for load in (-chart.load, chart.load) if chart.load else ():
+        axes.axvline(load, **scaled(_LOAD))
         handles.append(Line2D([], [], **scaled(_LOAD), label="largest torque of gravity"))
-    for end in chart.limits:
-        axes.axhline(end, **scaled(_ALLOWED))
+    for limit in chart.limits:
+        axes.axhline(limit, **scaled(_ALLOWED))
         handles.append(Line2D([], [], **scaled(_ALLOWED), label="stiffness limit of the file"))
-    axes.set_xlim(seen.tau_e[0], seen.tau_e[-1])
-    axes.set_ylim(0, seen.top)
-    if _is_wide(seen):
-        smallest = SMALLEST_SHARE * seen.top
-        shown = seen.lower[seen.lower > smallest]
+    axes.set_xlim(stiffness_map.tau_e[0], stiffness_map.tau_e[-1])
+    axes.set_ylim(0, stiffness_map.top)
+    if _is_wide(stiffness_map):
+        smallest = SMALLEST_SHARE * stiffness_map.top
+        visible_minimum = stiffness_map.lower[stiffness_map.lower > smallest]
         axes.set_yscale("log")
-        axes.set_ylim(shown.min() / 2 if shown.size else smallest, seen.top)
+        axes.set_ylim(visible_minimum.min() / 2 if visible_minimum.size else smallest, stiffness_map.top)
     words = "elastic " + _torque_words(chart)
     axes.set_xlabel(rf"{words} $\tau_e$ [{chart.unit('tau_e')}]")
     axes.set_ylabel(f"stiffness [{chart.unit('stiffness')}]")
     return handles
 
 
-def _is_wide(seen: StiffnessMap) -> bool:
+def _is_wide(stiffness_map: StiffnessMap) -> bool:
     """Return whether the stiffness needs a logarithmic axis."""
-    lower = seen.lower[np.isfinite(seen.lower)]
-    return bool(seen.top > WIDE_RATIO * np.median(lower))
+    lower = stiffness_map.lower[np.isfinite(stiffness_map.lower)]
+    return bool(stiffness_map.top > WIDE_RATIO * np.median(lower))
 
 
-def _draw_area(axes: Axes, seen: StiffnessMap) -> list[Artist]:
+def _draw_area(axes: Axes, stiffness_map: StiffnessMap) -> list[Artist]:
     """Draw the attainable range, and the part of it beyond a limit."""
-    upper = np.minimum(seen.upper, seen.top)
-    axes.fill_between(seen.tau_e, seen.lower, upper, where=upper >= seen.lower, **_AREA)
+    upper = np.minimum(stiffness_map.upper, stiffness_map.top)
+    axes.fill_between(
+        stiffness_map.tau_e, stiffness_map.lower, upper, where=upper >= stiffness_map.lower, **_AREA
+    )
     return [Patch(**_AREA, label="attainable")]
 
 
-def _draw_limits(axes: Axes, seen: StiffnessMap) -> list[Artist]:
+def _draw_limits(axes: Axes, stiffness_map: StiffnessMap) -> list[Artist]:
     """Draw where motors or springs reach their limits, and hatch the range beyond."""
-    tau_e = np.broadcast_to(seen.tau_e, seen.levels.shape)
+    tau_e = np.broadcast_to(stiffness_map.tau_e, stiffness_map.levels.shape)
     handles: list[Artist] = []
-    for words, clearance in seen.clearance.items():
+    for caption, clearance in stiffness_map.clearance.items():
         if not (clearance < 0).any():
             continue
-        look = scaled(_LIMIT[words])
-        lines = {"colors": look["color"], "linewidths": look["linewidth"], "linestyles": [look["linestyle"]]}
-        axes.contour(tau_e, seen.levels, clearance, levels=[0.0], **lines)
-        handles.append(Line2D([], [], **look, label=words))
+        style = scaled(_LIMIT[caption])
+        lines = {
+            "colors": style["color"],
+            "linewidths": style["linewidth"],
+            "linestyles": [style["linestyle"]],
+        }
+        axes.contour(tau_e, stiffness_map.levels, clearance, levels=[0.0], **lines)
+        handles.append(Line2D([], [], **style, label=caption))
     if not handles:
         return handles
-    worst = np.min(np.stack(list(seen.clearance.values())), axis=0)
+    smallest_clearance = np.min(np.stack(list(stiffness_map.clearance.values())), axis=0)
     shading = axes.contourf(
-        tau_e, seen.levels, worst, levels=[-np.inf, 0.0], colors=[_BEYOND["facecolor"]], hatches=["////"]
+        tau_e,
+        stiffness_map.levels,
+        smallest_clearance,
+        levels=[-np.inf, 0.0],
+        colors=[_BEYOND["facecolor"]],
+        hatches=["////"],
     )
     shading.set_edgecolor(_BEYOND["edgecolor"])
     shading.set_linewidth(0.0)
@@ -179,26 +190,31 @@ def _draw_limits(axes: Axes, seen: StiffnessMap) -> list[Artist]:
     return [*handles, Patch(**_BEYOND, label="beyond a limit")]
 
 
-def _draw_ends(axes: Axes, seen: StiffnessMap) -> list[Artist]:
+def _draw_ends(axes: Axes, stiffness_map: StiffnessMap) -> list[Artist]:
     """Draw the ends of the attainable range: where A is singular, and where springs or settings end."""
     handles: list[Artist] = []
     kinds = ((True, _SINGULAR, "singular decoupling matrix"), (False, _END, "end of springs or settings"))
-    for singular, look, label in kinds:
-        for end, marks in ((seen.lower, seen.lower_singular), (seen.upper, seen.upper_singular)):
-            there = np.isfinite(end) & (end <= seen.top) & (marks == singular)
-            if there.any():
-                joined = there | np.roll(there, 1) & np.isfinite(end)
-                axes.plot(seen.tau_e, np.where(joined, end, np.nan), **scaled(look))
-                handles.append(Line2D([], [], **scaled(look), label=label))
+    for singular, style, label in kinds:
+        for end, end_singular in (
+            (stiffness_map.lower, stiffness_map.lower_singular),
+            (stiffness_map.upper, stiffness_map.upper_singular),
+        ):
+            at_end = np.isfinite(end) & (end <= stiffness_map.top) & (end_singular == singular)
+            if at_end.any():
+                extended = at_end | np.roll(at_end, 1) & np.isfinite(end)
+                axes.plot(stiffness_map.tau_e, np.where(extended, end, np.nan), **scaled(style))
+                handles.append(Line2D([], [], **scaled(style), label=label))
     return handles
 
 
-def _draw_only(axes: Axes, seen: StiffnessMap) -> list[Artist]:
+def _draw_fixed_stiffness(axes: Axes, stiffness_map: StiffnessMap) -> list[Artist]:
     """Draw the stiffness of springs that no motor adjusts, dotted beyond a limit."""
-    within, beyond = seen.within[0], {**_ONLY, "linestyle": (0, (1, 1.5))}
-    axes.plot(seen.tau_e, np.where(within, seen.lower, np.nan), **scaled(_ONLY))
-    axes.plot(seen.tau_e, np.where(within, np.nan, seen.lower), **scaled(beyond))
+    within_limits, beyond_style = stiffness_map.within_limits[0], {**_ONLY, "linestyle": (0, (1, 1.5))}
+    axes.plot(stiffness_map.tau_e, np.where(within_limits, stiffness_map.lower, np.nan), **scaled(_ONLY))
+    axes.plot(
+        stiffness_map.tau_e, np.where(within_limits, np.nan, stiffness_map.lower), **scaled(beyond_style)
+    )
     handles: list[Artist] = [Line2D([], [], **scaled(_ONLY), label="stiffness that no motor adjusts")]
-    if not within.all():
-        handles.append(Line2D([], [], **scaled(beyond), label="stiffness beyond a limit"))
+    if not within_limits.all():
+        handles.append(Line2D([], [], **scaled(beyond_style), label="stiffness beyond a limit"))
     return handles

@@ -19,12 +19,12 @@ from vsacli.base.units import TIME
 from vsacli.results.charts import chart as charts
 from vsacli.results.charts.chart import PanelGrid, Sheet
 from vsacli.results.charts.look import current_look
-from vsacli.results.plots.arrangement import arranged
-from vsacli.results.plots.long_texts import LINE, broken, fit_texts
+from vsacli.results.plots.arrangement import arrange_blocks
+from vsacli.results.plots.long_texts import LINE_HEIGHT, fit_texts, wrapped
 from vsacli.results.plots.panels import draw_chart
 from vsacli.results.plots.styles import line_handle, line_style, make_legible, new_figure, shortened
 
-LATE = 1e5
+LATE_START = 1e5
 """Start time, s, from which ticks count from the start, since their digits would not fit side by side."""
 
 FINE, FEW_TICKS = 0.1, 4
@@ -46,17 +46,17 @@ AxesGrid = npt.NDArray[Any]
 """Panels in rows and columns."""
 
 
-def drawn(sheet: Sheet) -> Figure:
+def draw_sheet(sheet: Sheet) -> Figure:
     """Draw a sheet as a figure."""
-    arrangement = arranged(sheet)
+    arrangement = arrange_blocks(sheet)
     with new_figure(arrangement.natural) as figure:
         if arrangement.stacked:
-            places = figure.add_gridspec(len(arrangement.blocks), 1, height_ratios=arrangement.shares)
+            gridspec = figure.add_gridspec(len(arrangement.blocks), 1, height_ratios=arrangement.shares)
         else:
-            places = figure.add_gridspec(1, len(arrangement.blocks), width_ratios=arrangement.shares)
+            gridspec = figure.add_gridspec(1, len(arrangement.blocks), width_ratios=arrangement.shares)
         handles = line_handles(sheet.legend)
-        for place, block in enumerate(arrangement.blocks):
-            handles += _draw_block(places[place], block)
+        for index, block in enumerate(arrangement.blocks):
+            handles += _draw_block(gridspec[index], block)
         return complete(figure, sheet.title, handles)
 
 
@@ -65,26 +65,28 @@ def line_handles(lines: charts.Legend) -> list[Artist]:
     return [line_handle(line_style(look), label) for label, look in lines.items()]
 
 
-def _draw_block(place: SubplotSpec, block: PanelGrid) -> list[Artist]:
+def _draw_block(subplot_spec: SubplotSpec, block: PanelGrid) -> list[Artist]:
     """Draw the charts of a block; return the legend entries besides those of the lines."""
     handles: list[Artist] = []
-    panels = _panels(place, block)
-    for of_row, row in zip(panels, block.rows, strict=True):
-        for axes, chart in zip(of_row, row, strict=True):
+    panels = _panels(subplot_spec, block)
+    for axes_row, row in zip(panels, block.rows, strict=True):
+        for axes, chart in zip(axes_row, row, strict=True):
             handles += [] if chart is None else draw_chart(axes, chart)
-    for of_row, row, lines in zip(panels, block.rows, block.beside, strict=False):
+    for axes_row, row, lines in zip(panels, block.rows, block.beside, strict=False):
         if lines:
             last = max(column for column, chart in enumerate(row) if chart is not None)
-            _name_beside(of_row[last], line_handles(lines))
+            _name_beside(axes_row[last], line_handles(lines))
     return handles
 
 
-def _panels(place: SubplotSpec, block: PanelGrid) -> AxesGrid:
+def _panels(subplot_spec: SubplotSpec, block: PanelGrid) -> AxesGrid:
     """Return the panels of a block, (rows, columns); panels without a chart are removed."""
     rows, folds = block.folding
-    each, columns = len(block.heights), len(block.rows[0])
-    places = place.subgridspec(rows * each, folds * columns, height_ratios=[*block.heights] * rows)
-    grid = places.subplots(squeeze=False).reshape(rows * each, folds, columns)
+    group_rows, columns = len(block.heights), len(block.rows[0])
+    gridspec = subplot_spec.subgridspec(
+        rows * group_rows, folds * columns, height_ratios=[*block.heights] * rows
+    )
+    grid = gridspec.subplots(squeeze=False).reshape(rows * group_rows, folds, columns)
     panels = grid.swapaxes(0, 1).reshape(-1, columns)
     for unused in panels[len(block.rows) :].flat:
         unused.remove()
@@ -92,13 +94,15 @@ def _panels(place: SubplotSpec, block: PanelGrid) -> AxesGrid:
     present = np.array([[chart is not None for chart in row] for row in block.rows])
     for unused in panels[~present]:
         unused.remove()
-    for first in range(0, len(present), rows * each):
-        fold = slice(first, first + rows * each)
-        for column, there in zip(panels[fold].T, present[fold].T, strict=True):
-            if there.any():
-                share_time(column[there], block.time, block.xlabel)
-                if len(column) < rows * each:  # labels use the empty place below, else they tear rows apart
-                    column[there][-1].xaxis.set_in_layout(False)
+    for start in range(0, len(present), rows * group_rows):
+        fold_rows = slice(start, start + rows * group_rows)
+        for column, has_chart in zip(panels[fold_rows].T, present[fold_rows].T, strict=True):
+            if has_chart.any():
+                share_time(column[has_chart], block.time, block.xlabel)
+                if (
+                    len(column) < rows * group_rows
+                ):  # labels use the empty place below, else they tear rows apart
+                    column[has_chart][-1].xaxis.set_in_layout(False)
     return panels
 
 
@@ -108,10 +112,10 @@ def share_time(column: Sequence[Axes], time: FloatArray, label: str = f"time [{T
         axes.sharex(column[-1])
         axes.tick_params(labelbottom=False)
     column[-1].set_xlabel(label)
-    if time[0] >= LATE:
-        whole = math.floor(time[0])
-        column[-1].set_xlabel(f"time after {whole} {TIME} [{TIME}]")
-        column[-1].xaxis.set_major_formatter(lambda tick, _: f"{tick - whole:g}")
+    if time[0] >= LATE_START:
+        whole_seconds = math.floor(time[0])
+        column[-1].set_xlabel(f"time after {whole_seconds} {TIME} [{TIME}]")
+        column[-1].xaxis.set_major_formatter(lambda tick, _: f"{tick - whole_seconds:g}")
     if time[-1] > time[0]:
         column[-1].set_xlim(time[0], time[-1])
         if time[-1] - time[0] < FINE:
@@ -121,7 +125,7 @@ def share_time(column: Sequence[Axes], time: FloatArray, label: str = f"time [{T
 def _name_beside(axes: Axes, handles: Sequence[Artist]) -> None:
     """Add a legend of lines at the right of a panel."""
     labels = [shortened(str(handle.get_label()), LABEL_BESIDE) for handle in handles]
-    _take_literally(axes.legend(handles, labels, loc="center left", bbox_to_anchor=(1.0, 0.5)))
+    _disable_math(axes.legend(handles, labels, loc="center left", bbox_to_anchor=(1.0, 0.5)))
 
 
 def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
@@ -134,13 +138,13 @@ def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
         labels = ["\n".join(map(shortened, label.split("\n"))) for label in by_label]
         longest = max(len(line) for label in labels for line in label.split("\n"))
         width = look.scale * (_INCHES_PER_HANDLE + _INCHES_PER_CHARACTER * longest)
-        rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / width)))
-        columns = math.ceil(len(labels) / rows)
+        legend_rows = math.ceil(len(labels) / max(1, int(figure.get_figwidth() / width)))
+        columns = math.ceil(len(labels) / legend_rows)
         legend = figure.legend(list(by_label.values()), labels, loc="outside lower center", ncols=columns)
-        _take_literally(legend)
+        _disable_math(legend)
         if look.width is not None and look.height is None:
-            more = max(0, rows - ROWS_OF_LEGEND)
-            figure.set_figheight(figure.get_figheight() + LINE * look.scale * more)
+            extra_rows = max(0, legend_rows - ROWS_OF_LEGEND)
+            figure.set_figheight(figure.get_figheight() + LINE_HEIGHT * look.scale * extra_rows)
     make_legible(figure)
     if look.width is not None:
         fit_texts(figure)
@@ -149,12 +153,12 @@ def complete(figure: Figure, title: str, handles: Sequence[Artist]) -> Figure:
 
 def _title(title: str, figure: Figure) -> str:
     """Return a title of limited length, in lines as wide as the figure if its width is fixed."""
-    look, whole = current_look(), shortened(title, TITLE_LENGTH)
+    look, one_line = current_look(), shortened(title, TITLE_LENGTH)
     if look.width is None:
-        return whole
-    return broken(whole, int(figure.get_figwidth() / (TITLE_CHARACTER * look.scale)))
+        return one_line
+    return wrapped(one_line, int(figure.get_figwidth() / (TITLE_CHARACTER * look.scale)))
 
 
-def _take_literally(legend: Legend) -> None:
+def _disable_math(legend: Legend) -> None:
     for text in legend.get_texts():
         text.set_parse_math(False)

@@ -68,13 +68,13 @@ class MotorLimits(NamedTuple):
         """Return the largest driving torque at a speed; NaN above the largest attainable speed."""
         torque = np.full_like(speed, self.max_torque)
         if math.isfinite(self.max_voltage):
-            left = self.max_voltage - self.torque_constant * speed
-            by_voltage = (
-                left * self.torque_constant / self.resistance
+            remaining_voltage = self.max_voltage - self.torque_constant * speed
+            voltage_limited = (
+                remaining_voltage * self.torque_constant / self.resistance
                 if self.resistance
-                else np.where(left >= 0, math.inf, -math.inf)
+                else np.where(remaining_voltage >= 0, math.inf, -math.inf)
             )
-            torque = np.minimum(torque, by_voltage)
+            torque = np.minimum(torque, voltage_limited)
         return np.where((speed <= self.max_velocity) & (torque >= 0), torque, np.nan)
 
 
@@ -103,26 +103,28 @@ def torque_speed_figure(motors: Sequence[TorqueSpeed], title: str) -> Figure:
     """Draw a panel for each motor: |torque| over |speed|, paler where it brakes."""
     with panel_grid(len(motors), PANEL_HEIGHT) as (figure, panels):
         names = list(dict.fromkeys(name for motor in motors for name in motor.runs))
-        handles: list[Artist] = [Line2D([], [], **_run_look(at), label=name) for at, name in enumerate(names)]
+        handles: list[Artist] = [
+            Line2D([], [], **_run_look(index), label=name) for index, name in enumerate(names)
+        ]
         for axes, motor in zip(panels, motors, strict=True):
-            handles += _draw(axes, motor, names)
+            handles += _draw_motor(axes, motor, names)
         return complete(figure, title, handles)
 
 
-def _draw(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
+def _draw_motor(axes: Axes, motor: TorqueSpeed, names: Sequence[str]) -> list[Artist]:
     """Draw a panel; return its legend entries."""
     speeds, torques = (np.concatenate([np.abs(run[part]) for run in motor.runs.values()]) for part in (0, 1))
-    right = _end(float(speeds.max()), [min(motor.bounds.max_velocity, _fastest(motor.bounds))])
-    top = _end(float(torques.max()), [motor.bounds.max_torque, motor.bounds.continuous_torque])
-    handles = _draw_bounds(axes, motor.bounds, right, top)
+    x_max = _axis_end(float(speeds.max()), [min(motor.bounds.max_velocity, _no_load_speed(motor.bounds))])
+    y_max = _axis_end(float(torques.max()), [motor.bounds.max_torque, motor.bounds.continuous_torque])
+    handles = _draw_bounds(axes, motor.bounds, x_max, y_max)
     for name, (velocity, torque) in motor.runs.items():
         _draw_run(axes, velocity, torque, _run_look(names.index(name)))
     axes.plot(*motor.rms, **scaled(RMS_LOOK), zorder=5)
     handles.append(Line2D([], [], **scaled(RMS_LOOK), label="root mean square"))
     if any((velocity * torque < 0).any() for velocity, torque in motor.runs.values()):
         handles.append(Line2D([], [], color="black", alpha=BRAKING, label="pale: while it brakes"))
-    axes.set_xlim(0, right)
-    axes.set_ylim(0, top)
+    axes.set_xlim(0, x_max)
+    axes.set_ylim(0, y_max)
     title = "\n".join(shortened(line, TITLE_LENGTH) for line in (motor.name, motor.drive))
     axes.set_title(title, loc="left", parse_math=False)
     axes.set_xlabel(f"|speed| [{motor.velocity_unit}]")
@@ -136,47 +138,51 @@ def _run_look(index: int) -> dict[str, Any]:
     return {"color": style.color, "linestyle": style.linestyle}
 
 
-def _end(used: float, bounds: Sequence[float]) -> float:
+def _axis_end(largest: float, bounds: Sequence[float]) -> float:
     """Return the end of an axis, beyond the motion and beyond visible bounds."""
-    seen = [bound for bound in bounds if bound <= SIGHT * used]
-    return ROOM * max([used, *seen]) or 1.0
+    visible_bounds = [bound for bound in bounds if bound <= SIGHT * largest]
+    return ROOM * max([largest, *visible_bounds]) or 1.0
 
 
-def _fastest(bounds: MotorLimits) -> float:
+def _no_load_speed(bounds: MotorLimits) -> float:
     """Return the no-load speed at the maximum voltage."""
     return bounds.max_voltage / bounds.torque_constant if math.isfinite(bounds.max_voltage) else math.inf
 
 
-def _draw_bounds(axes: Axes, bounds: MotorLimits, right: float, top: float) -> list[Artist]:
-    speed = np.linspace(0, right, POINTS)
-    edge = bounds.torque_at(speed)
+def _draw_bounds(axes: Axes, bounds: MotorLimits, x_max: float, y_max: float) -> list[Artist]:
+    speed = np.linspace(0, x_max, POINTS)
+    torque_limit = bounds.torque_at(speed)
     handles: list[Artist] = []
-    if np.isinf(edge).all():
+    if np.isinf(torque_limit).all():
         return handles
-    axes.fill_between(speed, np.minimum(edge, 2 * top), **PEAK_LOOK, zorder=0.4)
+    axes.fill_between(speed, np.minimum(torque_limit, 2 * y_max), **PEAK_LOOK, zorder=0.4)
     handles.append(
         Patch(facecolor=PEAK_LOOK["facecolor"], edgecolor=EDGE["color"], label="within the peak limits")
     )
     if math.isfinite(bounds.continuous_torque):
-        lasting = np.minimum(edge, bounds.continuous_torque)
-        axes.fill_between(speed, np.minimum(lasting, 2 * top), **CONTINUOUS_LOOK, zorder=0.5)
+        continuous_torque = np.minimum(torque_limit, bounds.continuous_torque)
+        axes.fill_between(speed, np.minimum(continuous_torque, 2 * y_max), **CONTINUOUS_LOOK, zorder=0.5)
         handles.append(Patch(**CONTINUOUS_LOOK, label="within the continuous limits"))
-    axes.plot(speed, np.minimum(edge, 2 * top), **scaled(EDGE))
-    last = speed[np.isfinite(edge)]
-    if last.size and last[-1] < right * (1 - 1 / POINTS):
-        axes.plot([last[-1]] * 2, [0, min(edge[np.isfinite(edge)][-1], 2 * top)], **scaled(EDGE))
+    axes.plot(speed, np.minimum(torque_limit, 2 * y_max), **scaled(EDGE))
+    attainable_speeds = speed[np.isfinite(torque_limit)]
+    if attainable_speeds.size and attainable_speeds[-1] < x_max * (1 - 1 / POINTS):
+        axes.plot(
+            [attainable_speeds[-1]] * 2,
+            [0, min(torque_limit[np.isfinite(torque_limit)][-1], 2 * y_max)],
+            **scaled(EDGE),
+        )
     return handles
 
 
-def _draw_run(axes: Axes, velocity: FloatArray, torque: FloatArray, look: Mapping[str, Any]) -> None:
+def _draw_run(axes: Axes, velocity: FloatArray, torque: FloatArray, style: Mapping[str, Any]) -> None:
     """Draw |torque| over |speed|, dark where the motor drives."""
     drives = velocity * torque >= 0
-    for shown, alpha, order in ((~drives, BRAKING, 2), (drives, 1.0, 3)):
+    for mask, alpha, zorder in ((~drives, BRAKING, 2), (drives, 1.0, 3)):
         axes.plot(
-            np.where(shown, np.abs(velocity), np.nan),
-            np.where(shown, np.abs(torque), np.nan),
-            **look,
+            np.where(mask, np.abs(velocity), np.nan),
+            np.where(mask, np.abs(torque), np.nan),
+            **style,
             alpha=alpha,
-            zorder=order,
+            zorder=zorder,
             linewidth=1.2,
         )

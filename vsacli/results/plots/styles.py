@@ -20,7 +20,7 @@ from matplotlib.font_manager import FontEntry, findfont, fontManager, get_font
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
-from vsacli.results.charts.chart import DIFFERENCE, LIMIT_LOOK
+from vsacli.results.charts.chart import DIFFERENCE, LIMIT_STYLE
 from vsacli.results.charts.look import current_look, drawing_with
 
 if TYPE_CHECKING:
@@ -56,13 +56,13 @@ SETTINGS: dict[RcKeyType, Any] = {
     "svg.hashsalt": "vsacli",
 }
 
-TEXTS: tuple[RcKeyType, ...] = (
+TEXT_SIZES: tuple[RcKeyType, ...] = (
     "font.size",
     *("axes.titlesize", "axes.labelsize", "legend.fontsize", "xtick.labelsize", "ytick.labelsize"),
 )
 """Sizes of texts, which follow the font size of the look but stay legible."""
 
-SCALED: tuple[RcKeyType, ...] = (
+SCALED_SETTINGS: tuple[RcKeyType, ...] = (
     *("lines.linewidth", "lines.markersize", "lines.markeredgewidth", "axes.linewidth", "grid.linewidth"),
     *("xtick.major.size", "ytick.major.size", "xtick.major.width", "ytick.major.width", "patch.linewidth"),
     *("figure.constrained_layout.h_pad", "figure.constrained_layout.w_pad"),
@@ -97,7 +97,7 @@ class LineStyle:
     marker: str
 
     @property
-    def words(self) -> dict[str, Any]:
+    def line_kwargs(self) -> dict[str, Any]:
         """Keyword arguments for a line."""
         return {**dataclasses.asdict(self), "markerfacecolor": "none"}
 
@@ -106,7 +106,7 @@ def line_style(index: int) -> LineStyle:
     """Return the style of a look: 0 solid black, 1 dashed red, 2 blue with +, and so on."""
     if index == DIFFERENCE:
         return LineStyle(_COLORS[2], "-", "")
-    if index == LIMIT_LOOK:
+    if index == LIMIT_STYLE:
         return LineStyle("0.3", "-", "")
     return LineStyle(_COLORS[index % len(_COLORS)], *_STROKES[index % len(_STROKES)])
 
@@ -124,8 +124,8 @@ def house_style() -> Iterator[None]:
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(SETTINGS)
-        matplotlib.rcParams.update({name: look.points(matplotlib.rcParams[name]) for name in TEXTS})
-        matplotlib.rcParams.update({name: look.scale * matplotlib.rcParams[name] for name in SCALED})
+        matplotlib.rcParams.update({name: look.points(matplotlib.rcParams[name]) for name in TEXT_SIZES})
+        matplotlib.rcParams.update({name: look.scale * matplotlib.rcParams[name] for name in SCALED_SETTINGS})
         yield
 
 
@@ -144,24 +144,24 @@ SIZES = ("linewidth", "markersize")
 """Properties of lines in points."""
 
 
-def scaled(look: Mapping[str, Any]) -> dict[str, Any]:
+def scaled(style: Mapping[str, Any]) -> dict[str, Any]:
     """Return a style whose widths of lines and sizes of markers follow the font size of the current look."""
     scale = current_look().scale
-    return {name: scale * value if name in SIZES else value for name, value in look.items()}
+    return {name: scale * value if name in SIZES else value for name, value in style.items()}
 
 
 def line_handle(style: LineStyle, label: str) -> Artist:
     """Return the legend entry of a curve."""
-    return Line2D([], [], **style.words, label=label)
+    return Line2D([], [], **style.line_kwargs, label=label)
 
 
-USUAL = "DejaVu Sans"
+DEFAULT_FONT = "DejaVu Sans"
 """Default font, included in Matplotlib."""
 
-SUBSTITUTE = "Last Resort"
+FALLBACK_PREFIX = "Last Resort"
 """Beginning of the name of a fallback font, which draws the same symbol for all letters of a script."""
 
-REGULAR = 400
+REGULAR_WEIGHT = 400
 """Font weight that is neither bold nor light."""
 
 
@@ -179,41 +179,41 @@ def make_legible(figure: Figure) -> None:
 
 def _make_legible(text: Text, missing: frozenset[str]) -> None:
     fonts = further_fonts(missing)
-    text.set_fontfamily([USUAL, *(name for name, _ in fonts)])
-    drawn = frozenset("").union(*(letters for _, letters in fonts))
-    written = text.get_text()
-    for letter in missing - drawn:
-        written = written.replace(letter, letter.encode("unicode_escape").decode("ascii"))
-    text.set_text(written)
+    text.set_fontfamily([DEFAULT_FONT, *(name for name, _ in fonts)])
+    supplied = frozenset("").union(*(letters for _, letters in fonts))
+    escaped = text.get_text()
+    for letter in missing - supplied:
+        escaped = escaped.replace(letter, letter.encode("unicode_escape").decode("ascii"))
+    text.set_text(escaped)
 
 
 @cache
 def usual_letters() -> frozenset[str]:
     """Return the characters of the default font, and the line feed."""
-    return _letters(findfont(USUAL)) | {"\n"}
+    return _letters(findfont(DEFAULT_FONT)) | {"\n"}
 
 
 @cache
 def further_fonts(missing: frozenset[str]) -> tuple[tuple[str, frozenset[str]], ...]:
     """Return names of installed fonts for these characters, each with the characters that it supplies."""
-    found = []
+    fonts = []
     for entry in installed_fonts():
         if not missing:
             break
-        here = missing & _letters(entry.fname)
-        if here:
-            found.append((entry.name, here))
-            missing -= here
-    return tuple(found)
+        supplied = missing & _letters(entry.fname)
+        if supplied:
+            fonts.append((entry.name, supplied))
+            missing -= supplied
+    return tuple(fonts)
 
 
 def installed_fonts() -> Iterator[FontEntry]:
     """Return the fonts of this machine, upright regular ones first."""
     entries = sorted(
         fontManager.ttflist,
-        key=lambda entry: (entry.weight != REGULAR, entry.style != "normal", entry.name, entry.fname),
+        key=lambda entry: (entry.weight != REGULAR_WEIGHT, entry.style != "normal", entry.name, entry.fname),
     )
-    return (entry for entry in entries if not entry.name.startswith(SUBSTITUTE))
+    return (entry for entry in entries if not entry.name.startswith(FALLBACK_PREFIX))
 
 
 @cache

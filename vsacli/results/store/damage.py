@@ -30,10 +30,10 @@ SCALES = "DIMENSION_LIST"
 
 EXPECTED = "expected a result file, as invdyn or simulate writes it"
 
-_COLLECTION = struct.Struct("<8xQ")
-_OBJECT = struct.Struct("<HHIQ")
+_HEAP_HEADER = struct.Struct("<8xQ")
+_OBJECT_HEADER = struct.Struct("<HHIQ")
 _REFERENCE = struct.Struct("<IQI")
-_HEAP = b"GCOL\x01\0\0\0"
+_HEAP_SIGNATURE = b"GCOL\x01\0\0\0"
 _SMALLEST_HEAP = 4096
 _LARGEST_HEAP = 2**26
 _LARGEST_CHUNK = 2**20
@@ -58,22 +58,22 @@ class CheckedFile(h5py.File):  # type: ignore[misc]  # h5py has no types
     def __init__(self, path: str | Path) -> None:
         _check_signature(path)
         with reporting_damage(path):
-            self._bytes = _CheckedBytes(path)
+            self._checked_bytes = _CheckedBytes(path)
             try:
-                super().__init__(self._bytes, "r")
+                super().__init__(self._checked_bytes, "r")
             except BaseException:
-                self._bytes.close()
+                self._checked_bytes.close()
                 raise
 
     def close(self) -> None:
         """Close the file."""
         super().close()
-        self._bytes.close()
+        self._checked_bytes.close()
 
     def bytes_at(self, offset: int, size: int) -> bytes:
         """Return bytes of the file unchanged, fewer at the end of the file."""
-        self._bytes.seek(offset)
-        return self._bytes.read(size)
+        self._checked_bytes.seek(offset)
+        return self._checked_bytes.read(size)
 
 
 class _CheckedBytes(io.FileIO):
@@ -93,24 +93,24 @@ class _CheckedBytes(io.FileIO):
 
     def readinto(self, buffer: Any) -> int:
         """Fill the buffer from the file; beyond the end of the file with zeros."""
-        view, start, done = memoryview(buffer), self.tell(), 0
-        while count := super().readinto(view[done:]):
-            done += count
-        if bytes(view[: len(_HEAP)]) == _HEAP and not self._ends(start):
-            done = 0
-        view[done:] = bytes(len(view) - done)  # zeros beyond the end of the file, or in place of the heap
+        view, start, filled = memoryview(buffer), self.tell(), 0
+        while count := super().readinto(view[filled:]):
+            filled += count
+        if bytes(view[: len(_HEAP_SIGNATURE)]) == _HEAP_SIGNATURE and not self._is_heap_valid(start):
+            filled = 0
+        view[filled:] = bytes(len(view) - filled)  # zeros beyond the end of the file, or in place of the heap
         return len(view)
 
-    def _ends(self, offset: int) -> bool:
+    def _is_heap_valid(self, offset: int) -> bool:
         """Return whether a heap is as large as its header states, and each of its objects ends.
 
         A heap collection (HDF5 file format 3.0, III.E) is a sequence of objects, each after its header of
         index, reference count and size; index 0 is the free space at the end.
         """
         self.seek(offset)
-        head = self.read(_COLLECTION.size)
-        size = _COLLECTION.unpack(head)[0] if len(head) == _COLLECTION.size else 0
-        return _SMALLEST_HEAP <= size <= _LARGEST_HEAP and _all_end(self.read(size - len(head)))
+        header = self.read(_HEAP_HEADER.size)
+        size = _HEAP_HEADER.unpack(header)[0] if len(header) == _HEAP_HEADER.size else 0
+        return _SMALLEST_HEAP <= size <= _LARGEST_HEAP and _objects_fill_heap(self.read(size - len(header)))
 
 
 def _lock(file: io.FileIO) -> None:
@@ -152,8 +152,8 @@ def _check_signature(path: str | Path) -> None:
 
 
 @contextlib.contextmanager
-def reporting_damage(path: str | Path, what: str = "") -> Iterator[None]:
-    """Turn exceptions by which HDF5 reports truncation or corruption, here of `what`, into InputError."""
+def reporting_damage(path: str | Path, variable: str = "") -> Iterator[None]:
+    """Turn exceptions by which HDF5 reports truncation or corruption, here of `variable`, into InputError."""
     try:
         yield
     except InputError:
@@ -171,24 +171,24 @@ def reporting_damage(path: str | Path, what: str = "") -> Iterator[None]:
         MemoryError,
         NotImplementedError,
     ) as error:
-        subject = f"variable {what} is" if what else "is"
+        subject = f"variable {variable} is" if variable else "is"
         reason = f" ({' '.join(str(error).split())[:200]})" if isinstance(error, DamageError) else ""
         raise InputError.one(f"{subject} damaged or truncated{reason}; compute it again", path) from error
 
 
-def _all_end(objects: bytes) -> bool:
+def _objects_fill_heap(objects: bytes) -> bool:
     """Return whether the objects of a heap fill it: none is empty, and none extends beyond its end."""
     position = 0
-    while len(objects) - position >= _OBJECT.size:
-        index, _, _, size = _OBJECT.unpack_from(objects, position)
-        room = size if index == 0 else _OBJECT.size + -(-size // 8) * 8
-        if not 0 < room <= len(objects) - position:
+    while len(objects) - position >= _OBJECT_HEADER.size:
+        index, _, _, size = _OBJECT_HEADER.unpack_from(objects, position)
+        object_size = size if index == 0 else _OBJECT_HEADER.size + -(-size // 8) * 8
+        if not 0 < object_size <= len(objects) - position:
             return False
-        position += room
+        position += object_size
     return True
 
 
-def own_dataset(file: CheckedFile, name: str) -> h5py.Dataset:
+def local_dataset(file: CheckedFile, name: str) -> h5py.Dataset:
     """Return a dataset if its values are in this file, and chunks and texts claim no more bytes than it has.
 
     Raises:
@@ -210,13 +210,13 @@ def own_dataset(file: CheckedFile, name: str) -> h5py.Dataset:
     return dataset
 
 
-def check_present(attributes: Container[str], needed: Iterable[str], name: str = "the file") -> None:
+def check_present(attributes: Container[str], required: Iterable[str], name: str = "the file") -> None:
     """Refuse an object that lacks attributes required in each file.
 
     Raises:
         DamageError: with the missing attributes.
     """
-    missing = [each for each in needed if each not in attributes]
+    missing = [attribute for attribute in required if attribute not in attributes]
     if missing:
         raise DamageError(f"{name} has no attribute {', '.join(missing)}")
 
@@ -224,10 +224,10 @@ def check_present(attributes: Container[str], needed: Iterable[str], name: str =
 def read_texts(file: h5py.File) -> None:
     """Read all attributes of all objects, and all datasets of texts, since damage of one shows only then."""
 
-    def read(_name: str, each: h5py.Group | h5py.Dataset) -> None:
-        dict(each.attrs)
-        if isinstance(each, h5py.Dataset) and h5py.check_string_dtype(each.dtype):
-            bounded(each)[()]
+    def read(_name: str, node: h5py.Group | h5py.Dataset) -> None:
+        dict(node.attrs)
+        if isinstance(node, h5py.Dataset) and h5py.check_string_dtype(node.dtype):
+            check_nbytes(node)[()]
 
     file.visititems(read)
 
@@ -237,7 +237,7 @@ def file_size(file: h5py.File) -> int:
     return int(file.id.get_filesize())
 
 
-def bounded(dataset: h5py.Dataset) -> h5py.Dataset:
+def check_nbytes(dataset: h5py.Dataset) -> h5py.Dataset:
     """Return the dataset if its values need no more memory than its file has bytes.
 
     Raises:
@@ -255,12 +255,12 @@ def check_times(time: FloatArray) -> None:
     Raises:
         DamageError: times are not finite or not ascending, or beyond the range allowed in trajectories.
     """
-    finite, rising = np.isfinite(time), time[1:] > time[:-1]
+    finite, ascending = np.isfinite(time), time[1:] > time[:-1]
     if not finite.all():
         sample = int(np.argmin(finite))
         raise DamageError(f"sample {sample} is at {time[sample]} s")
-    if not rising.all():
-        sample = int(np.argmin(rising))
+    if not ascending.all():
+        sample = int(np.argmin(ascending))
         raise DamageError(f"{time[sample + 1]:.9g} s follows {time[sample]:.9g} s, at sample {sample + 1}")
     if time.size and not max(-time[0], time[-1]) <= LONGEST:
         raise DamageError(f"they go from {time[0]:.3g} to {time[-1]:.3g} s")
@@ -270,13 +270,13 @@ def _check_chunks(dataset: h5py.Dataset, size: int) -> None:
     """Check the size that follows from the shape of a chunk, and the size that the library allocates."""
     if dataset.chunks is None:
         return
-    claimed = dataset.dtype.itemsize
+    claimed_bytes = dataset.dtype.itemsize
     for length in dataset.chunks:
-        claimed *= length
+        claimed_bytes *= length
     if dataset.size:
-        claimed = max(claimed, dataset.id.get_chunk_info_by_coord((0,) * dataset.ndim).size)
-    if claimed > max(size, _LARGEST_CHUNK):
-        raise DamageError(f"{dataset.name} claims chunks of {claimed:,} bytes in a file of {size:,}")
+        claimed_bytes = max(claimed_bytes, dataset.id.get_chunk_info_by_coord((0,) * dataset.ndim).size)
+    if claimed_bytes > max(size, _LARGEST_CHUNK):
+        raise DamageError(f"{dataset.name} claims chunks of {claimed_bytes:,} bytes in a file of {size:,}")
 
 
 def _check_texts(dataset: h5py.Dataset, file: CheckedFile) -> None:
@@ -285,7 +285,7 @@ def _check_texts(dataset: h5py.Dataset, file: CheckedFile) -> None:
     if offset is None:
         return
     references = file.bytes_at(offset, min(dataset.size * _REFERENCE.size, size))
-    whole = len(references) // _REFERENCE.size * _REFERENCE.size
-    claimed = sum(length for length, _, _ in _REFERENCE.iter_unpack(references[:whole]))
-    if claimed > size:
-        raise DamageError(f"{dataset.name} claims texts of {claimed:,} bytes in a file of {size:,}")
+    complete_bytes = len(references) // _REFERENCE.size * _REFERENCE.size
+    claimed_bytes = sum(length for length, _, _ in _REFERENCE.iter_unpack(references[:complete_bytes]))
+    if claimed_bytes > size:
+        raise DamageError(f"{dataset.name} claims texts of {claimed_bytes:,} bytes in a file of {size:,}")

@@ -20,10 +20,10 @@ from vsacli.results.store.writer import ResultWriter
 from vsacli.robot.model import Robot
 from vsacli.trajectory.trajectory import Trajectory
 
-_COMPUTED = ("q", "dq", "ddq", "tau_e", "theta", "tau_motor", "motor_power", "flags")
+_COMPUTED_VARIABLES = ("q", "dq", "ddq", "tau_e", "theta", "tau_motor", "motor_power", "flags")
 """Variables stored in addition to the derivatives."""
 
-_SLOPE = "_slope"
+_SLOPE_SUFFIX = "_slope"
 """Suffix of the names of derivatives."""
 
 
@@ -47,11 +47,11 @@ class SimulationWriter(ResultWriter):
         sensed: bool = False,
         provenance: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
-        self._sensed = sensed
+        self._has_sensors = sensed
         super().__init__(file, robot, trajectory, provenance=provenance)
 
-    def _absent(self, trajectory: Trajectory) -> dict[str, str]:  # noqa: ARG002
-        return {} if self._sensed else dict.fromkeys(map(measured, MEASURED), "the run had no sensors")
+    def _absent_reasons(self, trajectory: Trajectory) -> dict[str, str]:  # noqa: ARG002
+        return {} if self._has_sensors else dict.fromkeys(map(measured, MEASURED), "the run had no sensors")
 
 
 class ParameterValue(NamedTuple):
@@ -77,36 +77,41 @@ class SensitivityWriter(ResultWriter):
         file: Staged,
         robot: Robot,
         trajectory: Trajectory,
-        numbers: Sequence[ParameterValue],
-        slopes: Mapping[str, bool],
+        parameters: Sequence[ParameterValue],
+        differentiated: Mapping[str, bool],
         *,
         provenance: Mapping[str, str],
     ) -> None:
-        super().__init__(file, robot, trajectory, _COMPUTED, provenance=provenance)
-        self._numbers, self._wanted = numbers, slopes
+        super().__init__(file, robot, trajectory, _COMPUTED_VARIABLES, provenance=provenance)
+        self._parameters, self._differentiated = parameters, differentiated
 
-    def _create(self) -> None:
-        super()._create()
-        file, (paths, values, units) = self._file, zip(*self._numbers, strict=True)
-        scale = create_labels(file, "parameter", paths, "number of the robot file", track_order=False)
-        scale.make_scale("parameter")
-        stored = file.create_dataset("parameter_value", data=list(values))
-        words = "SI unit of the number"
-        for dataset in (stored, create_labels(file, "parameter_unit", units, words, track_order=False)):
-            attach_scales(dataset, [scale])
-        for name, of_motors in self._wanted.items():
-            slope = self._slope(name, of_motors, scale)
-            self._fillers[f"{name}{_SLOPE}"] = ChunkFiller(slope, self.do)
+    def _create_datasets(self) -> None:
+        super()._create_datasets()
+        file, (paths, values, units) = self._file, zip(*self._parameters, strict=True)
+        parameter_scale = create_labels(
+            file, "parameter", paths, "number of the robot file", track_order=False
+        )
+        parameter_scale.make_scale("parameter")
+        values_dataset = file.create_dataset("parameter_value", data=list(values))
+        long_name = "SI unit of the number"
+        for dataset in (
+            values_dataset,
+            create_labels(file, "parameter_unit", units, long_name, track_order=False),
+        ):
+            attach_scales(dataset, [parameter_scale])
+        for name, of_motors in self._differentiated.items():
+            slope_dataset = self._create_slope(name, of_motors, parameter_scale)
+            self._fillers[f"{name}{_SLOPE_SUFFIX}"] = ChunkFiller(slope_dataset, self.schedule_write)
 
-    def _slope(self, name: str, of_motors: bool, scale: h5py.Dataset) -> h5py.Dataset:
-        row = (len(self._numbers), len(self._robot.joints), *((len(MOTORS),) if of_motors else ()))
+    def _create_slope(self, name: str, of_motors: bool, scale: h5py.Dataset) -> h5py.Dataset:
+        row_shape = (len(self._parameters), len(self._robot.joints), *((len(MOTORS),) if of_motors else ()))
         samples = self._trajectory.samples
         dataset = self._file.create_dataset(
-            f"{name}{_SLOPE}",
-            shape=(samples, *row),
-            maxshape=(samples, *row),
+            f"{name}{_SLOPE_SUFFIX}",
+            shape=(samples, *row_shape),
+            maxshape=(samples, *row_shape),
             dtype="<f8",
-            chunks=(chunk_rows(samples, 8 * int(np.prod(row))), *row),
+            chunks=(chunk_rows(samples, 8 * int(np.prod(row_shape))), *row_shape),
         )
         dataset.attrs["units"] = f"units of {name}, per parameter_unit"
         dataset.attrs["long_name"] = f"derivative of {name} by each number of the robot file"
@@ -114,12 +119,12 @@ class SensitivityWriter(ResultWriter):
         attach_scales(dataset, scales[: dataset.ndim])
         return dataset
 
-    def _values(self, block: Any, name: str) -> AnyArray:
+    def _dataset_values(self, block: Any, name: str) -> AnyArray:
         """Return the values of a block, or of its derivatives, for a dataset."""
-        variable = name.removesuffix(_SLOPE)
-        return super()._values(block.block, name) if variable == name else block.over_time(variable)
+        variable = name.removesuffix(_SLOPE_SUFFIX)
+        return super()._dataset_values(block.block, name) if variable == name else block.over_time(variable)
 
-    def _size(self) -> int:
-        columns = sum(len(MOTORS) if of_motors else 1 for of_motors in self._wanted.values())
-        slopes = 8 * columns * len(self._numbers) * len(self._robot.joints)
-        return super()._size() + self._trajectory.samples * slopes
+    def _expected_bytes(self) -> int:
+        column_count = sum(len(MOTORS) if of_motors else 1 for of_motors in self._differentiated.values())
+        slope_bytes = 8 * column_count * len(self._parameters) * len(self._robot.joints)
+        return super()._expected_bytes() + self._trajectory.samples * slope_bytes

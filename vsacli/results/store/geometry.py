@@ -15,11 +15,11 @@ DH = ("a", "alpha", "d", "theta")
 """Parameters of a Denavit-Hartenberg row, in the order of its fields."""
 
 PARENT, CARRIER = "joints/parent", "tools/joint"
-_POSES = ("base_", "tool_", "joints/mount_", "tools/")
+_POSE_PREFIXES = ("base_", "tool_", "joints/mount_", "tools/")
 
 ARRAYS = (
     *(f"joints/dh_{name}" for name in DH),
-    *(f"{prefix}{part}" for prefix in _POSES for part in ("xyz", "rpy")),
+    *(f"{prefix}{part}" for prefix in _POSE_PREFIXES for part in ("xyz", "rpy")),
     *(PARENT, CARRIER),
 )
 """Datasets of the group `inputs/robot` with the geometry; plain chains have the first ones."""
@@ -64,31 +64,36 @@ class StoredGeometry(NamedTuple):
         Raises:
             DamageError, LookupError: the arrays are those of no robot.
         """
-        rows = np.stack([arrays[f"joints/dh_{name}"] for name in DH], axis=-1)
-        mounts = _poses(arrays, "joints/mount_") if "joints/mount_xyz" in arrays else [None] * len(rows)
+        dh_rows = np.stack([arrays[f"joints/dh_{name}"] for name in DH], axis=-1)
+        mounts = _poses(arrays, "joints/mount_") if "joints/mount_xyz" in arrays else [None] * len(dh_rows)
         joints = tuple(
-            StoredRow(DenavitHartenberg(**dict(zip(DH, row, strict=True))), joint_type == "revolute", mount)
-            for row, joint_type, mount in zip(rows.tolist(), joint_types, mounts, strict=True)
+            StoredRow(
+                DenavitHartenberg(**dict(zip(DH, dh_row, strict=True))), joint_type == "revolute", mount
+            )
+            for dh_row, joint_type, mount in zip(dh_rows.tolist(), joint_types, mounts, strict=True)
         )
-        index = {FRAME_0: -1, **{name: number for number, name in enumerate(joint_names)}}
-        parents = tuple(index[name] for name in arrays.get(PARENT, [FRAME_0, *joint_names[:-1]]))
-        if any(parent >= number for number, parent in enumerate(parents)):
+        joint_indices = {FRAME_0: -1, **{name: index for index, name in enumerate(joint_names)}}
+        parents = tuple(joint_indices[name] for name in arrays.get(PARENT, [FRAME_0, *joint_names[:-1]]))
+        if any(parent >= index for index, parent in enumerate(parents)):
             raise DamageError("a joint comes before the one that carries it")
-        [base], [tool] = _poses(arrays, "base_"), _poses(arrays, "tool_")
-        places, tools = [number for number in range(len(joints)) if number not in parents], [tool]
+        [base], [tool_pose] = _poses(arrays, "base_"), _poses(arrays, "tool_")
+        tool_joints, tool_poses = [index for index in range(len(joints)) if index not in parents], [tool_pose]
         if CARRIER in arrays:
-            places, tools = [index[name] for name in arrays[CARRIER]], _poses(arrays, "tools/")
-        elif len(places) > 1:
-            places, tools = [], []
-        if base is None or (stated := [pose for pose in tools if pose is not None]) != tools:
+            tool_joints, tool_poses = (
+                [joint_indices[name] for name in arrays[CARRIER]],
+                _poses(arrays, "tools/"),
+            )
+        elif len(tool_joints) > 1:
+            tool_joints, tool_poses = [], []
+        if base is None or (end_effectors := [pose for pose in tool_poses if pose is not None]) != tool_poses:
             raise DamageError("a frame has no pose")
-        return cls(base, joints, parents, tuple(stated), tuple(places))
+        return cls(base, joints, parents, tuple(end_effectors), tuple(tool_joints))
 
 
 def _poses(arrays: Mapping[str, AnyArray], prefix: str) -> list[Pose | None]:
     """Return the poses of one or several frames; None for a frame with NaN."""
-    numbers = np.stack([arrays[f"{prefix}{part}"] for part in ("xyz", "rpy")], axis=-2)
+    values = np.stack([arrays[f"{prefix}{part}"] for part in ("xyz", "rpy")], axis=-2)
     return [
         None if np.isnan(pose).any() else Pose(xyz=tuple(pose[0]), rpy=tuple(pose[1]))
-        for pose in numbers.reshape(-1, 2, 3).tolist()
+        for pose in values.reshape(-1, 2, 3).tolist()
     ]

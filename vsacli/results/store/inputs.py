@@ -13,7 +13,7 @@ import numpy as np
 
 from vsacli.base.storage import place_of
 from vsacli.documents.source import Source
-from vsacli.results.store.damage import CheckedFile, DamageError, check_present, own_dataset
+from vsacli.results.store.damage import CheckedFile, DamageError, check_present, local_dataset
 from vsacli.results.store.schema import TEXT, storable
 
 LARGEST_STORED = 256 * 2**20
@@ -50,8 +50,8 @@ def write_sources(inputs: h5py.Group, sources: Mapping[str, tuple[Source, ...]])
         sources: files by the object that they describe; the first file of each refers to the others.
     """
     roles = {files[0]: role for role, files in sources.items() if files}
-    every = dict.fromkeys(source for files in sources.values() for source in files)
-    for number, source in enumerate(every, start=1):
+    unique_sources = dict.fromkeys(source for files in sources.values() for source in files)
+    for number, source in enumerate(unique_sources, start=1):
         group = inputs.create_group(f"file_{number}", track_order=True)
         group.attrs.update({"path": storable(source.path), "sha256": source.sha256})
         if source.changes:
@@ -72,7 +72,7 @@ def _write_content(group: h5py.Group, source: Source) -> None:
             if size > LARGEST_STORED or hashlib.file_digest(file, "sha256").hexdigest() != source.sha256:
                 return
             file.seek(0)
-            stored = group.create_dataset(
+            dataset = group.create_dataset(
                 "content",
                 (size,),
                 np.uint8,
@@ -81,35 +81,35 @@ def _write_content(group: h5py.Group, source: Source) -> None:
                 compression_opts=COMPRESSION,
             )
             for start in range(0, size, CHUNK):
-                piece = np.frombuffer(file.read(CHUNK), np.uint8)
-                stored[start : start + len(piece)] = piece
+                chunk = np.frombuffer(file.read(CHUNK), np.uint8)
+                dataset[start : start + len(chunk)] = chunk
     except OSError:
         return  # the file is gone; the run continues with the data read from it
 
 
 def read_sources(file: CheckedFile) -> Iterator[StoredInput]:
     """Yield the input files in the order in which they were written."""
-    number = 1
-    while (name := f"inputs/file_{number}") in file:
+    file_number = 1
+    while (name := f"inputs/file_{file_number}") in file:
         attributes = {key: str(value) for key, value in file[name].attrs.items()}
         check_present(attributes, ("path", "sha256"), name)
         yield StoredInput(
             path=attributes["path"],
             sha256=attributes["sha256"],
             role=attributes.get("role", ""),
-            content=_content(file, name),
+            content=_read_content(file, name),
             changes=json.loads(attributes.get("changes", "{}")),
         )
-        number += 1
+        file_number += 1
 
 
-def _content(file: CheckedFile, name: str) -> bytes | None:
+def _read_content(file: CheckedFile, name: str) -> bytes | None:
     if f"{name}/text" in file:
-        text: str = own_dataset(file, f"{name}/text").asstr()[()]
+        text: str = local_dataset(file, f"{name}/text").asstr()[()]
         return text.encode()
     if f"{name}/content" in file:
-        stored = own_dataset(file, f"{name}/content")
-        if stored.nbytes > LARGEST_STORED:
-            raise DamageError(f"{name} claims {stored.nbytes:,} bytes, of at most {LARGEST_STORED:,}")
-        return bytes(stored[...])
+        dataset = local_dataset(file, f"{name}/content")
+        if dataset.nbytes > LARGEST_STORED:
+            raise DamageError(f"{name} claims {dataset.nbytes:,} bytes, of at most {LARGEST_STORED:,}")
+        return bytes(dataset[...])
     return None

@@ -46,13 +46,13 @@ from vsacli.trajectory.trajectory import Trajectory
 LABELS = {"axis": ("x", "y", "z"), "bound": ("lower", "upper"), "direction": ("negative", "positive")}
 """Labels of dimensions that only the robot's arrays have; each is written if an array has it."""
 
-PARENTS = ("joints", "parent")
+PARENTS_PATH = ("joints", "parent")
 """Path of the field with the parents of the joints."""
 
 GZIP_LEVEL = 4
 
 
-AXES = {
+AXIS_DESCRIPTIONS = {
     "tool": "tool name",
     "displacement_axis": "translation along and rotation about the axes of the base frame",
     "wrench_axis": "force and moment along the axes of a frame",
@@ -93,18 +93,18 @@ def create_layout(
     """
     file.attrs.update({"format": format_name, **_root_attributes(robot, trajectory, provenance)})
     scales = _create_coordinates(file, robot, trajectory.samples)
-    of_variables = {dim for variable in variables for dim in variable.dims}
-    of_tree = set() if robot.is_plain_chain or not robot.end_effectors else {"tool"}
-    scales |= _create_axes(file, of_variables | of_tree, robot, trajectory)
-    stored = {"time": scales["time"]}
+    variable_dims = {dim for variable in variables for dim in variable.dims}
+    tree_dims = set() if robot.is_plain_chain or not robot.end_effectors else {"tool"}
+    scales |= _create_axes(file, variable_dims | tree_dims, robot, trajectory)
+    datasets = {"time": scales["time"]}
     for variable in variables:
         dataset = _create_variable(file, variable, robot, trajectory.samples, precision)
-        stored[variable.name] = dataset
+        datasets[variable.name] = dataset
         attach_scales(dataset, [scales[dim] for dim in ("time", *variable.dims)])
     inputs = file.create_group("inputs", track_order=True)
     write_sources(inputs, {"robot": robot.sources, "trajectory": trajectory.sources})
     _write_robot(inputs, robot, scales)
-    return stored
+    return datasets
 
 
 def _root_attributes(robot: Robot, trajectory: Trajectory, provenance: Mapping[str, str]) -> dict[str, str]:
@@ -129,9 +129,11 @@ def _root_attributes(robot: Robot, trajectory: Trajectory, provenance: Mapping[s
 def _scipy_version() -> str:
     """Return the version from SciPy's files; importing it or importlib.metadata outlasts a short run."""
     spec = find_spec("scipy")
-    text = Path(spec.origin or "").with_name("version.py").read_text(encoding="utf-8") if spec else ""
-    found = re.search(r'^version\s*=\s*"([^"]+)"', text, re.MULTILINE)
-    return found[1] if found else "unknown"
+    version_source = (
+        Path(spec.origin or "").with_name("version.py").read_text(encoding="utf-8") if spec else ""
+    )
+    match = re.search(r'^version\s*=\s*"([^"]+)"', version_source, re.MULTILINE)
+    return match[1] if match else "unknown"
 
 
 def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> dict[str, h5py.Dataset]:
@@ -139,7 +141,7 @@ def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> dict[str
     time = _create_variable(file, VARIABLES["time"], robot, samples, DOUBLE)
     joint = create_labels(file, "joint", robot.joint_names, "joint name")
     joint_type = create_labels(file, "joint_type", robot.joint_types, "revolute or prismatic")
-    motor = _add_array(file, "motor", np.array(MOTORS, dtype="<i8"))
+    motor = _create_array(file, "motor", np.array(MOTORS, dtype="<i8"))
     motor.attrs["long_name"] = "motor of a joint"
     scales = {"time": time, "joint": joint, "motor": motor}
     for name, scale in scales.items():
@@ -151,9 +153,11 @@ def _create_coordinates(file: h5py.File, robot: Robot, samples: int) -> dict[str
 def _create_axes(
     file: h5py.File, dims: Set[str], robot: Robot, trajectory: Trajectory
 ) -> dict[str, h5py.Dataset]:
-    """Write the dimension scales of `AXES` among some dimensions; return them by name."""
+    """Write the dimension scales of `AXIS_DESCRIPTIONS` among some dimensions; return them by name."""
     axes = {
-        dim: create_labels(file, dim, robot.labels[dim], words) for dim, words in AXES.items() if dim in dims
+        dim: create_labels(file, dim, robot.labels[dim], long_name)
+        for dim, long_name in AXIS_DESCRIPTIONS.items()
+        if dim in dims
     }
     if trajectory.wrench is not None:
         frames = frames_by_tool(trajectory.wrench.frame)
@@ -179,20 +183,20 @@ def create_labels(
 def _create_variable(
     file: h5py.File, variable: Variable, robot: Robot, samples: int, precision: str
 ) -> h5py.Dataset:
-    row = row_shape(variable, robot.labels)
+    sample_shape = row_shape(variable, robot.labels)
     dataset = file.create_dataset(
         variable.name,
-        shape=(samples, *row),
-        maxshape=(samples, *row),
+        shape=(samples, *sample_shape),
+        maxshape=(samples, *sample_shape),
         dtype=storage_type(variable, precision),
-        chunks=(chunk_rows(samples, row_bytes(variable, robot.labels, precision)), *row),
+        chunks=(chunk_rows(samples, row_bytes(variable, robot.labels, precision)), *sample_shape),
         compression=GZIP_LEVEL if variable.name in FLAG_BITS else None,
         track_order=True,
     )
     dataset.attrs.update(variable_attributes(variable, robot.joint_types))
     if "joint" in variable.dims and variable.requires not in OF_ANY_ROBOT:
-        there = [joint.has_columns(variable) for joint in robot.joints]
-        dataset.attrs[EXISTING] = np.array(there, dtype=np.uint8)
+        existing = [joint.has_columns(variable) for joint in robot.joints]
+        dataset.attrs[EXISTING] = np.array(existing, dtype=np.uint8)
     return dataset
 
 
@@ -205,15 +209,15 @@ def _write_robot(inputs: h5py.Group, robot: Robot, coordinates: Mapping[str, h5p
     group = inputs.create_group("robot", track_order=True)
     scales, fields = dict(coordinates), resolve(robot)
     for name in [name for name in LABELS if any(name in field.dims for field in fields)]:
-        scales[name] = _add_array(group, name, np.array(LABELS[name], dtype=TEXT))
+        scales[name] = _create_array(group, name, np.array(LABELS[name], dtype=TEXT))
         scales[name].make_scale(name)
-    members = {"joints": group.create_group("joints")}
+    member_groups = {"joints": group.create_group("joints")}
     if robot.tools:
-        members["tools"] = group.create_group("tools")
+        member_groups["tools"] = group.create_group("tools")
     for field in fields:
-        place, path = members.get(field.path[0], group), field.path
-        name = "_".join(path if place is group else path[1:])
-        dataset = _write_field(place, name, field, robot.joint_types)
+        owner_group, path = member_groups.get(field.path[0], group), field.path
+        name = "_".join(path if owner_group is group else path[1:])
+        dataset = _write_field(owner_group, name, field, robot.joint_types)
         attach_scales(dataset, [scales[dim] for dim in field.dims])
 
 
@@ -223,18 +227,20 @@ def resolve(robot: Robot) -> list[ResolvedField]:
     If the robot has the field `parent`, it has the parent of each joint.
     """
     return [
-        field._replace(values=np.array(robot.parent_names, dtype=object)) if field.path == PARENTS else field
-        for field in _resolved(robot)
+        field._replace(values=np.array(robot.parent_names, dtype=object))
+        if field.path == PARENTS_PATH
+        else field
+        for field in _resolved_fields(robot)
     ]
 
 
-def _resolved(record: Any) -> Iterator[ResolvedField]:
+def _resolved_fields(record: Any) -> Iterator[ResolvedField]:
     record = getattr(record, "at_joint", record)  # motor values on the joint side
     for name, (field, _) in declared_fields(type(record)).items():
-        content = getattr(record, name)
-        if content is not None:
-            for part in resolve_values(field.kind, content, _resolved):
-                yield part._replace(path=(name, *part.path), doc=part.doc or field.doc)
+        value = getattr(record, name)
+        if value is not None:
+            for subfield in resolve_values(field.kind, value, _resolved_fields):
+                yield subfield._replace(path=(name, *subfield.path), doc=subfield.doc or field.doc)
 
 
 def _write_field(
@@ -246,12 +252,12 @@ def _write_field(
     else:
         units = unit_attributes(field.quantity, joint_types)
         values = field.values
-    dataset = _add_array(group, name, values.reshape(field.values.shape))
+    dataset = _create_array(group, name, values.reshape(field.values.shape))
     dataset.attrs.update({**units, "long_name": field.doc})
     return dataset
 
 
-def _add_array(group: h5py.Group, name: str, values: AnyArray) -> h5py.Dataset:
+def _create_array(group: h5py.Group, name: str, values: AnyArray) -> h5py.Dataset:
     """Write a dataset of numbers, or of texts in an array of type `TEXT`; attributes keep their order."""
     return group.create_dataset(name, data=values, dtype=values.dtype, track_order=True)
 

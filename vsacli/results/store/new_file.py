@@ -38,10 +38,10 @@ BEHIND_FROM = 2**24
 """Bytes written directly, in some 10 ms, before a thread is worth its start. Without the thread, 10^6 samples
 of a 3R with compiled code take at least 1.26 times as long."""
 
-BEHIND = 2**25
+MAX_PENDING_BYTES = 2**25
 """Bytes that may wait to be written: slightly more than a block of seven joints with all variables."""
 
-SYNCED = 2**26
+SYNC_BYTES = 2**26
 """Bytes after which the disk starts to store them, so that little remains at the end."""
 
 CHUNK_BYTES = 2**19
@@ -62,8 +62,8 @@ class NewFile:
         self._file: Any = None  # h5py has no types
         self._sink: Sink | None = None
         self._thread: ThreadPoolExecutor | None = None
-        self._waiting: deque[tuple[Future[None], int]] = deque()
-        self._bytes = self._synced = self._held = 0
+        self._pending_writes: deque[tuple[Future[None], int]] = deque()
+        self._submitted_bytes = self._synced_bytes = self._pending_bytes = 0
 
     def __enter__(self) -> Self:
         """Create the file with everything except samples and report.
@@ -71,26 +71,29 @@ class NewFile:
         Raises:
             StorageError: the file cannot be written, or does not fit on its disk.
         """
-        check_free_space(self._staged.path, self._size())
+        check_free_space(self._staged.path, self._expected_bytes())
         try:
-            with interrupts_deferred(), self.used():
+            with interrupts_deferred(), self.reporting_disk_errors():
                 self._open()
-                self._create()
+                self._create_datasets()
         except BaseException:
             self.discard()
             raise
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+        self,
+        error_type: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
     ) -> None:
         self.discard()
 
-    def _size(self) -> int:
+    def _expected_bytes(self) -> int:
         """Return the approximate size of the file in bytes."""
         raise NotImplementedError
 
-    def _create(self) -> None:
+    def _create_datasets(self) -> None:
         """Write everything that is known before the first sample into the empty file."""
         raise NotImplementedError
 
@@ -108,7 +111,7 @@ class NewFile:
         self._file = self._cleanup.enter_context(file)
 
     @contextlib.contextmanager
-    def used(self) -> Iterator[None]:
+    def reporting_disk_errors(self) -> Iterator[None]:
         """Surround any use of HDF5; a disk error takes precedence over the HDF5 error that follows from it.
 
         Raises:
@@ -123,41 +126,41 @@ class NewFile:
             if self._sink is not None and self._sink.error is not None:
                 raise storage_error(self._staged.path, self._sink.error) from self._sink.error
 
-    def do(self, task: Callable[[], None], size: int) -> None:
-        """Run a task that writes `size` bytes: immediately, or in a thread once the file is long.
+    def schedule_write(self, task: Callable[[], None], byte_count: int) -> None:
+        """Run a task that writes `byte_count` bytes: immediately, or in a thread once the file is long.
 
-        To be called within `used`, as the task itself is; tasks run in order. Signals never reach the thread,
-        and its exceptions are raised by a later call or by `wait`. While too many bytes are waiting, the
-        caller waits too.
+        To be called within `reporting_disk_errors`, as the task itself is; tasks run in order. Signals never
+        reach the thread, and its exceptions are raised by a later call or by `wait`. While too many bytes are
+        waiting, the caller waits too.
         """
-        self._bytes += size
-        if self._bytes <= BEHIND_FROM:
+        self._submitted_bytes += byte_count
+        if self._submitted_bytes <= DIRECT_BYTES:
             task()
             return
         if self._thread is None:
             from concurrent.futures import ThreadPoolExecutor
 
             self._thread = ThreadPoolExecutor(1, "vsacli-writing")
-        self._waiting.append((self._thread.submit(task), size))
-        self._held += size
-        while self._held > BEHIND:
+        self._pending_writes.append((self._thread.submit(task), byte_count))
+        self._pending_bytes += byte_count
+        while self._pending_bytes > MAX_PENDING_BYTES:
             self._await_oldest()
-        if self._sink is not None and self._bytes - self._synced >= SYNCED:
-            self._synced = self._bytes
+        if self._sink is not None and self._submitted_bytes - self._synced_bytes >= SYNC_BYTES:
+            self._synced_bytes = self._submitted_bytes
             self._sink.begin_sync()
 
     def wait(self) -> None:
-        """Wait until all tasks are done; to be called within `used`."""
-        while self._waiting:
+        """Wait until all tasks are done; to be called within `reporting_disk_errors`."""
+        while self._pending_writes:
             self._await_oldest()
 
     def _await_oldest(self) -> None:
-        done, size = self._waiting.popleft()
-        self._held -= size
-        done.result()
+        write_future, byte_count = self._pending_writes.popleft()
+        self._pending_bytes -= byte_count
+        write_future.result()
 
     def _close(self) -> None:
-        """Write remaining chunks; to be called within `used`."""
+        """Write remaining chunks; to be called within `reporting_disk_errors`."""
         assert self._sink is not None, "it is open"
         self._file.close()
         self._sink.close()
@@ -180,7 +183,7 @@ class Sink(io.RawIOBase):
 
     def __init__(self, file: io.FileIO) -> None:
         self._file = file
-        self._syncing: threading.Thread | None = None
+        self._sync_thread: threading.Thread | None = None
         self.error: OSError | None = None
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
@@ -197,10 +200,10 @@ class Sink(io.RawIOBase):
 
     def write(self, data: Any) -> int:
         """Write all of `data`, or store the error."""
-        rest = memoryview(data)
+        remaining = memoryview(data)
         try:
-            while len(rest) and self.error is None:
-                rest = rest[self._file.write(rest) :]
+            while len(remaining) and self.error is None:
+                remaining = remaining[self._file.write(remaining) :]
         except OSError as error:
             self.error = error
         return len(data)
@@ -215,9 +218,9 @@ class Sink(io.RawIOBase):
 
     def begin_sync(self) -> None:
         """Sync the bytes written so far to disk, in a thread, unless an earlier sync is still running."""
-        if self._syncing is None or not self._syncing.is_alive():
-            self._syncing = threading.Thread(target=self._sync, name="vsacli-syncing")
-            self._syncing.start()
+        if self._sync_thread is None or not self._sync_thread.is_alive():
+            self._sync_thread = threading.Thread(target=self._sync, name="vsacli-syncing")
+            self._sync_thread.start()
 
     def _sync(self) -> None:
         try:
@@ -227,8 +230,8 @@ class Sink(io.RawIOBase):
 
     def close(self) -> None:
         """Close the file; store an error that the file system reports only now."""
-        if self._syncing is not None:
-            self._syncing.join()
+        if self._sync_thread is not None:
+            self._sync_thread.join()
         try:
             self._file.close()
         except OSError as error:
@@ -238,9 +241,9 @@ class Sink(io.RawIOBase):
 
 def chunk_rows(samples: int, row_bytes: int) -> int:
     """Return the samples of a chunk: chunks of equal size, as few as `CHUNK_BYTES` allows."""
-    most = max(1, CHUNK_BYTES // row_bytes)
-    chunks = -(-samples // most)
-    return -(-samples // chunks)
+    max_rows = max(1, CHUNK_BYTES // row_bytes)
+    chunk_count = -(-samples // max_rows)
+    return -(-samples // chunk_count)
 
 
 class ChunkFiller:
@@ -250,15 +253,17 @@ class ChunkFiller:
 
     Args:
         dataset: dataset whose first axis is time, with chunks as wide as its rows, and no filter but gzip.
-        hand_over: function such as `NewFile.do`.
+        hand_over: function such as `NewFile.schedule_write`.
     """
 
-    def __init__(self, dataset: h5py.Dataset, hand_over: Callable[[Callable[[], None], int], None]) -> None:
-        self._dataset, self._hand_over = dataset, hand_over
-        self._shape, self._dtype = dataset.chunks, dataset.dtype
-        self._level: int | None = dataset.compression_opts
-        self._start = self._filled = 0
-        self._values: AnyArray = np.empty(0)
+    def __init__(
+        self, dataset: h5py.Dataset, schedule_write: Callable[[Callable[[], None], int], None]
+    ) -> None:
+        self._dataset, self._schedule_write = dataset, schedule_write
+        self._chunk_shape, self._dtype = dataset.chunks, dataset.dtype
+        self._gzip_level: int | None = dataset.compression_opts
+        self._chunk_start = self._filled_rows = 0
+        self._chunk: AnyArray = np.empty(0)
 
     def append(self, values: AnyArray) -> None:
         """Copy samples, (samples, ...), of any memory layout.
@@ -266,36 +271,36 @@ class ChunkFiller:
         Raises:
             FloatingPointError: a finite value overflows the type of the dataset.
         """
-        rows = self._shape[0]
+        capacity = self._chunk_shape[0]
         while len(values):
-            if not self._filled:
-                self._values = np.empty(self._shape, self._dtype)
-            taken = values[: rows - self._filled]
+            if not self._filled_rows:
+                self._chunk = np.empty(self._chunk_shape, self._dtype)
+            rows = values[: capacity - self._filled_rows]
             with np.errstate(over="raise"):
-                self._values[self._filled : self._filled + len(taken)] = taken
-            self._filled += len(taken)
-            values = values[len(taken) :]
-            if self._filled == rows:
-                self._pass_on()
+                self._chunk[self._filled_rows : self._filled_rows + len(rows)] = rows
+            self._filled_rows += len(rows)
+            values = values[len(rows) :]
+            if self._filled_rows == capacity:
+                self._schedule_chunk()
 
     def finish(self) -> None:
         """Hand over the last chunk, and shorten the dataset to the samples written."""
-        self._hand_over(partial(self._shorten, self._start + self._filled), 0)
-        if self._filled:
-            self._values[self._filled :] = 0  # beyond the shortened dataset
-            self._pass_on()
+        self._schedule_write(partial(self._shorten, self._chunk_start + self._filled_rows), 0)
+        if self._filled_rows:
+            self._chunk[self._filled_rows :] = 0  # beyond the shortened dataset
+            self._schedule_chunk()
 
-    def _pass_on(self) -> None:
-        self._hand_over(partial(self._write, self._start, self._values), self._values.nbytes)
-        self._start += self._filled
-        self._filled, self._values = 0, np.empty(0)
+    def _schedule_chunk(self) -> None:
+        self._schedule_write(partial(self._write_chunk, self._chunk_start, self._chunk), self._chunk.nbytes)
+        self._chunk_start += self._filled_rows
+        self._filled_rows, self._chunk = 0, np.empty(0)
 
     def _shorten(self, samples: int) -> None:
         if samples < self._dataset.shape[0]:
             self._dataset.resize(samples, axis=0)
 
-    def _write(self, start: int, values: AnyArray) -> None:
+    def _write_chunk(self, chunk_start: int, chunk: AnyArray) -> None:
         """Write a chunk, bypassing the library's cache."""
-        content = values if self._level is None else zlib.compress(values.data, self._level)
+        raw_chunk = chunk if self._gzip_level is None else zlib.compress(chunk.data, self._gzip_level)
         with phil:  # h5py's lock, which this call takes only since version 3.16
-            self._dataset.id.write_direct_chunk((start, *(0 for _ in values.shape[1:])), content)
+            self._dataset.id.write_direct_chunk((chunk_start, *(0 for _ in chunk.shape[1:])), raw_chunk)

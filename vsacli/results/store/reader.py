@@ -39,10 +39,10 @@ from vsacli.results.store.damage import (
     SCALES,
     CheckedFile,
     DamageError,
-    bounded,
+    check_nbytes,
     check_present,
     check_times,
-    own_dataset,
+    local_dataset,
     read_texts,
     reporting_damage,
 )
@@ -58,27 +58,27 @@ from vsacli.results.store.schema import (
 from vsacli.robot.joint import existing_columns
 from vsacli.robot.model import END_EFFECTOR
 
-OF_ROBOT = "inputs/robot"
-OF_JOINTS = f"{OF_ROBOT}/joints/{{}}"
+ROBOT_GROUP = "inputs/robot"
+JOINT_DATASET = f"{ROBOT_GROUP}/joints/{{}}"
 """Dataset of a parameter of all joints: path in the robot file with underscores in place of dots."""
 
-OF_MIN_STIFFNESS = f"{OF_ROBOT}/tools/min_stiffness"
+MIN_STIFFNESS_DATASET = f"{ROBOT_GROUP}/tools/min_stiffness"
 """Dataset of the limits of the tools."""
 
 BLOCK_SAMPLES = 8192
 """Number of samples read at a time to check a file."""
 
-MADE_BY = ("created", "generated_by", "command_line", "versions", "Conventions")
+FILE_ATTRIBUTES = ("created", "generated_by", "command_line", "versions", "Conventions")
 """Root attributes of every file."""
 
-COMPUTED_BY = ("engine", "compiler", "threads")
+RUN_ATTRIBUTES = ("engine", "compiler", "threads")
 """Root attributes of files written by a run: all of them, or none."""
 
 
-OURS = "vsacli-"
+FORMAT_PREFIX = "vsacli-"
 """Beginning of the name of each format."""
 
-RANGES = {
+RANGE_DATASETS = {
     "q": "limits_position",
     "dq": "limits_velocity",
     "stiffness": "limits_stiffness",
@@ -86,7 +86,7 @@ RANGES = {
 }
 """Datasets with the lower and upper bound of joint variables, by variable."""
 
-SIZES = {
+MAGNITUDE_DATASETS = {
     "phi": "actuator_spring_max_deflection",
     "dtheta": "actuator_motor_max_velocity",
     "tau_motor": "actuator_motor_max_torque",
@@ -110,15 +110,15 @@ class StoredFile:
     def __init__(self, path: str | Path, file: CheckedFile) -> None:
         self.path = Path(path)
         self._file = file
-        self._checked: dict[str, h5py.Dataset] = {}
+        self._checked_datasets: dict[str, h5py.Dataset] = {}
 
     def _dataset(self, name: str) -> h5py.Dataset:
         """Return a dataset, checked at its first use."""
-        if name not in self._checked:
-            self._checked[name] = bounded(own_dataset(self._file, name))
-        return self._checked[name]
+        if name not in self._checked_datasets:
+            self._checked_datasets[name] = check_nbytes(local_dataset(self._file, name))
+        return self._checked_datasets[name]
 
-    def _labels(self, name: str, rows: slice = slice(None)) -> tuple[str, ...]:
+    def _read_labels(self, name: str, rows: slice = slice(None)) -> tuple[str, ...]:
         return tuple(map(one_line, self._dataset(name).asstr()[rows]))
 
     def inputs(self) -> list[StoredInput]:
@@ -132,7 +132,7 @@ class StoredFile:
 
     def close(self) -> None:
         """Close the file."""
-        self._checked.clear()
+        self._checked_datasets.clear()
         self._file.close()
 
     def __enter__(self) -> Self:
@@ -169,8 +169,8 @@ class StoredResult(StoredFile):
     kind = "result"
     command = "invdyn"
     declared: Mapping[str, Variable] = VARIABLES
-    _of_runs: tuple[str, ...] = ("options",)
-    _to_get = "run invdyn again without --variables, or with {} among them"
+    _run_attributes: tuple[str, ...] = ("options",)
+    _how_to_store = "run invdyn again without --variables, or with {} among them"
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
@@ -193,18 +193,18 @@ class StoredResult(StoredFile):
             )
             self.complete = bool(file.attrs["complete"])
             self.precision = str(file.attrs.get(PRECISION, DOUBLE))
-            self.joint_names = self._labels("joint")
-            self.joint_types = self._labels("joint_type")
+            self.joint_names = self._read_labels("joint")
+            self.joint_types = self._read_labels("joint_type")
             self.tool_names = self._tool_names()
             self.declared = variables_by_tool(self.declared, len(self.tool_names))
-            self.actuators = self._labels("inputs/robot/joints/actuator_type")
-            self.gear_ratio = self._of_motors("actuator_motor_gear_ratio")
+            self.actuators = self._read_labels("inputs/robot/joints/actuator_type")
+            self.gear_ratio = self._motor_values("actuator_motor_gear_ratio")
             self.variables = tuple(
                 name for name, variable in self.declared.items() if variable.dims and name in file
             )
-            self.samples = self._samples()
-            self.report_json = self._report()
-        self._whole: set[str] = set()
+            self.samples = self._sample_count()
+            self.report_json = self._read_report()
+        self._checked_layouts: set[str] = set()
 
     @property
     def labels(self) -> Labels:
@@ -214,7 +214,7 @@ class StoredResult(StoredFile):
     def _tool_names(self) -> tuple[str, ...]:
         """Return the names of the tools; chains that need none in their file have one."""
         if "tool" in self._file:
-            return self._labels("tool")
+            return self._read_labels("tool")
         return (END_EFFECTOR,) if self.format == str(self.attributes["format"]) else ()
 
     def motor_constant(self, name: str) -> FloatArray:
@@ -224,14 +224,14 @@ class StoredResult(StoredFile):
             InputError: the file is damaged.
         """
         with reporting_damage(self.path):
-            return self._of_motors(f"actuator_motor_{name}")
+            return self._motor_values(f"actuator_motor_{name}")
 
-    def _of_motors(self, name: str) -> FloatArray:
+    def _motor_values(self, name: str) -> FloatArray:
         """Return values of motors, (joints, 2); stored without second axis if no joint has two motors."""
         constants = np.full((len(self.actuators), len(MOTORS)), np.nan)
-        if OF_JOINTS.format(name) in self._file:
-            stored = self._dataset(OF_JOINTS.format(name))
-            constants.T[: 1 if stored.ndim == 1 else len(MOTORS)] = stored[...].T
+        if JOINT_DATASET.format(name) in self._file:
+            dataset = self._dataset(JOINT_DATASET.format(name))
+            constants.T[: 1 if dataset.ndim == 1 else len(MOTORS)] = dataset[...].T
         return constants
 
     def limits(self, name: str) -> FloatArray:
@@ -242,12 +242,12 @@ class StoredResult(StoredFile):
         """
         name = SIMULATED_NAMES.get(name, name)
         with reporting_damage(self.path):
-            if name in SIZES:
-                largest = self._of_motors(SIZES[name])
-                return np.stack([-largest, largest], axis=-1)
+            if name in MAGNITUDE_DATASETS:
+                magnitudes = self._motor_values(MAGNITUDE_DATASETS[name])
+                return np.stack([-magnitudes, magnitudes], axis=-1)
             bounds = np.full((len(self.actuators), 1, 2), np.nan)
-            if name in RANGES and OF_JOINTS.format(RANGES[name]) in self._file:
-                bounds[:, 0] = self._dataset(OF_JOINTS.format(RANGES[name]))[...]
+            if name in RANGE_DATASETS and JOINT_DATASET.format(RANGE_DATASETS[name]) in self._file:
+                bounds[:, 0] = self._dataset(JOINT_DATASET.format(RANGE_DATASETS[name]))[...]
         return bounds
 
     def min_stiffness(self) -> FloatArray:
@@ -257,9 +257,9 @@ class StoredResult(StoredFile):
             InputError: the file is damaged.
         """
         bounds = np.full(len(self.tool_names), np.nan)
-        if OF_MIN_STIFFNESS in self._file:
+        if MIN_STIFFNESS_DATASET in self._file:
             with reporting_damage(self.path):
-                bounds[:] = self._dataset(OF_MIN_STIFFNESS)[...]
+                bounds[:] = self._dataset(MIN_STIFFNESS_DATASET)[...]
         return bounds
 
     def geometry(self) -> StoredGeometry:
@@ -270,9 +270,11 @@ class StoredResult(StoredFile):
         """
         with reporting_damage(self.path):
             arrays = {
-                name: np.array(self._labels(path)) if name in (PARENT, CARRIER) else self._dataset(path)[...]
+                name: np.array(self._read_labels(path))
+                if name in (PARENT, CARRIER)
+                else self._dataset(path)[...]
                 for name in ARRAYS
-                if (path := f"{OF_ROBOT}/{name}") in self._file
+                if (path := f"{ROBOT_GROUP}/{name}") in self._file
             }
             return StoredGeometry.of(self.joint_names, self.joint_types, arrays)
 
@@ -283,7 +285,7 @@ class StoredResult(StoredFile):
             InputError: the file is damaged.
         """
         with reporting_damage(self.path):
-            return np.asarray(self._dataset(f"{OF_ROBOT}/gravity")[...], dtype=np.float64).reshape(3)
+            return np.asarray(self._dataset(f"{ROBOT_GROUP}/gravity")[...], dtype=np.float64).reshape(3)
 
     def has_variable(self, variable: Variable) -> bool:
         """Return whether runs of this robot have a variable, as far as that depends on the robot file."""
@@ -291,13 +293,13 @@ class StoredResult(StoredFile):
             return not np.isnan(self.motor_constant(variable.requires)).all()
         return variable.requires in OF_ANY_ROBOT or variable.name in self.variables
 
-    def _report(self) -> dict[str, Any]:
-        content = json.loads(own_dataset(self._file, "report/json").asstr()[()])
-        if not isinstance(content, dict):
+    def _read_report(self) -> dict[str, Any]:
+        report = json.loads(local_dataset(self._file, "report/json").asstr()[()])
+        if not isinstance(report, dict):
             raise DamageError("report/json is no JSON object")
-        return cast("dict[str, Any]", shown(content))
+        return cast("dict[str, Any]", shown(report))
 
-    def _samples(self) -> int:
+    def _sample_count(self) -> int:
         """Return the number of samples; refuse a file whose joints and times do not match."""
         shape = self._dataset("time").shape
         if {len(self.joint_types), len(self.actuators)} != {len(self.joint_names)} or len(shape) != 1:
@@ -330,7 +332,7 @@ class StoredResult(StoredFile):
         if name == "time":
             return self.time[start:stop]
         if name not in self._file:
-            raise InputError.one(f"holds no {name}; {self._to_get.format(name)}", self.path)
+            raise InputError.one(f"holds no {name}; {self._how_to_store.format(name)}", self.path)
         with reporting_damage(self.path, name):
             self._check_layout(name)
             stored = self._file[name][start:stop]
@@ -341,18 +343,20 @@ class StoredResult(StoredFile):
         """Return values of a variable, rounded as by storage in the precision of this file."""
         variable = self.declared[name]
         with np.errstate(over="ignore"):
-            stored = split_axes(values, variable, self.labels).astype(storage_type(variable, self.precision))
-        return stored.astype(storage_type(variable))
+            rounded_values = split_axes(values, variable, self.labels).astype(
+                storage_type(variable, self.precision)
+            )
+        return rounded_values.astype(storage_type(variable))
 
     def _check_layout(self, name: str) -> None:
         """Refuse a variable whose shape or type does not fit the file, so that it can be read in parts."""
-        if name in self._whole:
+        if name in self._checked_layouts:
             return
-        dataset, expected = own_dataset(self._file, name), storage_type(self.declared[name], self.precision)
+        dataset, expected = local_dataset(self._file, name), storage_type(self.declared[name], self.precision)
         shape = (self.samples, *row_shape(self.declared[name], self.labels))
         if dataset.shape != shape or dataset.dtype != expected:
             raise DamageError(f"{name} is {dataset.dtype} {dataset.shape}, expected {expected} {shape}")
-        self._whole.add(name)
+        self._checked_layouts.add(name)
 
     def check(self) -> None:
         """Read everything once, which is not done when a file is opened.
@@ -367,8 +371,8 @@ class StoredResult(StoredFile):
         with reporting_damage(self.path):
             read_texts(self._file)
             for name in ("time", *self.variables):
-                needed = variable_attributes(self.declared[name], self.joint_types)
-                check_present(self._file[name].attrs, needed, name)
+                required = variable_attributes(self.declared[name], self.joint_types)
+                check_present(self._file[name].attrs, required, name)
                 if self.declared[name].dims:
                     check_present(self._file[name].attrs, [SCALES], name)
 
@@ -377,8 +381,8 @@ class StoredResult(StoredFile):
         if variable.requires in OF_ANY_ROBOT or variable.name not in self.variables:
             return np.array(existing_columns(variable, self.actuators))
         with reporting_damage(self.path):
-            stored = np.asarray(self._file[variable.name].attrs[EXISTING], dtype=bool)
-            return stored.reshape(len(self.actuators), -1)
+            exists = np.asarray(self._file[variable.name].attrs[EXISTING], dtype=bool)
+            return exists.reshape(len(self.actuators), -1)
 
     def provenance(self) -> dict[str, Any]:
         """Return creation time, command, versions, and path and SHA-256 of each input.
@@ -386,17 +390,27 @@ class StoredResult(StoredFile):
         Raises:
             InputError: the file is damaged.
         """
-        known = (*COMPUTED_BY, PRECISION)
+        optional_attributes = (*RUN_ATTRIBUTES, PRECISION)
         with reporting_damage(self.path):
-            ran = any(name in self.attributes for name in (*COMPUTED_BY, *self._of_runs))
-            check_present(self.attributes, (*MADE_BY, *((*COMPUTED_BY, *self._of_runs) if ran else ())))
+            has_run_attributes = any(
+                name in self.attributes for name in (*RUN_ATTRIBUTES, *self._run_attributes)
+            )
+            check_present(
+                self.attributes,
+                (*FILE_ATTRIBUTES, *((*RUN_ATTRIBUTES, *self._run_attributes) if has_run_attributes else ())),
+            )
             provenance = {
                 **{name: str(self.attributes[name]) for name in ("created", "generated_by", "command_line")},
-                **{name: str(self.attributes[name]) for name in known if name in self.attributes},
+                **{
+                    name: str(self.attributes[name])
+                    for name in optional_attributes
+                    if name in self.attributes
+                },
                 "versions": json.loads(self.attributes["versions"]),
                 "options": json.loads(self.attributes.get("options", "{}")),
                 "inputs": [
-                    {"path": each.path, "sha256": each.sha256, **_changes(each)} for each in self.inputs()
+                    {"path": source.path, "sha256": source.sha256, **_changes_entry(source)}
+                    for source in self.inputs()
                 ],
             }
         return cast("dict[str, Any]", shown(provenance))
@@ -409,12 +423,12 @@ class StoredSimulation(StoredResult):
     kind = "simulation"
     command = "simulate"
     declared = SIMULATION_VARIABLES
-    _of_runs = ()
-    _to_get = "run simulate again"
+    _run_attributes = ()
+    _how_to_store = "run simulate again"
 
 
-def _changes(file: StoredInput) -> dict[str, Any]:
-    return {"changes": file.changes} if file.changes else {}
+def _changes_entry(stored_input: StoredInput) -> dict[str, Any]:
+    return {"changes": stored_input.changes} if stored_input.changes else {}
 
 
 _Stored = TypeVar("_Stored", bound=StoredResult)
@@ -428,10 +442,10 @@ def open_one_of(path: str | Path, *kinds: type[_Stored]) -> _Stored:
     """
     with contextlib.ExitStack() as stack:
         file = stack.enter_context(CheckedFile(path))
-        found = _format(path, file)
-        kind = next((kind for kind in kinds if kind.format == found), None)
+        format_name = _read_format(path, file)
+        kind = next((kind for kind in kinds if kind.format == format_name), None)
         if kind is None:
-            raise InputError.one(_foreign(found, kinds), path)
+            raise InputError.one(_wrong_format_message(format_name, kinds), path)
         stored = kind(path, file)
         stack.pop_all()
     return stored
@@ -444,7 +458,7 @@ def stored_format(path: str | Path) -> str | None:
         InputError, StorageError: as `StoredResult.open`.
     """
     with CheckedFile(path) as file:
-        return _format(path, file)
+        return _read_format(path, file)
 
 
 def stored_inputs(path: str | Path) -> list[StoredInput]:
@@ -454,40 +468,56 @@ def stored_inputs(path: str | Path) -> list[StoredInput]:
         InputError, StorageError: as `StoredResult.open`.
     """
     with CheckedFile(path) as file:
-        found = _format(path, file)
-        if found is None or not found.startswith(OURS):
-            raise InputError.one(_foreign(found, (StoredResult, StoredSimulation)), path)
+        format_name = _read_format(path, file)
+        if format_name is None or not format_name.startswith(FORMAT_PREFIX):
+            raise InputError.one(_wrong_format_message(format_name, (StoredResult, StoredSimulation)), path)
         return StoredFile(path, file).inputs()
 
 
-def _format(path: str | Path, file: h5py.File) -> str | None:
+def _read_format(path: str | Path, file: h5py.File) -> str | None:
     """Return the attribute `format`, for trees that of chains."""
     with reporting_damage(path):
-        found = file.attrs.get("format")
-    if not isinstance(found, str):
+        format_name = file.attrs.get("format")
+    if not isinstance(format_name, str):
         return None
-    return next((plain for plain, of_tree in file_formats.OF_TREES.items() if of_tree == found), found)
+    return next(
+        (
+            chain_format
+            for chain_format, tree_format in file_formats.TREE_FORMATS.items()
+            if tree_format == format_name
+        ),
+        format_name,
+    )
 
 
-def _foreign(found: str | None, kinds: Sequence[type[StoredResult]]) -> str:
-    for kind in kinds:
-        if found is not None and found.startswith(f"{OURS}{kind.kind}/"):
-            return other_version(found, kind.format, kind.command)
-    return f"is {kind_of_format(found)}, expected {joined((f'a {kind.kind}' for kind in kinds), 'or')}"
+def _wrong_format_message(name: str | None, readers: Sequence[type[StoredResult]]) -> str:
+    for reader in readers:
+        if name is not None and name.startswith(f"{FORMAT_PREFIX}{reader.kind}/"):
+            return other_version(name, reader.format, reader.command)
+    return f"is {kind_of_format(name)}, expected {joined((f'a {reader.kind}' for reader in readers), 'or')}"
 
 
-def kind_of_format(found: str | None) -> str:
+def kind_of_format(format_name: str | None) -> str:
     """Return the kind of an HDF5 file in words, from its attribute `format`."""
-    if found is None or not found.startswith(OURS):
+    if format_name is None or not format_name.startswith(FORMAT_PREFIX):
         return "an HDF5 file that vsacli has not written"
-    return f"a {found.partition('/')[0].removeprefix(OURS).replace('-', ' ')}"
+    return f"a {format_name.partition('/')[0].removeprefix(FORMAT_PREFIX).replace('-', ' ')}"
 
 
-def other_version(found: str, read: str, command: str) -> str:
+def other_version(format_name: str, expected_format: str, command: str) -> str:
     """Return that a file has another version of a format, and how to compute it again."""
-    again = f"run {command} again, with its inputs (vsacli info FILE --extract FOLDER)"
-    formats = joined((read, *(of_tree for plain, of_tree in file_formats.OF_TREES.items() if plain == read)))
-    return f"has the format {found}, but this version reads {formats}; {again}"
+    advice = f"run {command} again, with its inputs (vsacli info FILE --extract FOLDER)"
+    formats = joined(
+        (
+            expected_format,
+            *(
+                tree_format
+                for chain_format, tree_format in file_formats.TREE_FORMATS.items()
+                if chain_format == expected_format
+            ),
+        )
+    )
+    return f"has the format {format_name}, but this version reads {formats}; {advice}"
 
 
 def open_stored(path: str | Path) -> StoredResult:

@@ -29,9 +29,9 @@ def unit_attributes(quantity: Quantity, joint_types: tuple[str, ...]) -> dict[st
     """Return `units`; if joints differ in it, or forces and moments, also an attribute for each unit."""
     if isinstance(quantity, WrenchQuantity):
         return quantity.attributes
-    found = sorted({quantity.unit(joint_type) for joint_type in joint_types})
-    if len(found) == 1:
-        return {"units": found[0]}
+    units = sorted({quantity.unit(joint_type) for joint_type in joint_types})
+    if len(units) == 1:
+        return {"units": units[0]}
     return {
         "units": "see joint_type",
         "units_revolute": quantity.revolute,
@@ -45,9 +45,9 @@ def variable_attributes(variable: Variable, joint_types: tuple[str, ...]) -> dic
     attributes |= {"long_name": variable.long_name, "equation": variable.equation}
     if "joint" in variable.dims:
         attributes["coordinates"] = "joint_type"
-    if bits := FLAG_BITS.get(variable.name):
-        attributes["flag_masks"] = np.array([int(flag) for flag in bits], dtype=FLAG_TYPE)
-        attributes["flag_meanings"] = " ".join(flag.label for flag in bits)
+    if flags := FLAG_BITS.get(variable.name):
+        attributes["flag_masks"] = np.array([int(flag) for flag in flags], dtype=FLAG_TYPE)
+        attributes["flag_meanings"] = " ".join(flag.label for flag in flags)
     return attributes
 
 

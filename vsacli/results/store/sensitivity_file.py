@@ -12,5 +12,5 @@ class StoredSensitivity(StoredResult):
     format = file_formats.SENSITIVITY
     kind = "sensitivity"
     command = "sensitivity"
-    _of_runs = ()
-    _to_get = "run sensitivity again"
+    _run_attributes = ()
+    _how_to_store = "run sensitivity again"

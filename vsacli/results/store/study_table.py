@@ -42,7 +42,7 @@ TEXTS = {
     "key": "digest of all that the row depends on",
 }
 
-OF_RUN = tuple(name for name in TEXTS if name != "trajectory")
+RUN_TEXTS = tuple(name for name in TEXTS if name != "trajectory")
 """Texts that a run results in; the trajectory is one of its inputs."""
 
 LATER_TEXTS = (FIRST_LIMIT,)
@@ -132,7 +132,7 @@ class StudyWriter(NewFile):
 
     def __init__(self, file: Staged, head: Head, rows: int) -> None:
         super().__init__(file)
-        self._head, self._rows, self._written = head, rows, 0
+        self._head, self._row_count, self._written_rows = head, rows, 0
 
     def write(self, rows: StudyRows) -> None:
         """Append rows.
@@ -140,12 +140,14 @@ class StudyWriter(NewFile):
         Raises:
             StorageError: the disk is full or fails.
         """
-        place = slice(self._written, self._written + len(rows.run))
-        with self.used():
-            self._file["run"][place] = rows.run
+        row_slice = slice(self._written_rows, self._written_rows + len(rows.run))
+        with self.reporting_disk_errors():
+            self._file["run"][row_slice] = rows.run
             for name, values in rows.arrays.items():
-                self._file[name][place] = [storable(each) for each in values] if _texts(values) else values
-        self._written = place.stop
+                self._file[name][row_slice] = (
+                    [storable(text) for text in values] if _are_texts(values) else values
+                )
+        self._written_rows = row_slice.stop
 
     def finish(self) -> None:
         """Complete the file.
@@ -153,22 +155,24 @@ class StudyWriter(NewFile):
         Raises:
             StorageError: the disk is full or fails.
         """
-        with self.used():
+        with self.reporting_disk_errors():
             self._close()
 
-    def _size(self) -> int:
-        columns = sum(int(np.prod(self._shape(each)[1:])) for each in self._head.columns)
-        return self._rows * 8 * (columns + len(self._head.parameters) + 16)
+    def _expected_bytes(self) -> int:
+        columns = sum(int(np.prod(self._shape(column)[1:])) for column in self._head.columns)
+        return self._row_count * 8 * (columns + len(self._head.parameters) + 16)
 
     def _shape(self, column: StudyColumn) -> tuple[int, ...]:
-        lengths = {"step": self._head.steps, "joint": len(self._head.joint_names), "motor": len(MOTORS)}
-        return (self._rows, *(lengths[dim] for dim in column.dims))
+        dim_lengths = {"step": self._head.steps, "joint": len(self._head.joint_names), "motor": len(MOTORS)}
+        return (self._row_count, *(dim_lengths[dim] for dim in column.dims))
 
-    def _create(self) -> None:
+    def _create_datasets(self) -> None:
         head, file = self._head, self._file
         file.attrs.update(self._attributes())
         scales = {
-            "run": self._dataset("run", (self._rows,), "<i8", {"long_name": "number of the run, from 0"}),
+            "run": self._create_dataset(
+                "run", (self._row_count,), "<i8", {"long_name": "number of the run, from 0"}
+            ),
             "joint": create_labels(
                 file, "joint", head.joint_names, "joint, from the base to the tip", track_order=False
             ),
@@ -180,25 +184,27 @@ class StudyWriter(NewFile):
             scales["step"].attrs["long_name"] = "step that was kept, from 0"
         for name, scale in scales.items():
             scale.make_scale(name)
-        types = create_labels(file, "joint_type", head.joint_types, "type of the joint", track_order=False)
-        attach_scales(types, [scales["joint"]])
+        joint_type = create_labels(
+            file, "joint_type", head.joint_types, "type of the joint", track_order=False
+        )
+        attach_scales(joint_type, [scales["joint"]])
         for name, long_name in TEXTS.items():
-            self._dataset(name, (self._rows,), TEXT, {"long_name": long_name}, [scales["run"]])
+            self._create_dataset(name, (self._row_count,), TEXT, {"long_name": long_name}, [scales["run"]])
         for parameter in head.parameters:
-            unit = {"units": parameter.unit} if parameter.numeric and parameter.unit else {}
-            attributes = {"long_name": f"value of {parameter.path}", **unit}
+            unit_attribute = {"units": parameter.unit} if parameter.numeric and parameter.unit else {}
+            attributes = {"long_name": f"value of {parameter.path}", **unit_attribute}
             dtype = "<f8" if parameter.numeric else TEXT
-            self._dataset(parameter.path, (self._rows,), dtype, attributes, [scales["run"]])
-        coordinates = " ".join([*(each.path for each in head.parameters), "trajectory"])
+            self._create_dataset(parameter.path, (self._row_count,), dtype, attributes, [scales["run"]])
+        coordinates = " ".join([*(varied.path for varied in head.parameters), "trajectory"])
         for column in head.columns:
             attributes = {
                 **unit_attributes(column.quantity, head.joint_types),
                 "long_name": column.long_name,
                 "coordinates": f"{coordinates} joint_type",
             }
-            along = [scales[dim] for dim in ("run", *column.dims)]
-            self._dataset(column.name, self._shape(column), "<f8", attributes, along)
-        for name in OF_RUN:
+            column_scales = [scales[dim] for dim in ("run", *column.dims)]
+            self._create_dataset(column.name, self._shape(column), "<f8", attributes, column_scales)
+        for name in RUN_TEXTS:
             file[name].attrs["coordinates"] = coordinates
         write_sources(file.create_group("inputs", track_order=True), head.sources)
 
@@ -217,7 +223,7 @@ class StudyWriter(NewFile):
             "Conventions": "CF-1.11",
         }
 
-    def _dataset(
+    def _create_dataset(
         self,
         name: str,
         shape: tuple[int, ...],
@@ -231,17 +237,17 @@ class StudyWriter(NewFile):
         return dataset
 
 
-def _texts(values: Any) -> bool:
+def _are_texts(values: Any) -> bool:
     return not isinstance(values, np.ndarray) and bool(len(values)) and isinstance(values[0], str)
 
 
 PROVENANCE = ("method", "seed", "engine", "compiler", "numpy", "command_line")
 """Root attributes on the computation of a table."""
 
-OF_COLUMNS = ("units", "long_name", "coordinates", SCALES)
+COLUMN_ATTRIBUTES = ("units", "long_name", "coordinates", SCALES)
 
 
-ALL = slice(None)
+ALL_ROWS = slice(None)
 """Slice of all rows."""
 
 
@@ -281,9 +287,9 @@ class StoredStudy(StoredFile):
         try:
             with reporting_damage(path):
                 self.attributes: dict[str, Any] = dict(self._file.attrs)
-                if (found := self.attributes.get("format")) != file_formats.STUDY_TABLE:
-                    kind = kind_of_format(found if isinstance(found, str) else None)
-                    raise InputError.one(f"is {kind}, expected a table that vsacli study writes", path)
+                if (format_name := self.attributes.get("format")) != file_formats.STUDY_TABLE:
+                    format_kind = kind_of_format(format_name if isinstance(format_name, str) else None)
+                    raise InputError.one(f"is {format_kind}, expected a table that vsacli study writes", path)
                 check_present(self.attributes, ("study_name", "robot_name"))
                 self.study_name, self.robot_name = (
                     one_line(str(self.attributes[name])) for name in ("study_name", "robot_name")
@@ -298,30 +304,34 @@ class StoredStudy(StoredFile):
                 self.joint_names, self.joint_types = self.texts("joint"), self.texts("joint_type")
                 self.rows = len(self._dataset("run"))
                 self.steps = len(self._dataset("step")) if "step" in self._file else 0
-                self._check()
+                self._check_row_counts()
         except BaseException:
             self._file.close()
             raise
 
-    def _check(self) -> None:
-        stored = [name for name in TEXTS if not self._lacks(name)]
-        for name in (*stored, *self.parameters, *self.columns):
+    def _check_row_counts(self) -> None:
+        stored_texts = [name for name in TEXTS if not self._lacks_text(name)]
+        for name in (*stored_texts, *self.parameters, *self.columns):
             if self._dataset(name).shape[0] != self.rows:
                 raise DamageError(f"{name} has not {self.rows} rows")
 
-    def _lacks(self, name: str) -> bool:
+    def _lacks_text(self, name: str) -> bool:
         return name in LATER_TEXTS and name not in self._file
 
-    def texts(self, name: str, rows: slice = ALL) -> tuple[str, ...]:
+    def texts(self, name: str, rows: slice = ALL_ROWS) -> tuple[str, ...]:
         """Return the texts of rows, or the labels of a dimension.
 
         Raises:
             InputError: the texts are damaged.
         """
         with reporting_damage(self.path, name):
-            return ("",) * len(range(self.rows)[rows]) if self._lacks(name) else self._labels(name, rows)
+            return (
+                ("",) * len(range(self.rows)[rows])
+                if self._lacks_text(name)
+                else self._read_labels(name, rows)
+            )
 
-    def read(self, name: str, rows: slice = ALL) -> AnyArray:
+    def read(self, name: str, rows: slice = ALL_ROWS) -> AnyArray:
         """Return a numeric column, (rows, ...), or the numbers of the runs.
 
         Raises:
@@ -340,9 +350,12 @@ class StoredStudy(StoredFile):
         with reporting_damage(self.path, name):
             dataset = self._dataset(name)
             unit = str(dataset.attrs["units"])
-            per_type = (str(dataset.attrs.get(f"units_{each}", unit)) for each in ("revolute", "prismatic"))
+            units_by_type = (
+                str(dataset.attrs.get(f"units_{joint_type}", unit))
+                for joint_type in ("revolute", "prismatic")
+            )
             dims = tuple(dimension[0].name.removeprefix("/") for dimension in dataset.dims)
-            return StoredColumn(name, dims[1:], Quantity(*per_type), str(dataset.attrs["long_name"]))
+            return StoredColumn(name, dims[1:], Quantity(*units_by_type), str(dataset.attrs["long_name"]))
 
     def shape(self, name: str, steps: int) -> tuple[int, ...]:
         """Return the shape of a column's values in one row, with this many samples over time."""
@@ -385,4 +398,4 @@ class StoredStudy(StoredFile):
         with reporting_damage(self.path):
             read_texts(self._file)
             for name in self.columns:
-                check_present(self._file[name].attrs, OF_COLUMNS, name)
+                check_present(self._file[name].attrs, COLUMN_ATTRIBUTES, name)

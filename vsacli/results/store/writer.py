@@ -86,10 +86,10 @@ class ResultWriter(NewFile):
         self._labels = robot.labels
         self._declared = variables_by_tool(self._declared, len(robot.tool_names))
         self._trajectory = trajectory
-        self._variables = self._selected(variables, robot, trajectory)
+        self._variables = self._variables_to_store(variables, robot, trajectory)
         self._precision = precision
-        rounded = {} if precision == DOUBLE else {PRECISION: precision}
-        self._provenance = {"command_line": "", **provenance, **rounded}
+        precision_attribute = {} if precision == DOUBLE else {PRECISION: precision}
+        self._provenance = {"command_line": "", **provenance, **precision_attribute}
         self._fillers: dict[str, ChunkFiller] = {}
 
     def write(self, block: Samples) -> None:
@@ -99,13 +99,13 @@ class ResultWriter(NewFile):
             StorageError: the disk is full or fails, perhaps for an earlier block; or a value overflows single
                 precision.
         """
-        with self.used():
+        with self.reporting_disk_errors():
             for name, filler in self._fillers.items():
-                values = self._values(block, name)
+                values = self._dataset_values(block, name)
                 try:
                     filler.append(values)
                 except FloatingPointError:
-                    raise self._too_large(name, values, block.time) from None
+                    raise self._overflow_error(name, values, block.time) from None
 
     def finish(self, report: Mapping[str, Any], provenance: Mapping[str, str] = MappingProxyType({})) -> None:
         """Store the report; the file contains the samples written so far.
@@ -117,99 +117,108 @@ class ResultWriter(NewFile):
         Raises:
             StorageError: the disk is full or fails.
         """
-        with self.used():
+        with self.reporting_disk_errors():
             for filler in self._fillers.values():
                 filler.finish()
             self.wait()
             for name, value in provenance.items():
                 self._file.attrs.modify(name, value)  # keeps its place among the attributes
-            self._complete(report)
+            self._write_report(report)
             self._close()
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+        self,
+        error_type: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
     ) -> None:
-        unfinished = kind is None and bool(self._file)
-        super().__exit__(kind, error, traceback)
+        unfinished = error_type is None and bool(self._file)
+        super().__exit__(error_type, error, traceback)
         if unfinished:
             raise RuntimeError("a result was left without `finish`")
 
-    def _create(self) -> None:
-        stored = create_layout(
+    def _create_datasets(self) -> None:
+        datasets = create_layout(
             self._file,
-            self._format if self._robot.is_plain_chain else file_formats.OF_TREES[self._format],
+            self._format if self._robot.is_plain_chain else file_formats.TREE_FORMATS[self._format],
             self._robot,
             self._trajectory,
             self._variables,
             self._provenance,
             self._precision,
         )
-        self._fillers = {name: ChunkFiller(dataset, self.do) for name, dataset in stored.items()}
+        self._fillers = {
+            name: ChunkFiller(dataset, self.schedule_write) for name, dataset in datasets.items()
+        }
 
-    def _values(self, block: Any, name: str) -> AnyArray:
+    def _dataset_values(self, block: Any, name: str) -> AnyArray:
         """Return the values of a block for a dataset."""
         return split_axes(getattr(block, name), self._declared[name], self._labels)
 
-    def _too_large(self, name: str, values: AnyArray, time: FloatArray) -> StorageError:
+    def _overflow_error(self, name: str, values: AnyArray, time: FloatArray) -> StorageError:
         """Return the error for values that overflow single precision."""
         with np.errstate(over="ignore"):
-            lost = np.isfinite(values) & np.isinf(values.astype(np.float32))
-        at = tuple(np.argwhere(lost)[0])
-        owner = next((dim for dim in self._declared[name].dims if dim in ("joint", "tool")), None)
-        of_owner = f" of {self._labels[owner][at[1]]}" if owner else ""
-        what = f"{name}{of_owner} is {values[at]:.3g} at t = {time_text(time[at[0]])}"
+            overflows = np.isfinite(values) & np.isinf(values.astype(np.float32))
+        index = tuple(np.argwhere(overflows)[0])
+        owner_dim = next((dim for dim in self._declared[name].dims if dim in ("joint", "tool")), None)
+        owner_text = f" of {self._labels[owner_dim][index[1]]}" if owner_dim else ""
+        value_text = f"{name}{owner_text} is {values[index]:.3g} at t = {time_text(time[index[0]])}"
         advice = f"beyond the {np.finfo(np.float32).max:.2g} of single precision; store in double precision"
-        return StorageError(self._staged.path, f"cannot be written: {what}, {advice}")
+        return StorageError(self._staged.path, f"cannot be written: {value_text}, {advice}")
 
-    def _complete(self, report: Mapping[str, Any]) -> None:
-        text = storable(json.dumps(report, ensure_ascii=False, allow_nan=False))
-        self._file.create_group("report").create_dataset("json", data=text, dtype=TEXT)
+    def _write_report(self, report: Mapping[str, Any]) -> None:
+        report_json = storable(json.dumps(report, ensure_ascii=False, allow_nan=False))
+        self._file.create_group("report").create_dataset("json", data=report_json, dtype=TEXT)
         self._file.attrs["verdict"] = report["verdict"]
         self._file.attrs["complete"] = int(report["complete"])
 
-    def _size(self) -> int:
+    def _expected_bytes(self) -> int:
         """Return the bytes of all samples, flags before compression."""
-        stored = (VARIABLES["time"], *self._variables)
-        row = sum(row_bytes(variable, self._labels, self._precision) for variable in stored)
-        return self._trajectory.samples * row
+        stored_variables = (VARIABLES["time"], *self._variables)
+        sample_bytes = sum(
+            row_bytes(variable, self._labels, self._precision) for variable in stored_variables
+        )
+        return self._trajectory.samples * sample_bytes
 
-    def _selected(
+    def _variables_to_store(
         self, names: Iterable[str] | None, robot: Robot, trajectory: Trajectory
     ) -> tuple[Variable, ...]:
         """Return the variables with these names, or all that a run of robot and trajectory has."""
-        named = {ALL} if names is None else set(names)
-        absent = {**self._absent(trajectory), **_not_given(robot, self._declared)}
-        if TIP_COMPLIANCE in named:
-            absent.pop(TOOL_FLAGS, None)
-        for variable in select_variables(named - {ALL}, self._declared):
-            if variable.name in absent:
-                raise InputError.one(f"there is no {variable.name}: {absent[variable.name]}")
-        present = {name for name in self._declared if name not in absent and name not in ON_REQUEST}
-        return select_variables(named - {ALL} | (present if ALL in named else set()), self._declared)
+        requested = {ALL} if names is None else set(names)
+        reasons = {**self._absent_reasons(trajectory), **_missing_in_robot(robot, self._declared)}
+        if TIP_COMPLIANCE in requested:
+            reasons.pop(TOOL_FLAGS, None)
+        for variable in select_variables(requested - {ALL}, self._declared):
+            if variable.name in reasons:
+                raise InputError.one(f"there is no {variable.name}: {reasons[variable.name]}")
+        default_names = {name for name in self._declared if name not in reasons and name not in ON_REQUEST}
+        return select_variables(
+            requested - {ALL} | (default_names if ALL in requested else set()), self._declared
+        )
 
-    def _absent(self, trajectory: Trajectory) -> dict[str, str]:
+    def _absent_reasons(self, trajectory: Trajectory) -> dict[str, str]:
         """Return the variables that a run along a trajectory does not have, each with the reason."""
-        uncertain = trajectory.uncertain
-        certain = [name for name in UNCERTAIN if name not in uncertain]
+        uncertain_names = trajectory.uncertain
+        certain_names = [name for name in UNCERTAIN if name not in uncertain_names]
         reasons = {
-            deviation(name): f"{name} does not come from a fit of recorded samples" for name in certain
+            deviation(name): f"{name} does not come from a fit of recorded samples" for name in certain_names
         }
         if trajectory.wrench is not None:
             return reasons
-        wrench = (*WRENCH_NAMES, *map(deviation, WRENCH_NAMES))
-        return reasons | dict.fromkeys(wrench, "the trajectory has no wrench")
+        wrench_names = (*WRENCH_NAMES, *map(deviation, WRENCH_NAMES))
+        return reasons | dict.fromkeys(wrench_names, "the trajectory has no wrench")
 
 
-def _not_given(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
+def _missing_in_robot(robot: Robot, declared: Mapping[str, Variable]) -> dict[str, str]:
     """Return the variables that the robot does not have, each with the missing key of its file."""
     return {
-        name: f"no {variable.dims[0]} of {robot.name} has {_requirement(variable)}"
+        name: f"no {variable.dims[0]} of {robot.name} has {_requirement_text(variable)}"
         for name, variable in declared.items()
         if not robot.has_variable(variable)
     }
 
 
-def _requirement(variable: Variable) -> str:
+def _requirement_text(variable: Variable) -> str:
     if variable.requires == MIN_STIFFNESS:
         return f"a {MIN_STIFFNESS}, and {TIP_COMPLIANCE} is not computed"
     if variable.requires in MOTOR_CONSTANTS:

@@ -24,8 +24,8 @@ from vsacli.robot.models.exported_model import (
     xml_document,
 )
 from vsacli.robot.models.mjcf_drives import (
-    DRAWN,
     GHOST,
+    POINT_SIZE,
     Sections,
     Start,
     add_dampers,
@@ -74,7 +74,7 @@ def mjcf_model(robot: Robot, start: Start | None = None) -> ExportedModel:
     add_dampers(sections, robot.joints)
     tools = zip(exported_tool_names(robot), robot.end_effectors, robot.tool_joints, strict=True)
     for name, tool, carrier in tools:
-        add_element(bodies[carrier], "site", name=name, pos=tool.xyz, quat=_quaternion(tool), size=DRAWN)
+        add_element(bodies[carrier], "site", name=name, pos=tool.xyz, quat=_quaternion(tool), size=POINT_SIZE)
     if start is not None:
         add_start(root, sections.world, robot, start)
     return ExportedModel(xml_document(root, _header_comment(robot)), forces_text(robot), ())

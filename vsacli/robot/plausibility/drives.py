@@ -112,8 +112,12 @@ def _checked_motors(checked: CheckedRobot) -> Iterator[_CheckedMotor]:
             yield _CheckedMotor(checked, number, joint, path, motor)
 
 
-def _measure_motors(
-    name: str, size: Callable[[_CheckedMotor], float] | None = None, *, unit: str = "", carrying: bool = False
+def _motor_measurements(
+    field: str,
+    magnitude: Callable[[_CheckedMotor], float] | None = None,
+    *,
+    unit: str = "",
+    loaded_only: bool = False,
 ) -> Measure:
     """Return the measure of a field of the motors.
 
@@ -122,7 +126,7 @@ def _measure_motors(
         size: function that returns the size of a motor; by default |value|, NaN if 0 or infinite. Those
             with NaN are skipped.
         unit: unit of the field; motors with another one are skipped. "" for any unit.
-        carrying: whether to skip motors that do not carry the load.
+        loaded_only: whether to skip motors that do not carry the load.
     """
 
     def measure(checked: CheckedRobot) -> Iterator[Measured]:
@@ -133,7 +137,7 @@ def _measure_motors(
             if counts and unit in ("", drive.unit(name)):
                 yield drive.measure(name, relative)
 
-    return measure
+    return motor_measurements
 
 
 def _rotor_inertia_share(drive: _CheckedMotor, *, tiny: bool) -> float:
@@ -195,12 +199,12 @@ def _measure_dry_friction(checked: CheckedRobot) -> Iterator[Measured]:
 
 
 GEAR_RULES: tuple[Rule[CheckedRobot], ...] = (
-    Rule("gear ratios", "`gear_ratio`", _measure_motors("gear_ratio", unit="1"),
+    Rule("gear ratios", "`gear_ratio`", _motor_measurements("gear_ratio", unit="1"),
         size="motor turns per joint turn", low=1, high=5000, usual=100,
         reason="several stages reach some thousands",
         finding="is {size} turns of the motor to one of the joint",
         advice="it is the motor's turns over those of the joint, e.g. 100"),
-    Rule("gear ratios of prismatic joints", "`gear_ratio`", _measure_motors("gear_ratio", unit="rad/m"),
+    Rule("gear ratios of prismatic joints", "`gear_ratio`", _motor_measurements("gear_ratio", unit="rad/m"),
         size="rad/m", low=5, high=1e5, usual=600,
         reason="5: a wheel of 0.4 m; 100,000: a screw of 0.06 mm pitch",
         finding="turns the motor by {size} rad for each meter", units=(OtherUnit("rad/mm", 1e3),),
@@ -209,8 +213,8 @@ GEAR_RULES: tuple[Rule[CheckedRobot], ...] = (
 
 MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
     Rule("light rotors", "`motor.inertia`",
-        _measure_motors(
-            "inertia", lambda m: ratio_or_nan(m.at_joint_side.inertia, m.link_inertia), carrying=True
+        _motor_measurements(
+            "inertia", lambda m: ratio_or_nan(m.at_joint_side.inertia, m.link_inertia), loaded_only=True
         ),
         size="joint-side, over the link's inertia about its joint", low=0.005,
         reason="gears multiply by the ratio squared; direct drives have large rotors",
@@ -248,14 +252,14 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         )
     ),
     Rule("velocities of motors and joints", "`max_velocity`, `limits.velocity`",
-        _measure_motors("max_velocity", _joint_velocity, carrying=True),
+        _motor_measurements("max_velocity", _joint_velocity, loaded_only=True),
         size="joint-side, over the joint's limit", high=8,
         reason="a joint's limit is about what its motor can do",
         finding="lets the joint go {size} times as fast as its `limits.velocity`",
         units=ROTARY, advice="check the units of both", in_angles=True,
         explained_by=(*GEARS, "velocities of motors", "velocities of shafts")),
     Rule("weak motors", "`max_torque`",
-        _measure_motors("max_torque", lambda m: ratio_or_nan(m.torque, m.load), carrying=True),
+        _motor_measurements("max_torque", lambda m: ratio_or_nan(m.torque, m.load), loaded_only=True),
         size="joint-side, over the load of the stretched arm's weight",
         low=0.05, usual=2,
         reason="it could accelerate the arm by only 0.05 g",
@@ -263,7 +267,7 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         advice="is it the motor's own? Then give `gear_ratio` and `side: shaft`, or multiply by it",
         explained_by=GEARS),
     Rule("strong motors", "`max_torque`",
-        _measure_motors("max_torque", lambda m: ratio_or_nan(m.torque, m.scale), carrying=True),
+        _motor_measurements("max_torque", lambda m: ratio_or_nan(m.torque, m.scale), loaded_only=True),
         size="joint-side, over weight times reach",
         high=300, usual=0.5, reason="it would lift 300 such robots",
         finding="is, on the joint's side of the gear, {size} times the weight of the robot at its reach",
@@ -286,7 +290,7 @@ RESISTANCE_RULES: tuple[Rule[CheckedRobot], ...] = (
 )  # fmt: skip
 
 WINDING_RULES: tuple[Rule[CheckedRobot], ...] = (
-    Rule("torque constants", "`torque_constant`", _measure_motors("torque_constant"),
+    Rule("torque constants", "`torque_constant`", _motor_measurements("torque_constant"),
         size="N m/A", low=1e-4, high=30, usual=0.1,
         reason="from the smallest motors, 0.0003, to large direct drives, a few",
         finding="is that of no motor", units=(OtherUnit("mN m/A", 1e-3), OtherUnit("N cm/A", 1e-2)),
@@ -295,7 +299,7 @@ WINDING_RULES: tuple[Rule[CheckedRobot], ...] = (
 
 RULES_OF_MOTORS_AND_SPRINGS: tuple[Rule[CheckedRobot], ...] = (
     Rule("motors compared with springs", "`max_torque`, `spring`",
-        _measure_motors("max_torque", _deflection_of_springs, carrying=True),
+        _motor_measurements("max_torque", _deflection_of_springs, loaded_only=True),
         size="deflection of the springs at rest under this torque, rad (of the reach)",
         low=0.01, reason="bundled robots: 0.03 to 6; the springs would not count",
         finding="deflects the springs of the joint by only {size} rad (of the reach)",

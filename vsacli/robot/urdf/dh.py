@@ -22,7 +22,7 @@ from vsacli.robot.urdf.moving_tree import MovingJoint, MovingTree, Tip
 SNAP_ANGLE = 1e-4
 """Default angle, rad; axes closer to parallel are made parallel if their common normal is far away."""
 
-FAR_NORMAL = 10.0
+FAR_NORMAL_DISTANCE = 10.0
 """Distance of a common normal from the joints, m, up to which no axis is made parallel at any angle, and a
 link with several joints may have its frame on it."""
 
@@ -89,19 +89,21 @@ def dh_frames(joints: Sequence[MovingJoint], tips: Sequence[Tip], snap: float) -
         for joint, axis in zip(joints, axes, strict=True)
     ]
     seats: list[FloatArray] = []
-    for joint, axis, near in zip(joints, axes, is_near, strict=True):
-        seats.append(_seat_on_axis(seats[joint.parent] if joint.parent >= 0 else None, axis, near))
+    for joint, axis, uses_normal in zip(joints, axes, is_near, strict=True):
+        seats.append(_seat_on_axis(seats[joint.parent] if joint.parent >= 0 else None, axis, uses_normal))
     poses: list[FloatArray] = []
-    for number, seat in enumerate(seats):
-        begun = [seats[child] for child in children[number] if is_near[child]]
-        ends = [_last_frame(seat, tip.pose) for tip in tips if tip.joint == number and not children[number]]
-        poses.append([*begun, *ends, seat][0])
+    for index, seat in enumerate(seats):
+        child_seats = [seats[child] for child in children[index] if is_near[child]]
+        tip_frames = [
+            _last_frame(seat, tip.pose) for tip in tips if tip.joint == index and not children[index]
+        ]
+        poses.append([*child_seats, *tip_frames, seat][0])
     scale = float(max(abs(pose[:3, 3]).max() for pose in (*seats, *poses, *(tip.pose for tip in tips))))
-    steps = (inverse_pose(seat) @ pose for seat, pose in zip(seats, poses, strict=True))
+    relative_poses = (inverse_pose(seat) @ pose for seat, pose in zip(seats, poses, strict=True))
     return Frames(
         base=seats[0],
         seats=tuple(seats),
-        rows=tuple(_dh_row(step, scale) for step in steps),
+        rows=tuple(_dh_row(step, scale) for step in relative_poses),
         poses=tuple(poses),
         tools=tuple(inverse_pose(poses[tip.joint]) @ tip.pose for tip in tips),
         snaps=snaps,
@@ -111,17 +113,19 @@ def dh_frames(joints: Sequence[MovingJoint], tips: Sequence[Tip], snap: float) -
 
 def _joints_on_links(joints: Sequence[MovingJoint]) -> dict[int, list[int]]:
     """Return the indices of the joints on the link of each joint, those on the base under -1."""
-    children: dict[int, list[int]] = {number: [] for number in range(-1, len(joints))}
-    for number, joint in enumerate(joints):
-        children[joint.parent].append(number)
+    children: dict[int, list[int]] = {index: [] for index in range(-1, len(joints))}
+    for index, joint in enumerate(joints):
+        children[joint.parent].append(index)
     return children
 
 
 def tidy(numbers: FloatArray, scale: float) -> FloatArray:
     """Return numbers, replaced by short ones from which they differ by rounding; `scale` is the largest."""
     exponent = math.ceil(math.log10(scale)) if scale > 0 else 0
-    short = np.round(numbers, SHORT_DECIMALS - exponent)
-    return np.where(abs(numbers - short) <= FILE_ROUNDING * scale, short, numbers) + 0.0  # no negative zero
+    short_numbers = np.round(numbers, SHORT_DECIMALS - exponent)
+    return (
+        np.where(abs(numbers - short_numbers) <= FILE_ROUNDING * scale, short_numbers, numbers) + 0.0
+    )  # no negative zero
 
 
 def tidy_angle(angle: float) -> float:
@@ -134,11 +138,15 @@ def tidy_angle(angle: float) -> float:
 def _axes(joints: Sequence[MovingJoint], children: Mapping[int, Sequence[int]]) -> list[Axis]:
     """Return the axes; a prismatic joint's, whose location is arbitrary, passes through the only next one."""
     axes: dict[int, Axis] = {}
-    for number, joint in reversed(list(enumerate(joints))):
-        further = children[number]
-        point = axes[further[0]].point if len(further) == 1 and not joint.is_revolute else joint.origin
-        axes[number] = Axis(point, joint.direction)
-    return [axes[number] for number in range(len(joints))]
+    for index, joint in reversed(list(enumerate(joints))):
+        child_indices = children[index]
+        point = (
+            axes[child_indices[0]].point
+            if len(child_indices) == 1 and not joint.is_revolute
+            else joint.origin
+        )
+        axes[index] = Axis(point, joint.direction)
+    return [axes[index] for index in range(len(joints))]
 
 
 def _make_parallel(
@@ -148,19 +156,21 @@ def _make_parallel(
 
     Of several joints on a link, a mount takes those whose common normal is far away.
     """
-    result: list[Axis] = []
+    parallel_axes: list[Axis] = []
     snaps: list[Snap] = []
     for joint, axis in zip(joints, axes, strict=True):
         if joint.parent >= 0:
-            before = result[joint.parent]
-            sine = _sine_between(before, axis)
+            previous_axis = parallel_axes[joint.parent]
+            sine = _sine_between(previous_axis, axis)
             is_only = len(children[joint.parent]) == 1
-            if sine <= FILE_ROUNDING or (is_only and sine < snap and _normal_is_far(before, axis)):
-                direction = before.direction * math.copysign(1, before.direction @ axis.direction)
+            if sine <= FILE_ROUNDING or (is_only and sine < snap and _normal_is_far(previous_axis, axis)):
+                direction = previous_axis.direction * math.copysign(
+                    1, previous_axis.direction @ axis.direction
+                )
                 axis = Axis(axis.point, direction)
                 snaps += [Snap(joint.urdf.name, sine)] if sine > FILE_ROUNDING else []
-        result.append(axis)
-    return result, tuple(snaps)
+        parallel_axes.append(axis)
+    return parallel_axes, tuple(snaps)
 
 
 def _sine_between(first: Axis, second: Axis) -> float:
@@ -170,32 +180,32 @@ def _sine_between(first: Axis, second: Axis) -> float:
 def _normal_is_far(first: Axis, second: Axis) -> bool:
     """Return whether the common normal is far away; that of parallel axes is not."""
     is_parallel = _sine_between(first, second) <= FILE_ROUNDING
-    return not is_parallel and max(map(abs, _common_normal_feet(first, second))) > FAR_NORMAL
+    return not is_parallel and max(map(abs, _common_normal_feet(first, second))) > FAR_NORMAL_DISTANCE
 
 
 def _common_normal_feet(first: Axis, second: Axis) -> tuple[float, float]:
     """Return the feet of the common normal of two axes, as distances along each axis from its point, m."""
-    across = second.point - first.point
+    between_points = second.point - first.point
     normal = np.cross(first.direction, second.direction)
-    scaled = normal / (normal @ normal)
+    scaled_normal = normal / (normal @ normal)
     return (
-        float(np.cross(across, second.direction) @ scaled),
-        float(np.cross(across, first.direction) @ scaled),
+        float(np.cross(between_points, second.direction) @ scaled_normal),
+        float(np.cross(between_points, first.direction) @ scaled_normal),
     )
 
 
-def _seat_on_axis(carrying: FloatArray | None, axis: Axis, is_near: bool) -> FloatArray:
+def _seat_on_axis(carrier_seat: FloatArray | None, axis: Axis, is_near: bool) -> FloatArray:
     """Return the frame at which the row of a joint begins: on its axis, where the frames before suggest.
 
     Args:
-        carrying: seat of the joint before; None on the base.
+        carrier_seat: seat of the joint before; None on the base.
         axis: axis of the joint.
         is_near: whether the common normal with the axis before is to be used.
     """
-    if carrying is None:
+    if carrier_seat is None:
         origin = axis.point - (axis.point @ axis.direction) * axis.direction  # the closest to the base's
         return _frame_facing(np.eye(4), Axis(origin, axis.direction))
-    return _next_frame(carrying, axis) if is_near else _frame_facing(carrying, axis)
+    return _next_frame(carrier_seat, axis) if is_near else _frame_facing(carrier_seat, axis)
 
 
 def _frame_facing(frame: FloatArray, axis: Axis) -> FloatArray:
@@ -207,13 +217,13 @@ def _frame_facing(frame: FloatArray, axis: Axis) -> FloatArray:
 
 def _next_frame(frame: FloatArray, axis: Axis) -> FloatArray:
     """Return the frame on an axis, at the common normal with the z axis of the frame before."""
-    before = Axis(frame[:3, 3], frame[:3, 2])
-    normal = np.cross(before.direction, axis.direction)
+    previous_axis = Axis(frame[:3, 3], frame[:3, 2])
+    normal = np.cross(previous_axis.direction, axis.direction)
     if np.linalg.norm(normal) <= FILE_ROUNDING:
         return _parallel_frame(frame, axis)
-    foot_before, foot = _common_normal_feet(before, axis)
+    foot_before, foot = _common_normal_feet(previous_axis, axis)
     origin = axis.point + foot * axis.direction
-    across = origin - (before.point + foot_before * before.direction)
+    across = origin - (previous_axis.point + foot_before * previous_axis.direction)
     x = _perpendicular_part(normal, axis.direction)
     distance = float(x @ across)
     if distance < 0 if abs(distance) > _negligible(origin) else _turns_back(x, frame):

@@ -39,7 +39,7 @@ from vsacli.robot.urdf.link_tree import (
 from vsacli.robot.urdf.vocabulary import REDUCTIONS, Unread, refuse_macros, sort_words
 from vsacli.robot.urdf.xml_tree import Element, parse_xml
 
-SIMPLE = "SimpleTransmission"
+SIMPLE_TRANSMISSION = "SimpleTransmission"
 """Type of a transmission from one motor to one joint, in ROS control and for the PR2."""
 
 
@@ -50,8 +50,12 @@ def read_gear_ratios(root: Element, unread: Unread, problems: Problems) -> dict[
     """
     ratios: dict[str, float] = {}
     for transmission in _transmissions(root):
-        ends = (child for child in transmission.children if "joint" in child.tag.lower())
-        joints = [end.attributes["name"].strip() for end in ends if "name" in end.attributes]
+        joint_elements = (child for child in transmission.children if "joint" in child.tag.lower())
+        joints = [
+            joint_element.attributes["name"].strip()
+            for joint_element in joint_elements
+            if "name" in joint_element.attributes
+        ]
         for name in dict.fromkeys(joints):
             if name not in unread.left_out:
                 message = f"the transmission of joint {quoted(name)}, which does not exist, is ignored"
@@ -72,23 +76,23 @@ def _transmissions(root: Element) -> Iterator[Element]:
 def _is_simple(transmission: Element) -> bool:
     """Return whether a transmission is declared as simple, with one motor and one reduction at most."""
     types = [child.text for tag in ("type", "plugin") for child in transmission.children_with_tag(tag)]
-    says_so = [transmission.attributes.get("type", ""), *types]
+    type_texts = [transmission.attributes.get("type", ""), *types]
     motors = list(transmission.children_with_tag("actuator"))
-    is_one = len(motors) == 1 >= len(_declared_reductions(transmission))
-    return any(word.endswith(SIMPLE) for word in says_so) and is_one
+    has_one_motor = len(motors) == 1 >= len(_declared_reductions(transmission))
+    return any(word.endswith(SIMPLE_TRANSMISSION) for word in type_texts) and has_one_motor
 
 
 def _declared_reductions(transmission: Element) -> list[tuple[int, str, str]]:
     """Return line, word and text of each gear reduction, an element or an attribute."""
     parts = list(transmission.with_descendants())
-    elements = [(part.line, part.tag, part.text) for part in parts if part.tag in REDUCTIONS]
-    attributes = [
+    reduction_elements = [(part.line, part.tag, part.text) for part in parts if part.tag in REDUCTIONS]
+    reduction_attributes = [
         (part.line, word, part.attributes[word])
         for part in parts
         for word in REDUCTIONS
         if word in part.attributes
     ]
-    return elements + attributes
+    return reduction_elements + reduction_attributes
 
 
 def _net_reduction(transmission: Element, problems: Problems) -> float:
@@ -113,7 +117,7 @@ UNIT_QUATERNION = 1e-2
 """Deviation of a quaternion's norm from 1 that rounding to three digits cannot cause."""
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_Named = TypeVar("_Named", UrdfLink, UrdfJoint)
+_NamedRecord = TypeVar("_NamedRecord", UrdfLink, UrdfJoint)
 
 
 def read_urdf(path: str | os.PathLike[str]) -> Urdf:
@@ -135,48 +139,52 @@ def read_urdf(path: str | os.PathLike[str]) -> Urdf:
     version = root.attributes.get("version", VERSIONS[0])
     if version not in VERSIONS:
         unread.warn(root.line, f"version {quoted(version)} is unknown; read as {VERSIONS[-1]}")
-    reader = _Reader(problems, version, read_gear_ratios(root, unread, problems), unread)
+    reader = _ElementReader(problems, version, read_gear_ratios(root, unread, problems), unread)
     links = _index_by_name(map(reader.link, root.children_with_tag("link")), "link", problems)
     joints = _index_by_name(map(reader.joint, root.children_with_tag("joint")), "joint", problems)
     name = reader.word(root, "name")
     if not links:
         problems.fail(root.line, "the file describes no links")
-    _check_ends(links, joints, problems)
-    _check_leaders(joints, problems)
+    _check_joint_links(links, joints, problems)
+    _check_mimic_circles(joints, problems)
     problems.check()
     root_link = _root_link(links, joints, problems)
     return Urdf(source.path, name, links, joints, root_link, tuple(sorted(unread.warnings())))
 
 
-def _index_by_name(records: Iterable[_Named], kind: str, problems: Problems) -> dict[str, _Named]:
-    named: dict[str, _Named] = {}
+def _index_by_name(records: Iterable[_NamedRecord], kind: str, problems: Problems) -> dict[str, _NamedRecord]:
+    records_by_name: dict[str, _NamedRecord] = {}
     for record in records:
-        if record.name in named:
-            first = named[record.name].line
+        if record.name in records_by_name:
+            line = records_by_name[record.name].line
             message = (
-                f"the {kind} {quoted(record.name)} stands on line {first} already; each needs its own name"
+                f"the {kind} {quoted(record.name)} stands on line {line} already; each needs its own name"
             )
             problems.add(record.line, message)
-        named.setdefault(record.name, record)
-    return named
+        records_by_name.setdefault(record.name, record)
+    return records_by_name
 
 
-def _check_ends(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
+def _check_joint_links(
+    links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], problems: Problems
+) -> None:
     """Check that each joint has two existing links, and no link two parents."""
     parents: dict[str, UrdfJoint] = {}
     for joint in joints.values():
-        for end in dict.fromkeys((joint.parent, joint.child)):
-            if end and end not in links:
-                message = f"there is no link {quoted(end)}{did_you_mean(end, links)}"
+        for link_name in dict.fromkeys((joint.parent, joint.child)):
+            if link_name and link_name not in links:
+                message = f"there is no link {quoted(link_name)}{did_you_mean(link_name, links)}"
                 problems.add(joint.line, f"joint {quoted(joint.name)}: {message}")
-        other = parents.setdefault(joint.child, joint)
-        if joint.child and other is not joint:
-            both = f"the joints {quoted(other.name)} and {quoted(joint.name)}"
-            message = f"the link {quoted(joint.child)} is the child of {both}; closed loops are not read"
+        first_joint = parents.setdefault(joint.child, joint)
+        if joint.child and first_joint is not joint:
+            joints_text = f"the joints {quoted(first_joint.name)} and {quoted(joint.name)}"
+            message = (
+                f"the link {quoted(joint.child)} is the child of {joints_text}; closed loops are not read"
+            )
             problems.add(joint.line, message)
 
 
-def _check_leaders(joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
+def _check_mimic_circles(joints: Mapping[str, UrdfJoint], problems: Problems) -> None:
     for joint in joints.values():
         if joint.name in _followed_joints(joint, joints):
             message = "follows itself: the <mimic> of joints form a circle"
@@ -199,15 +207,17 @@ def _root_link(links: Mapping[str, UrdfLink], joints: Mapping[str, UrdfJoint], p
     if len(roots) != 1:
         reason = f"{', '.join(map(quoted, roots[:5]))} have no parent" if roots else "every link has a parent"
         problems.fail(1, f"the links must form one tree, which has one root, but {reason}")
-    circles = set(links) - {roots[0]} - {joint.child for joint in joints_below(roots[0], joints.values())}
-    if circles:
-        names = sorted(circles, key=lambda name: links[name].line)
+    circular_links = (
+        set(links) - {roots[0]} - {joint.child for joint in joints_below(roots[0], joints.values())}
+    )
+    if circular_links:
+        names = sorted(circular_links, key=lambda name: links[name].line)
         message = f"the link {quoted(names[0])} is its own ancestor: the joints form a circle"
         problems.fail(links[names[0]].line, message)
     return roots[0]
 
 
-class _Reader:
+class _ElementReader:
     """A reader of elements; problems are collected, and faulty parts replaced, so that reading continues."""
 
     def __init__(
@@ -246,8 +256,8 @@ class _Reader:
             name=name,
             line=element.line,
             type=kind,
-            parent=self._end(element, "parent"),
-            child=self._end(element, "child"),
+            parent=self._link_name(element, "parent"),
+            child=self._link_name(element, "child"),
             placement=self._origin(element),
             axis=self._axis(element) if kind in MOVING else np.zeros(3),
             limit=self._limit(element, kind),
@@ -261,12 +271,12 @@ class _Reader:
         multiplier, offset = self._number(element, "multiplier", 1.0), self._number(element, "offset", 0.0)
         return Mimic(self.word(element, "joint"), multiplier, offset)
 
-    def _end(self, joint: Element, tag: str) -> str:
-        end = self._child(joint, tag)
-        if end is None:
+    def _link_name(self, joint: Element, tag: str) -> str:
+        link_element = self._child(joint, tag)
+        if link_element is None:
             self._problems.add(joint.line, f"joint: there is no <{tag}> in it")
             return ""
-        return self.word(end, "link")
+        return self.word(link_element, "link")
 
     def _axis(self, joint: Element) -> FloatArray:
         element = self._child(joint, "axis")
@@ -284,31 +294,31 @@ class _Reader:
         lower, upper, velocity, effort = (
             self._bound(element, name) for name in ("lower", "upper", "velocity", "effort")
         )
-        self._name_dropped(joint, element, kind, (lower, upper, velocity, effort))
-        bounds = kind != "continuous" and lower < upper and (lower, upper) != UNLIMITED
+        self._note_dropped_limits(joint, element, kind, (lower, upper, velocity, effort))
+        has_range = kind != "continuous" and lower < upper and (lower, upper) != UNLIMITED
         return UrdfLimit(
-            position=(lower, upper) if bounds else None,
+            position=(lower, upper) if has_range else None,
             velocity=velocity if 0 < velocity < LARGEST_NUMBER else None,
             effort=effort if 0 < effort < LARGEST_NUMBER else None,
         )
 
-    def _name_dropped(
+    def _note_dropped_limits(
         self, joint: Element, limit: Element, kind: str, values: tuple[float, float, float, float]
     ) -> None:
         """Note limits of the file that cannot be ones, with reason, value and line."""
         lower, upper, velocity, effort = values
         is_continuous, sign = kind == "continuous", "they are not positive"
-        no_range = (lower >= upper or is_continuous) and (lower, upper) != UNLIMITED
+        is_empty_range = (lower >= upper or is_continuous) and (lower, upper) != UNLIMITED
         reason = "the joint is continuous" if is_continuous else "lower is not below upper"
-        for is_none, names, limits, why, quantity in (
-            (no_range, ("lower", "upper"), POSITION_LIMITS, reason, POSITION),
+        for is_dropped, names, limits, cause, quantity in (
+            (is_empty_range, ("lower", "upper"), POSITION_LIMITS, reason, POSITION),
             (velocity <= 0, ("velocity",), "velocity limits", sign, VELOCITY),
             (effort <= 0, ("effort",), "effort limits", sign, TORQUE),
         ):
-            if is_none and not limit.attributes.keys().isdisjoint(names):
+            if is_dropped and not limit.attributes.keys().isdisjoint(names):
                 value = " to ".join(limit.attributes.get(name, "0").strip() for name in names)
                 unit = quantity.unit("prismatic" if kind == "prismatic" else "revolute")
-                entry = (f"{limits} not taken over, since {why}", f"{value} {unit} (line {limit.line})")
+                entry = (f"{limits} not taken over, since {cause}", f"{value} {unit} (line {limit.line})")
                 self._unread.left_out[joint.attributes.get("name", "").strip()].append(entry)
 
     def _bound(self, element: Element, name: str) -> float:
@@ -323,9 +333,9 @@ class _Reader:
         if "quat_xyzw" in origin.attributes:
             return transform(self._rotation(origin), np.array(xyz))
         rpy = self._vector(origin, "rpy")
-        if many := [angle for angle in rpy if turns(angle) >= 1 + ROUNDED]:
-            most = max(many, key=abs)
-            message = f"rpy: {most:g} rad is {turns(most):.3g} turns; did you mean {most:g} deg?"
+        if large_angles := [angle for angle in rpy if turns(angle) >= 1 + ROUNDED]:
+            angle = max(large_angles, key=abs)
+            message = f"rpy: {angle:g} rad is {turns(angle):.3g} turns; did you mean {angle:g} deg?"
             self._unread.warn(origin.line, message, "turns")
         return pose_matrix(xyz, rpy)
 

@@ -22,7 +22,7 @@ from vsacli.base.progress import Progress, unheard, unseen
 from vsacli.base.texts import counted, listed
 from vsacli.documents.source import Source
 from vsacli.results.store.study_table import (
-    OF_RUN,
+    RUN_TEXTS,
     TEXTS,
     Head,
     StoredStudy,
@@ -106,7 +106,7 @@ def _table_rows(study: Study, rows: Sequence[Row], steps: int) -> StudyRows:
     points = [study.point(row.run) for row in rows]
     arrays: dict[str, Any] = {
         "trajectory": [study.trajectories[point.trajectory] for point in points],
-        **{name: [getattr(row, name) for row in rows] for name in OF_RUN},
+        **{name: [getattr(row, name) for row in rows] for name in RUN_TEXTS},
     }
     for dimension in study.dimensions:
         values = [point.values[dimension.path] for point in points]
