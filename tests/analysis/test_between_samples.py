@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 
 from vsacli import Flag, Limits, Motor, Report, Robot, Trajectory, inverse_dynamics, motor_torques
 from vsacli.actuators.reach import margin
-from vsacli.analysis.between_samples import SAMPLES_ONLY, SCANNED
+from vsacli.analysis.between_samples import SAMPLES_ONLY, SCAN_TIMES
 from vsacli.analysis.run import Run
 from vsacli.base.signals import POSITION, STIFFNESS
 from vsacli.trajectory.curves import ConstantProfile
@@ -174,7 +174,7 @@ def three_joints(rate: float = 103.0) -> tuple[Robot, Trajectory]:
 def test_what_is_found_does_not_depend_on_the_blocks(block_samples: int) -> None:
     """Of a run so long that it is looked at around its steps."""
     robot, trajectory = three_joints()
-    assert trajectory.samples > SCANNED
+    assert trajectory.samples > SCAN_TIMES
     whole = inverse_dynamics(robot, trajectory)
     run = Run(robot, trajectory, block_samples=block_samples)
     blocks = list(run)

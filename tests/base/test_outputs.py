@@ -17,7 +17,7 @@ from samples.system_errors import fail_with
 
 from vsacli import InputError, StorageError
 from vsacli.base import storage
-from vsacli.base.interrupts import ENDING, Interrupted, unwinding_when_ended
+from vsacli.base.interrupts import ENDING_SIGNALS, Interrupted, unwinding_when_ended
 from vsacli.base.outputs import Outputs, Staged
 from vsacli.base.storage import reporting_storage_errors, temporary_folder
 

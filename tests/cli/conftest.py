@@ -14,7 +14,7 @@ from samples.studies import study
 from vsacli.cli.main import run
 from vsacli.cli.main import vsacli as group
 from vsacli.results.charts.chart import Sheet
-from vsacli.results.plots import FigureFiles, drawn
+from vsacli.results.plots import FigureFiles, draw_sheet
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def drawn_figures(monkeypatch: pytest.MonkeyPatch) -> dict[str, Figure]:
 
     def save(_files: FigureFiles, drawings: Mapping[str, Figure | Sheet]) -> None:
         figures.update(
-            (name, drawn(each) if isinstance(each, Sheet) else each) for name, each in drawings.items()
+            (name, draw_sheet(each) if isinstance(each, Sheet) else each) for name, each in drawings.items()
         )
 
     monkeypatch.setattr(FigureFiles, "save", save)

@@ -10,7 +10,7 @@ from samples.command_line import REPOSITORY
 from samples.urdf import write
 
 from vsacli import InputError, load_robot
-from vsacli.robot.model import OF_PLACEHOLDERS
+from vsacli.robot.model import PLACEHOLDER_WARNING
 
 KEY = "placeholder: true\n"
 ARM = (REPOSITORY / "robots" / "vsa_3r.yaml").read_text(encoding="utf-8")

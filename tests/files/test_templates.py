@@ -19,7 +19,7 @@ from vsacli.documents.fields import OneOf, PairOf, RecordOf, declared_fields
 from vsacli.files.robot_template import MOST_JOINTS, robot_template
 from vsacli.files.templates import trajectory_template
 from vsacli.robot.file import RobotFile
-from vsacli.robot.model import OF_PLACEHOLDERS
+from vsacli.robot.model import PLACEHOLDER_WARNING
 from vsacli.trajectory.file import OF_ANY_ROBOT
 
 ROBOTS = sorted((REPOSITORY / "robots").glob("*.yaml"))

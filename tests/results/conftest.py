@@ -20,7 +20,7 @@ def chunks(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
 @pytest.fixture
 def cells(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
     """Set the number of values that are exported at a time."""
-    return lambda count: monkeypatch.setattr(selection, "CELLS", count)
+    return lambda count: monkeypatch.setattr(selection, "MAX_BLOCK_VALUES", count)
 
 
 @pytest.fixture

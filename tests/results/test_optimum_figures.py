@@ -11,7 +11,7 @@ from vsacli import load_robot, load_trajectory
 from vsacli.cli.optimize_plots import optimum_sheets
 from vsacli.results.charts.chart import ATTAINABLE
 from vsacli.results.charts.optimum import change_sheet, pace_sheet
-from vsacli.results.plots import drawn
+from vsacli.results.plots import draw_sheet
 from vsacli.studies.search import Optimum
 
 
@@ -59,12 +59,12 @@ def test_a_joint_with_one_motor_has_one_panel_of_torques():
 
 
 def test_the_fastest_motion_as_a_whole_is_drawn_where_there_is_one():
-    assert texts(drawn(pace_sheet(TIME, 1 + TIME, np.nan, "arm"))) == ["optimum", "as commanded"]
-    assert texts(drawn(pace_sheet(TIME, 1 + TIME, 1.5, "arm")))[-1] == "fastest uniform scaling"
+    assert texts(draw_sheet(pace_sheet(TIME, 1 + TIME, np.nan, "arm"))) == ["optimum", "as commanded"]
+    assert texts(draw_sheet(pace_sheet(TIME, 1 + TIME, 1.5, "arm")))[-1] == "fastest uniform scaling"
 
 
 def test_each_panel_has_the_limits_of_its_own_motor():
-    """Both had those of the weaker one, as two equal motors may be drawn."""
+    """Both had those of the weaker one, as two equal motors may be draw_sheet."""
     robot = load_robot(REPOSITORY / "robots" / "devices" / "fsj.yaml")
     motion = load_trajectory(REPOSITORY / "trajectories" / "devices" / "fsj.yaml", robot)
     sheets = optimum_sheets(Optimum(robot, "fsj", "torque", "torque", "stiffness", 0.01), motion, motion)

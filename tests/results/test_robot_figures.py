@@ -21,7 +21,7 @@ from samples.trees import hand
 from samples.wrenches import held
 
 from vsacli import Robot, inverse_dynamics, load_robot
-from vsacli.files.info.robot_info import load_sizes, static_load
+from vsacli.files.info.robot_info import static_load, static_loads
 from vsacli.results.charts.arm_chart import ArmPoints, arm_chart, home_position
 from vsacli.results.charts.look import STYLES, drawing_with
 from vsacli.results.charts.robot_charts import LIMITS, ActuatorChart, StiffnessMap, actuator_charts

@@ -47,7 +47,7 @@ def write_behind(monkeypatch: pytest.MonkeyPatch) -> Callable[[int, int], None]:
     """Have short files, too, written in a thread, and stored by another; set the bytes that may wait."""
 
     def wait_for(writing: int, storing: int) -> None:
-        for name, size in (("BEHIND_FROM", 0), ("BEHIND", writing), ("SYNCED", storing)):
+        for name, size in (("DIRECT_BYTES", 0), ("MAX_PENDING_BYTES", writing), ("SYNC_BYTES", storing)):
             monkeypatch.setattr(new_file, name, size)
 
     return wait_for
@@ -197,7 +197,7 @@ def test_a_disk_that_fails_meanwhile(tmp_path: Path, before_system_call: Any) ->
 @pytest.fixture
 def behind(write_behind: Callable[[int, int], None], tmp_path: Path) -> Iterator[NewFile]:
     """A file all of whose tasks are done in a thread; 10 bytes may wait."""
-    write_behind(10, new_file.SYNCED)
+    write_behind(10, new_file.SYNC_BYTES)
     file = NewFile(Staged.unnamed(tmp_path / "r.h5"))
     yield file
     file.discard()

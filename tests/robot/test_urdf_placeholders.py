@@ -22,7 +22,7 @@ from vsacli import (
 )
 from vsacli.actuators.kinds import ACTUATORS
 from vsacli.files.templates import trajectory_template
-from vsacli.robot.model import OF_PLACEHOLDERS, WITHOUT_MASSES
+from vsacli.robot.model import PLACEHOLDER_WARNING, WITHOUT_MASSES
 from vsacli.robot.urdf import converted_robot_text
 from vsacli.robot.urdf.placeholders import UNLOADED
 

@@ -172,7 +172,7 @@ class DampedSprings:
             det_A=np.where(reach.infeasible, np.nan, springs.state.determinant),
             stiffness_min=lower,
             stiffness_max=upper,
-            flags=reach.flags | marked(Flag.INTERNAL_INSTABILITY, unstable),
+            flags=reach.flags | flags_where(Flag.INTERNAL_INSTABILITY, unstable),
         )
 
     def _attainable_range_and_reach(

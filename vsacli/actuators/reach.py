@@ -56,7 +56,7 @@ class LimitCheck(NamedTuple):
 
     def flags(self, variables: VariablesOfJoint, allowance: FloatArray | float = 0.0) -> FlagArray:
         """Return the bit where values leave the range by more than rounding and an allowance; not at NaN."""
-        return marked(self.flag, self.outside(self.values(variables)) > self.tolerance + allowance)
+        return flags_where(self.flag, self.outside(self.values(variables)) > self.tolerance + allowance)
 
     def allowance(self, variables: VariablesOfJoint) -> FloatArray | float:
         """Return the excess that uncertain values are allowed, (samples,); 0 without standard deviations.
@@ -134,7 +134,7 @@ class Reach(NamedTuple):
     def flags(self) -> FlagArray:
         """The bits of the same names."""
         bits = (Flag.INFEASIBLE, Flag.SLACK, Flag.SINGULAR, Flag.NEAR_SINGULAR)
-        first_bits, *further_bits = (marked(flag, mask) for flag, mask in zip(bits, self, strict=True))
+        first_bits, *further_bits = (flags_where(flag, mask) for flag, mask in zip(bits, self, strict=True))
         return reduce(operator.or_, further_bits, first_bits)
 
 

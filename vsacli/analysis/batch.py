@@ -105,11 +105,12 @@ class Batch:
         # where memory limits the blocks of a long chain, only one is computed at a time
         is_long = usual_block(len(robot.joints)) < usual_block(1)
         self._computes_ahead = trajectory.samples > self._block_samples and not is_long
-        summary_threads = int(
-            self._computes_ahead
-        )  # one thread updates the summaries while the others compute
+        # one thread updates the summaries while the others compute
+        summary_threads = int(self._computes_ahead)
         samples = kernel_samples or trajectory.samples * len(variants)
-        self.choice = choose_engine(engine, self._dynamics.kernel, samples, threads, tell, busy=busy)
+        self.choice = choose_engine(
+            engine, self._dynamics.kernel, samples, threads, tell, busy=summary_threads
+        )
         self._dynamics.engine = self.choice.engine
         self._uncertainty = _prepare_uncertainty(robot, trajectory, asked, self.choice.engine)
         self._minima_search = MinimaSearch(self._dynamics, min_margin, self._uncertainty)

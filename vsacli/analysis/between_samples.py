@@ -213,7 +213,7 @@ class MinimaSearch:
 
     def _times_by_side(self, time: FloatArray) -> FloatArray:
         """Return the times of samples for the sides of all variants, (sides of all, samples)."""
-        return np.repeat(time.reshape(self._variants, -1), self._sides.count, axis=0)
+        return np.repeat(time.reshape(self._variant_count, -1), self._sides.count, axis=0)
 
     def _scan(self, block: Block) -> None:
         """Search whole runs of few samples, at the same number of times from each sample to the next."""

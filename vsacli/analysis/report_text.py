@@ -29,8 +29,8 @@ def energy_lines(joints: Sequence[tuple[str, str, JointEnergy]]) -> Iterator[str
             if highest.elastic_peak
             else ""
         )
-        yield f"energy: motors deliver {spent} J and recover {recovered} J{stored}"
-        yield from _losses(energies)
+        yield f"energy: motors deliver {spent} J and recover {recovered} J{stored_text}"
+        yield from _loss_lines(energies)
     paired = [joint for joint in joints if not math.isnan(joint[2].co_contraction)]
     if paired:
         name, joint_type, most = max(paired, key=lambda joint: joint[2].co_contraction)
@@ -62,7 +62,7 @@ FAR_END = 100.0
 """Smallest upper end of an attainable range, relative to its lower end and to the commanded stiffness, that
 counts as none: limits of motors and deflections bind before, such as at 519 of 8.95e10 N m/rad."""
 
-WHOLE = 1e3
+INTEGERS_FROM = 1e3
 """Number from which on no decimals are shown."""
 
 RESTING_SHARE = 1e-3

@@ -159,7 +159,7 @@ class RunCheck:
     def _residuals(self) -> tuple[FloatArray, FloatArray]:
         """Return the largest scaled residuals of springs and shafts, (variants,), NaN where a value is."""
         probed = {name: np.concatenate([part[name] for part in self._excerpts]) for name in self._excerpts[0]}
-        variant = self._of_probed[: len(probed["q"])]
+        variant = self._probe_variants[: len(probed["q"])]
         joints = self._dynamics.variants.robot_with_rows(variant).joints
         of_joints = [JointVariables.of(of_joint(probed, index)) for index in range(len(joints))]
         recomputed = balance_errors(joints, of_joints)

@@ -198,12 +198,14 @@ def robot(
             [joint_option.name for joint_option in chosen],
             sizes=LinkSizes(lengths or (), masses or ()),
         )
-    _write(text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text])
+    _write_template(
+        text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text]
+    )
     if lengths or masses:  # the first warning is about these, others about what was computed from them
         located = (problem for problem in load_template(text).located_warnings if problem.line)
         for problem in itertools.islice(located, 1):
-            talk.note(f"warning: {problem._replace(file=_file(output, 'arm.yaml'))}")
-    talk.note(f"next: vsacli new trajectory --robot {_file(output, 'arm.yaml')} -o move.yaml")
+            talk.note(f"warning: {problem._replace(file=_quoted_path(output, 'arm.yaml'))}")
+    talk.note(f"next: vsacli new trajectory --robot {_quoted_path(output, 'arm.yaml')} -o move.yaml")
 
 
 def _letters(joints: str | None, actuator: str | None, chosen: Sequence[_JointOption]) -> str:

@@ -123,9 +123,9 @@ def robot_template(
     joints_to_write = [*zip(names, types, actuator_words, strict=True)]
     values = _robot_values(name, joints_to_write, sizes)
     if sizes != USUAL_SIZES:
-        usual = load_template(_robot_document(_robot_values(name, chosen, USUAL_SIZES)))
+        usual = load_template(_robot_document(_robot_values(name, joints_to_write, USUAL_SIZES)))
         scales = _scales_of_numbers(load_template(_robot_document(values)), usual)
-        for index, (joint, word) in enumerate(zip(values["joints"], words, strict=True)):
+        for index, (joint, word) in enumerate(zip(values["joints"], actuator_words, strict=True)):
             if word not in DEVICES:
                 scaled = {
                     key: _scale_numbers(joint[key], ("joints", index, key), scales)

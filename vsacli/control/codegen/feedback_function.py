@@ -204,5 +204,5 @@ class _Law:
         """Return the flags of a joint: torque undefined, or a limit exceeded by state or torque."""
         joint, variables = self._robot.joints[index], {name: array[index] for name, array in values.items()}
         exists = finite(variables["tau_motor"][: joint.actuator.motor_count])
-        flags = marked(Flag.SINGULAR, singular) | not_finite_flags(~(exists | singular))
+        flags = flags_where(Flag.SINGULAR, singular) | not_finite_flags(~(exists | singular))
         return limit_flags(joint, variables, flags)

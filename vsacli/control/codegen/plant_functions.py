@@ -156,7 +156,7 @@ def _range_flags(drivetrain: Drivetrain, q: Any, theta: Any) -> Any:
     outside_by_joint: list[Any] = [
         ~reduce(and_, inside[drivetrain.spring_joint == joint], np.True_) for joint in range(len(q))
     ]
-    return np.stack([marked(Flag.INFEASIBLE, is_outside) for is_outside in outside_by_joint])
+    return np.stack([flags_where(Flag.INFEASIBLE, is_outside) for is_outside in outside_by_joint])
 
 
 def step_function(robot: Robot, derivative: Function) -> Step:

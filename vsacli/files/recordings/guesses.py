@@ -146,10 +146,10 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
     guesses_by_name: dict[str, Guess] = {}
     names = JointNames(joint_names)
     if joint_names:
-        columns = _sided([_of_motor(column, names) for column in columns], names)
-    best = {column.signal: column.role for column in reversed(columns)}
-    columns = [column for column in columns if column.role == best[column.signal]]
-    assign = partial(_of_robot, joints=names) if joint_names else _named
+        columns = _sided([_as_motor_column(column, names) for column in columns], names)
+    best_roles = {column.signal: column.role for column in reversed(columns)}
+    columns = [column for column in columns if column.role == best_roles[column.signal]]
+    assign = partial(_assign_robot_joints, joints=names) if joint_names else _assign_named_joints
     for quantity in dict.fromkeys((*QUANTITIES, *VARIABLES_OF_MOTORS)):
         quantity_columns = [column for column in columns if column.quantity == quantity != "theta"]
         measured = [column for column in quantity_columns if column.role != COMMANDED]
@@ -161,8 +161,8 @@ def guesses(rows: FirstRows, time: TimeColumn | None, joint_names: Sequence[str]
             reasons = "; ".join(filter(None, (joint.reason, sides, command, doubt)))
             sure = joint.sure and not column.sided
             guess = Guess(column.place, joint.name, quantity, source, reasons, sure, column.of_motor)
-            found.setdefault(guess.name, guess)
-    return sorted(found.values(), key=lambda guess: (guess.quantity not in TAKEN, guess.place))
+            guesses_by_name.setdefault(guess.name, guess)
+    return sorted(guesses_by_name.values(), key=lambda guess: (guess.quantity not in TAKEN, guess.place))
 
 
 def _columns_by_name(rows: FirstRows, time: TimeColumn | None) -> list[_QuantityColumn]:
@@ -247,7 +247,7 @@ def _sided(columns: Sequence[_QuantityColumn], joints: JointNames) -> list[_Quan
     ]
 
 
-def _labels(rows: FirstRows) -> dict[int, str]:
+def _labels_in_rows(rows: FirstRows) -> dict[int, str]:
     """Return joint names found in the rows, as ROS writes them, by their indices in arrays."""
     words_by_column = [words_of_column_name(column) or ("",) for column in rows.columns]
     return {

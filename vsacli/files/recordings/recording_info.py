@@ -209,9 +209,9 @@ class _ProposedMapping:
     def columns_file(self, joint_names: Sequence[str]) -> Iterator[str]:
         """Yield a file for `--columns`."""
         yield f"format: {file_formats.COLUMNS}"
-        yield from self._rates()
-        yield from self._lines(self._found, joint_names)
-        places = {guess.place for guess in self._found}
+        yield from self._rate_lines()
+        yield from self._mapping_lines(self._column_guesses, joint_names)
+        places = {guess.place for guess in self._column_guesses}
         torques = [place for place, name in enumerate(self._rows.columns) if names_torque(name)]
         yield from (
             f"# {self._rows.called(place)}: not recognized" for place in torques if place not in places

@@ -240,7 +240,7 @@ def _near_rates(stored: float, rate: float, tolerance: float) -> list[float]:
     few_digits = (float(f"{stored:.{digits}g}") for digits in range(1, 18))
     nominal = next(each for each in few_digits if abs(each - stored) <= tolerance * stored)
     least, most = math.floor(nominal / rate), math.ceil(nominal / rate)
-    sides = (range(most, most + MOST_TRIED), range(least, 0, -1))
+    sides = (range(most, most + MAX_STRIDES_TRIED), range(least, 0, -1))
     found = [rate for strides in sides for rate in _typed(nominal, strides)]
     return found or [nominal / most, nominal / least]
 
@@ -273,4 +273,4 @@ def _stored_rate(result: StoredResult, again: str) -> float:
         place = f"near t = {time_text(float(time[error.argmax()]))}"
         message = f"the stored times are not equally spaced ({place}); {again}"
         raise InputError.one(message, result.path)
-    return 1 / interval
+    return 1 / step

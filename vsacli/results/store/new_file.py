@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 CHUNK_CACHE_SLOTS = 11
 """Slots of HDF5's chunk cache for a dataset: few, since rows are written in order."""
 
-BEHIND_FROM = 2**24
+DIRECT_BYTES = 2**24
 """Bytes written directly, in some 10 ms, before a thread is worth its start. Without the thread, 10^6 samples
 of a 3R with compiled code take at least 1.26 times as long."""
 

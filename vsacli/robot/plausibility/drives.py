@@ -122,20 +122,20 @@ def _motor_measurements(
     """Return the measure of a field of the motors.
 
     Args:
-        name: name of the field.
-        size: function that returns the size of a motor; by default |value|, NaN if 0 or infinite. Those
-            with NaN are skipped.
+        field: name of the field.
+        magnitude: function that returns the size of a motor; by default |value|, NaN if 0 or infinite.
+            Motors with NaN are skipped.
         unit: unit of the field; motors with another one are skipped. "" for any unit.
         loaded_only: whether to skip motors that do not carry the load.
     """
 
-    def measure(checked: CheckedRobot) -> Iterator[Measured]:
-        for drive in _checked_motors(checked):
-            value = getattr(drive.motor, name) or math.nan
-            relative = _nan_if_infinite(abs(value)) if size is None else size(drive)
-            counts = not math.isnan(relative) and (drive.carries_load or not carrying)
-            if counts and unit in ("", drive.unit(name)):
-                yield drive.measure(name, relative)
+    def motor_measurements(checked: CheckedRobot) -> Iterator[Measured]:
+        for motor in _checked_motors(checked):
+            value = getattr(motor.motor, field) or math.nan
+            size = _nan_if_infinite(abs(value)) if magnitude is None else magnitude(motor)
+            counts = not math.isnan(size) and (motor.carries_load or not loaded_only)
+            if counts and unit in ("", motor.unit(field)):
+                yield motor.measure(field, size)
 
     return motor_measurements
 
@@ -223,7 +223,7 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         explained_by=GEARS),
     *(
         Rule(name, "`motor.inertia`",
-            _measure_motors("inertia", partial(_rotor_inertia_share, tiny=tiny), carrying=True),
+            _motor_measurements("inertia", partial(_rotor_inertia_share, tiny=tiny), loaded_only=True),
             size="joint-side, over mass times reach squared (mass)",
             high=high, usual=0.1, reason=reason,
             finding="is, on the joint's side of the gear, {size} times mass times reach squared of the robot",
@@ -234,7 +234,7 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         )
     ),
     Rule("starting times", "`motor.inertia`",
-        _measure_motors("inertia", lambda m: m.at_joint_side.inertia * m.velocity / m.torque),
+        _motor_measurements("inertia", lambda m: m.at_joint_side.inertia * m.velocity / m.torque),
         size="s, in which `max_torque` accelerates the rotor alone to `max_velocity`", high=5, usual=0.01,
         reason="electric motors need some hundredths",
         finding="lets the motor alone start in no less than {size} s", units=UNITS_OF_ROTORS,
@@ -242,7 +242,7 @@ MOTOR_RULES: tuple[Rule[CheckedRobot], ...] = (
         explained_by=(*GEARS, "heavy rotors", "heavy rotors of tiny robots")),
     *(
         Rule(name, "`max_velocity`",
-            _measure_motors("max_velocity", partial(_shaft_velocity, side=side), carrying=True),
+            _motor_measurements("max_velocity", partial(_shaft_velocity, side=side), loaded_only=True),
             size=f"rad/s, of the motor's shaft, {condition}", high=2500, usual=usual,
             reason="robots have no faster motors",
             finding="is more than 24,000 turns a minute of the motor", units=units_of_side, in_angles=True)
