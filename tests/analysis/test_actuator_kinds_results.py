@@ -213,7 +213,7 @@ def test_a_robot_with_one_motor_a_joint_is_stored_without_the_second(
 # Figures
 
 
-def draw_sheet(**options: object) -> Result:
+def drawn(**options: object) -> Result:
     result = rest_to_rest(101, actuators=KINDS, **options)
     for name, joints in (("stiffness", [0]), ("stiffness_min", [0, 1]), ("stiffness_max", [0, 1])):
         result.read(name)[:, joints] = np.nan
@@ -232,8 +232,8 @@ def compared_panels(*results: Any) -> list[Any]:
 
 def test_no_stiffness_panel_for_a_rigid_joint_and_no_corridor_for_an_elastic_one() -> None:
     for figure, first in (
-        (plot_stored(draw_sheet())["motion"], 1),
-        (draw_sheet(feasibility(StoredCharts([draw_sheet()]))), 0),
+        (plot_stored(drawn())["motion"], 1),
+        (draw_sheet(feasibility(StoredCharts([drawn()]))), 0),
     ):
         shoulder, elbow = figure.axes[first:]
         assert titles([shoulder, elbow]) == ["shoulder", "elbow"]
@@ -242,13 +242,13 @@ def test_no_stiffness_panel_for_a_rigid_joint_and_no_corridor_for_an_elastic_one
 
 
 def test_motor_two_is_drawn_where_it_exists() -> None:
-    first, second = plot_stored(draw_sheet())["motor-torque"].axes
+    first, second = plot_stored(drawn())["motor-torque"].axes
     assert (len(first.lines), len(second.lines)) == (3, 1)
 
 
 @pytest.mark.slow
 def test_panels_without_a_motor_are_not_there() -> None:
-    result = draw_sheet(types="RRP")  # the antagonistic joint is the prismatic one
+    result = drawn(types="RRP")  # the antagonistic joint is the prismatic one
     figure = plot_stored(result)["motor-torque"]
     assert [len(axes.lines) for axes in figure.axes] == [2, 1, 1]
     result.actuators = ("elastic", "elastic", "rigid")
@@ -256,7 +256,7 @@ def test_panels_without_a_motor_are_not_there() -> None:
 
 
 def test_a_rigid_robot_has_a_figure_of_its_motion() -> None:
-    result = draw_sheet()
+    result = drawn()
     result.actuators = ("rigid",) * 3
     [position] = plot_stored(result)["motion"].axes
     assert len(position.lines) == 3
@@ -265,10 +265,10 @@ def test_a_rigid_robot_has_a_figure_of_its_motion() -> None:
 @pytest.mark.slow
 def test_a_comparison_shows_the_motors_that_any_of_the_results_has() -> None:
     antagonistic = rest_to_rest(101, trajectory="two motors")
-    one_each = draw_sheet(trajectory="one")
+    one_each = drawn(trajectory="one")
     one_each.actuators = ("rigid",) * 3
     assert len(compared_panels(one_each, antagonistic)) == 6
-    mixed = draw_sheet(trajectory="mixed")
+    mixed = drawn(trajectory="mixed")
     expected = ["base, motor 1", "shoulder, motor 1", "elbow, motor 1", "elbow, motor 2"]
     assert titles(compared_panels(one_each, mixed)) == expected
     expected = [f"{joint}, motor 1" for joint in ("base", "shoulder", "elbow")]

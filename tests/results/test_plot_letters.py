@@ -40,7 +40,7 @@ def test_letters_without_a_font_become_their_codes() -> None:
 
 
 def test_letters_of_an_installed_font_are_drawn_with_it(installed: list[FontEntry]) -> None:
-    installed.append(FontEntry(fname=SERIF, name="DejaVu Serif", weight=letters.REGULAR))
+    installed.append(FontEntry(fname=SERIF, name="DejaVu Serif", weight=letters.REGULAR_WEIGHT))
     figure = Figure()
     figure.suptitle("arm ⎷", parse_math=False)  # which the usual font has not
     letters.make_legible(figure)
