@@ -343,20 +343,20 @@ class Unit:
         self.dimensions = {name: exponent for name, exponent in dimensions.items() if exponent}
 
     def __mul__(self, other: Unit) -> Unit:
-        return self._times(other, 1)
+        return self._multiply_by_power(other, 1)
 
     def __truediv__(self, other: Unit) -> Unit:
-        return self._times(other, -1)
+        return self._multiply_by_power(other, -1)
 
     def __pow__(self, exponent: int) -> Unit:
-        return Unit(1.0, {})._times(self, exponent)
+        return Unit(1.0, {})._multiply_by_power(self, exponent)
 
-    def _times(self, other: Unit, power: int) -> Unit:
+    def _multiply_by_power(self, other: Unit, exponent: int) -> Unit:
         names = {**self.dimensions, **other.dimensions}
         dimensions = {
-            name: self.dimensions.get(name, 0) + power * other.dimensions.get(name, 0) for name in names
+            name: self.dimensions.get(name, 0) + exponent * other.dimensions.get(name, 0) for name in names
         }
-        return Unit(self.size * other.size**power, dimensions)
+        return Unit(self.size * other.size**exponent, dimensions)
 
 
 def conversion_factor(text: str, expected: str) -> float:

@@ -89,7 +89,7 @@ class _RobotColumns(NamedTuple):
         return np.array([joint.has_columns(variable) for joint in self.robot.joints])
 
 
-def recorded_columns(
+def read_recorded_columns(
     robot: Robot, path: str | Path, mapping: ColumnMapping = AS_NAMED
 ) -> tuple[list[RecordedColumn], tuple[str, ...], Recording]:
     """Return the required columns, the names of the others, and the recording as read.
@@ -102,28 +102,36 @@ def recorded_columns(
     Raises:
         InputError: no column is required, a unit does not fit its variable, or times do not ascend.
     """
-    wanted = [(name, 0, VARIABLES[name]) for name in (*READINGS, CURRENT)]
-    wanted += [(measured(name), 1, VARIABLES[name]) for name in READINGS]
-    recording = read_recording(path, _RobotColumns(robot), wanted, robot.name, mapping)
-    united = {name for name, unit in map(split_heading, recording.table.columns) if unit is not None}
-    stamps, columns = elapsed_times(recording.time), []
-    for place, signal in _preferred_columns(recording.signals).items():
-        there = np.isfinite(signal.values)
-        values = signal.values[there] * _torque_of_current(robot, signal)
-        columns.append(RecordedColumn(signal.column, place, stamps[there], values, signal.column in united))
-    used = {column.name for column in columns}
-    others = [signal.column for signal in recording.signals if signal.column not in used]
-    return columns, (*others, *recording.table.unknown_columns), recording
+    required_columns = [(name, 0, VARIABLES[name]) for name in (*READINGS, CURRENT)]
+    required_columns += [(measured(name), 1, VARIABLES[name]) for name in READINGS]
+    recording = read_recording(path, _RobotColumns(robot), required_columns, robot.name, mapping)
+    columns_with_unit = {
+        name for name, unit in map(split_heading, recording.table.columns) if unit is not None
+    }
+    times, columns = elapsed_times(recording.time), []
+    for variable_index, signal in _preferred_columns(recording.signals).items():
+        finite = np.isfinite(signal.values)
+        values = signal.values[finite] * _torque_constant(robot, signal)
+        columns.append(
+            RecordedColumn(
+                signal.column, variable_index, times[finite], values, signal.column in columns_with_unit
+            )
+        )
+    used_names = {column.name for column in columns}
+    unused_names = [signal.column for signal in recording.signals if signal.column not in used_names]
+    return columns, (*unused_names, *recording.table.unknown_columns), recording
 
 
 def _preferred_columns(signals: Sequence[MeasuredSignal]) -> dict[Where, MeasuredSignal]:
     """Return the preferred column for each place: sensor readings first, torques before currents."""
-    best = preferred(signals)
-    currents = {place: best.pop(place) for place in tuple(best) if place[0] == CURRENT}
-    return {(TORQUE, *place[1:]): signal for place, signal in currents.items()} | best
+    preferred_signals = preferred(signals)
+    currents = {
+        place: preferred_signals.pop(place) for place in tuple(preferred_signals) if place[0] == CURRENT
+    }
+    return {(TORQUE, *place[1:]): signal for place, signal in currents.items()} | preferred_signals
 
 
-def _torque_of_current(robot: Robot, signal: MeasuredSignal) -> float:
+def _torque_constant(robot: Robot, signal: MeasuredSignal) -> float:
     """Return the factor that converts a column to torques if it holds currents, otherwise 1."""
     variable, joint, motor, *_ = signal.place
     if variable != CURRENT or motor is None:

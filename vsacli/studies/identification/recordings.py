@@ -24,7 +24,7 @@ from vsacli.studies.identification.recording_faults import (
     TORQUE,
     RecordedColumn,
     Where,
-    recorded_columns,
+    read_recorded_columns,
     stopping_faults,
     unreliable_fit_sentences,
 )
@@ -75,7 +75,7 @@ def read_motor_recording(robot: Robot, path: str | Path, mapping: ColumnMapping 
         InputError: no column is required, a unit does not fit its variable, times do not ascend, or faults
             prevent a fit.
     """
-    recorded, unused, recording = recorded_columns(robot, path, mapping)
+    recorded, unused, recording = read_recorded_columns(robot, path, mapping)
     needed = {place for index in range(len(robot.joints)) for place in _needed(robot, index)}
     columns = [column for column in recorded if column.place in needed] or recorded
     unused = (*(column.name for column in recorded if column.place not in needed), *unused)
