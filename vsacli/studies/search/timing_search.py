@@ -140,7 +140,7 @@ class TimingSearch(PacedSearch):
                 self.uniform = math.nan if any(self._ends.moving) else self._period_count * self._scale
                 starts += [
                     (spaces.fitted(self._s, factor * random_pace, stiffness), interior_point)
-                    for random_pace in self._drawn(START_DURATION_RATIO, 2.0)
+                    for random_pace in self._random_paces(START_DURATION_RATIO, 2.0)
                 ]
         if not starts:
             raise NoStartError("no slow-down or speed-up of the whole motion keeps every limit")
