@@ -16,7 +16,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.texts import counted
 from vsacli.base.units import time_text
-from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
+from vsacli.trajectory.curves.closed_form import MAX_DURATION, MIN_DURATION
 from vsacli.trajectory.recorded.samples import SignalSamples
 
 TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of 32-bit counters, s
@@ -169,9 +169,9 @@ def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
         yield SampleProblem("time", f"must be finite, not {time[sample]}", sample=sample)
     elif (disorder := find_disorder(time)) is not None:
         yield SampleProblem("time", disorder.message, sample=disorder.sample)
-    elif len(time) > 1 and not SHORTEST <= time[-1] - time[0] <= LONGEST:
+    elif len(time) > 1 and not MIN_DURATION <= time[-1] - time[0] <= MAX_DURATION:
         yield SampleProblem(
-            "time", f"must go on for {SHORTEST:g} to {LONGEST:g} s, not {time[-1] - time[0]:g} s"
+            "time", f"must go on for {MIN_DURATION:g} to {MAX_DURATION:g} s, not {time[-1] - time[0]:g} s"
         )
 
 
