@@ -340,7 +340,9 @@ def gain_findings(
     link_factors = _factors_by_links(robot, joints, motors, recordings)
     solutions = {each.system.title: each for each in motors}
     return [
-        _gain_finding(solutions[name], factor, link_factors.get(name), rotor_differs=_rotor_differs(solutions[name]))
+        _gain_finding(
+            solutions[name], factor, link_factors.get(name), rotor_differs=_rotor_differs(solutions[name])
+        )
         for name, factor in factors.items()
     ]
 

@@ -188,7 +188,9 @@ class CombinedSearch:
 
         def accepts(numbers: Sequence[int]) -> Iterator[bool]:
             scan = self._scan(numbers)
-            return (self._combination_at(scan, x) is not None for x in range(len(numbers)))
+            return (
+                self._combination_at(scan, factor_index) is not None for factor_index in range(len(numbers))
+            )
 
         number = first_accepted(accepts, self._factors.scanned())
         return None if number is None else self._combination_at(self._scan([number]), 0)

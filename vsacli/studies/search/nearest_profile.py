@@ -391,8 +391,8 @@ def _accepted_stiffness(acceptance: Acceptance, joint: Joint, load: Load, rates:
     commanded_stiffness = load.command.commanded["stiffness"]
 
     def accepts(stiffness: FloatArray) -> BoolArray:
-        row_indices = (stiffness - commanded_stiffness).ravel(), *np.tile(rates, len(stiffness))
-        changed = load.at(np.tile(instants, len(stiffness))).changed(*row_indices)
+        additions = (stiffness - commanded_stiffness).ravel(), *np.tile(rates, len(stiffness))
+        changed = load.at(np.tile(instants, len(stiffness))).changed(*additions)
         return ~acceptance.refused_steps(joint, changed).reshape(stiffness.shape)
 
     low, high = admissible_stiffness(joint, load.command, acceptance.min_margin)

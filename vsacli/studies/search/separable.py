@@ -155,7 +155,7 @@ class _ExpandedGroup:
         instants = np.tile(group.instants, len(points) * (len(steps) + 1))
         samples = group.sampled(all_rows.reshape(len(rows), -1), instants)
         integrands, bounds = (each.shaped(all_rows.shape[1:]) for each in samples)
-        return [cls(group, integrands.part(place), bounds.part(place), steps) for place in range(len(points))]
+        return [cls(group, integrands.part(index), bounds.part(index), steps) for index in range(len(points))]
 
     def gradient(self) -> FloatArray:
         """Return the gradient of the cost by the own unknowns."""
@@ -187,13 +187,15 @@ class _ExpandedGroup:
     def _curvature(self, multipliers: FloatArray) -> FloatArray:
         """Return the Hessian of the Lagrangian by rows, (instants, rows, rows), by finite differences."""
         displaced_gradients = [
-            _weighted_gradient(self.group.weights, here.gradients)
-            + _weighted_gradient(multipliers, of_bounds.gradients)
-            for here, of_bounds in zip(self._displaced_integrands, self._displaced_bounds, strict=True)
+            _weighted_gradient(self.group.weights, gradient.gradients)
+            + _weighted_gradient(multipliers, displaced_bounds.gradients)
+            for gradient, displaced_bounds in zip(
+                self._displaced_integrands, self._displaced_bounds, strict=True
+            )
         ]
-        here = _weighted_gradient(self.group.weights, self.integrands.gradients)
-        here = here + _weighted_gradient(multipliers, self.bounds.gradients)
-        second_differences = (np.stack(displaced_gradients, axis=1) - here[:, None, :]) / self._steps[
+        gradient = _weighted_gradient(self.group.weights, self.integrands.gradients)
+        gradient = gradient + _weighted_gradient(multipliers, self.bounds.gradients)
+        second_differences = (np.stack(displaced_gradients, axis=1) - gradient[:, None, :]) / self._steps[
             None, :, None
         ]
         return (second_differences + second_differences.swapaxes(0, 1)).transpose(2, 0, 1) / 2
@@ -249,8 +251,8 @@ class SeparablePoint:
 
     def _sum_over_parts(self, part_gradients: Sequence[FloatArray]) -> FloatArray:
         total = np.zeros(self._size)
-        for part, own in zip(self._parts, part_gradients, strict=True):
-            total[part.group.unknowns] += own
+        for part, part_gradient in zip(self._parts, part_gradients, strict=True):
+            total[part.group.unknowns] += part_gradient
         return total
 
 
@@ -331,8 +333,8 @@ class _Relieved:
         *own_rows, relief = rows
         _, bounds = self._group.functions(own_rows, self._group.instants[instants])
         row_scales = zip(own_rows, self._start[:, instants], self._group.scales, strict=True)
-        displacements = [(row - begun) / size for row, begun, size in row_scales]
-        return [relief + TETHER * sum(each * each for each in displacements)], [
+        displacements = [(row - start_row) / scale for row, start_row, scale in row_scales]
+        return [relief + TETHER * sum(displacement * displacement for displacement in displacements)], [
             bound - relief for bound in bounds
         ]
 

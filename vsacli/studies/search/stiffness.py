@@ -98,9 +98,9 @@ class _Attempt(NamedTuple):
     instants: IndexArray
     start: FloatArray
 
-    def reaches(self, x: _Attempt, share: float = COST_TOLERANCE) -> bool:
+    def reaches(self, other: _Attempt, share: float = COST_TOLERANCE) -> bool:
         """Return whether the cost is that of another attempt but for a share of it, or lower."""
-        return self.minimum.cost <= x.minimum.cost + share * abs(x.minimum.cost)
+        return self.minimum.cost <= other.minimum.cost + share * abs(other.minimum.cost)
 
 
 class StiffnessSearch:

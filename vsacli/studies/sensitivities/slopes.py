@@ -66,9 +66,11 @@ def torque_slopes(
     for joint, parameter_indices in _parameter_indices_by_joint(run_parameters).items():
         joint_inputs = _inputs_seeded_at(inputs, seeded_inputs, joint)
         unaffected_joints = (
-            x for x in range(len(bodies)) if joint is not None and joint not in robot.paths[x]
+            index for index in range(len(bodies)) if joint is not None and joint not in robot.paths[index]
         )
-        torques = backward(joint_inputs, forward(joint_inputs, {x: bodies[x] for x in unaffected_joints}))
+        torques = backward(
+            joint_inputs, forward(joint_inputs, {index: bodies[index] for index in unaffected_joints})
+        )
         yield TorqueSlopes(
             parameter_indices, [_torque_derivatives(each, parameter_indices, samples) for each in torques]
         )

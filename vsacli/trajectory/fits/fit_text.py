@@ -24,7 +24,7 @@ from vsacli.trajectory.fits.selection import (
     SMALLEST_SHARE,
     SMOOTH,
 )
-from vsacli.trajectory.fits.smoothing import DETERMINED, Smoothing
+from vsacli.trajectory.fits.smoothing import MAX_DETERMINED_ERROR, Smoothing
 from vsacli.trajectory.fits.spectrum import motion_band
 
 TOLD = 0.01
@@ -118,7 +118,7 @@ def _advice(part: Part) -> str:
             f" filter, or set bandwidth: {part.noise.above:.2g}; if it is motion, set bandwidth:"
             f" {2 * part.noise.peak:.2g}"
         )
-    if part.smooth or part.smoothing is None or part.smoothing.own > DETERMINED:
+    if part.smooth or part.smoothing is None or part.smoothing.own > MAX_DETERMINED_ERROR:
         return "record it with less noise, or slower"
     return "try it with fit: smooth"
 
