@@ -114,8 +114,8 @@ class Rule(NamedTuple, Generic[_Subject]):
             for other in self.units
             if other.instead_of in ("", measured.unit)
         }
-        fitting = [other for other, size in sizes.items() if size and self.admits(size)]
-        return min(fitting, key=lambda other: abs(math.log(sizes[other] / self.usual)), default=None)
+        plausible_units = [other for other, size in sizes.items() if size and self.admits(size)]
+        return min(plausible_units, key=lambda other: abs(math.log(sizes[other] / self.usual)), default=None)
 
     def sentence(self, measured: Measured, other: OtherUnit | None) -> str:
         """Return the warning: field, value, finding, and the likely unit."""
@@ -140,10 +140,10 @@ def _component_name(path: NumberPath) -> str:
 
 
 def _guess_unit(measured: Measured, other: OtherUnit) -> str:
-    meant = f"did you mean {measured.value:.6g} {other.unit}"
+    question = f"did you mean {measured.value:.6g} {other.unit}"
     if measured.unit in ANGLES and other.unit == "deg":
-        return f"{meant}?"
-    return f"{meant}, which is {measured.value * other.factor:.4g} {measured.unit}?"
+        return f"{question}?"
+    return f"{question}, which is {measured.value * other.factor:.4g} {measured.unit}?"
 
 
 def _path_to_report(path: NumberPath, other: OtherUnit | None) -> NumberPath:
@@ -191,7 +191,7 @@ class ValuesInFile:
 
     def as_in_file(self, measured: Measured) -> Measured | None:
         """Return the number with the path to its scalar, which all joints may share; None if it differs."""
-        node, left = self.node_along(measured.path)
+        node, remaining_steps = self.node_along(measured.path)
         if not isinstance(node, TextNode) or math.isnan(measured.value):
             return measured
         try:
@@ -200,7 +200,7 @@ class ValuesInFile:
             return None
         if abs(value) != abs(measured.value):
             return None
-        return measured._replace(path=measured.path[: len(measured.path) - len(left)], value=value)
+        return measured._replace(path=measured.path[: len(measured.path) - len(remaining_steps)], value=value)
 
     def in_angles(self, measured: Measured) -> bool:
         """Return whether the file has this number as an expression with `deg` or `pi`."""
@@ -233,15 +233,17 @@ def implausible_measurements(
         written: file of the subject, if any.
         rules_with_findings: names of rules with findings elsewhere.
     """
-    outside_by_rule: dict[str, list[Measured]] = {}
+    implausible_by_rule: dict[str, list[Measured]] = {}
     with np.errstate(all="ignore"):  # extreme values may have an infinite size
         for rule in rules:
-            if {*outside_by_rule, *rules_with_findings}.isdisjoint(rule.explained_by):
-                outside = [measured for measured in rule.measure(subject) if not rule.admits(measured.size)]
+            if {*implausible_by_rule, *rules_with_findings}.isdisjoint(rule.explained_by):
+                implausible = [
+                    measured for measured in rule.measure(subject) if not rule.admits(measured.size)
+                ]
                 if rule.in_angles and written is not None:
-                    outside = [measured for measured in outside if not written.in_angles(measured)]
-                outside_by_rule |= {rule.name: outside} if outside else {}
-    return outside_by_rule
+                    implausible = [measured for measured in implausible if not written.in_angles(measured)]
+                implausible_by_rule |= {rule.name: implausible} if implausible else {}
+    return implausible_by_rule
 
 
 def implausible_values(
@@ -251,12 +253,12 @@ def implausible_values(
     rules_with_findings: Collection[str] = (),
 ) -> tuple[Problem, ...]:
     """Return the warnings about implausible values, with file and line if the file has the same value."""
-    named = {rule.name: rule for rule in rules}
-    outside_by_rule = implausible_measurements(rules, subject, written, rules_with_findings)
+    rules_by_name = {rule.name: rule for rule in rules}
+    implausible_by_rule = implausible_measurements(rules, subject, written, rules_with_findings)
     problems = (
-        _warning_about(named[name], each, written)
-        for name, several in outside_by_rule.items()
-        for each in several
+        _warning_about(rules_by_name[name], each, written)
+        for name, measurements in implausible_by_rule.items()
+        for each in measurements
     )
     return tuple(dict.fromkeys(problems))
 

@@ -393,7 +393,7 @@ def _factors_by_links(
     if without_links(robot, joints, system, recordings):
         return {}
     base_count = system.bodies
-    equations = [system.equations(system.before, solution) for solution in recordings]
+    equations = [system.equations(system.before, recording) for recording in recordings]
     factors = {}
     for solution in motors:
         title = solution.system.title

@@ -197,7 +197,7 @@ def _refine_shift(
     thinned_pairings = [each.thinned() for each in pairings]
     clipped_values = [tame(each.measured) for each in thinned_pairings]
 
-    def left(pairs: Sequence[Pairing], candidate: float) -> float:
+    def mean_unexplained(pairs: Sequence[Pairing], candidate: float) -> float:
         return float(
             np.mean(
                 [
@@ -208,7 +208,7 @@ def _refine_shift(
         )
 
     minimum = scipy.optimize.minimize_scalar(
-        lambda at: left(thinned_pairings, at),
+        lambda at: mean_unexplained(thinned_pairings, at),
         bounds=(shift - 2 * step, shift + 2 * step),
         method="bounded",
         options={"xatol": 1e-3 * step},
@@ -216,7 +216,7 @@ def _refine_shift(
     best_shift = float(minimum.x)
     followed_indices = exchanged_places(pairings, groups, best_shift)
     followed_signals = [pairings[place].computed for place in followed_indices]
-    unexplained = left(
+    unexplained = mean_unexplained(
         [each._replace(computed=it) for each, it in zip(thinned_pairings, followed_signals, strict=True)],
         best_shift,
     )

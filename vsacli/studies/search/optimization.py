@@ -300,13 +300,13 @@ def _search_until_confirmed(
 
     def attempt(rule: Acceptance) -> tuple[tuple[_Search, Pacing, Trajectory], FloatArray | None]:
         search = search_by(rule)
-        result = search.best()
-        best, short = _retime_and_check(optimum, path, result, period_count)
+        pacing = search.best()
+        best, short = _retime_and_check(optimum, path, pacing, period_count)
         if short is not None:
             short = np.mod(
-                path_at(short, result.pace(period_count), path.duration), path.duration / period_count
+                path_at(short, pacing.pace(period_count), path.duration), path.duration / period_count
             )
-        return (search, result, best), short
+        return (search, pacing, best), short
 
     result, is_confirmed = Acceptance(optimum.robot, optimum.min_margin).confirmed(attempt)
     if not is_confirmed:

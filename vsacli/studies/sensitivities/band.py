@@ -169,11 +169,11 @@ class Band:
             np.zeros(margin_variance.shape, dtype=bool),
         )
         if self._reversals.possible:
-            speed_variance = np.sqrt(speed_variance)
-            reversal_variance = self._reversals.variance(block.dtheta, speed_variance, covariance)
-            uncertain = self._reversals.uncertain(block.dtheta, speed_variance)
-        torque_variance = np.sqrt(np.maximum(torque_variance + reversal_variance, 0.0))
-        run_arrays = (part.time, block.tau_motor, part.margin, torque_variance, np.sqrt(margin_variance))
+            speed_deviation = np.sqrt(speed_variance)
+            reversal_variance = self._reversals.variance(block.dtheta, speed_deviation, covariance)
+            uncertain = self._reversals.uncertain(block.dtheta, speed_deviation)
+        torque_deviation = np.sqrt(np.maximum(torque_variance + reversal_variance, 0.0))
+        run_arrays = (part.time, block.tau_motor, part.margin, torque_deviation, np.sqrt(margin_variance))
         self._parts.append(_BandBlock(*run_arrays, reversal_variance, uncertain))
 
     def _uncertain_slopes(self, part: Derivatives) -> Iterator[tuple[int, dict[str, FloatArray], FloatArray]]:

@@ -224,10 +224,10 @@ def least_rms(demand: MotorDemand, shafts: Shaft) -> FloatArray:
     moments = demand.moments
     inertial, frictional, loaded = shafts.inertial, shafts.frictional, shafts.loaded
     quadratic, linear = (_mean_product(inertial, moments, each) for each in (inertial, frictional))
-    constant, inverse = (_mean_product(each, moments, loaded) for each in (frictional, loaded))
+    inverse, inverse_square = (_mean_product(each, moments, loaded) for each in (frictional, loaded))
 
     def rising(ratio: FloatArray) -> BoolArray:
-        slope = (quadratic * ratio + linear) * ratio - (constant + inverse / ratio) / ratio
+        slope = (quadratic * ratio + linear) * ratio - (inverse + inverse_square / ratio) / ratio
         return slope > 0
 
     minimum = _bisect_condition(rising, np.full_like(quadratic, LOWEST), np.full_like(quadratic, HIGHEST))
