@@ -16,7 +16,7 @@ from vsacli import Result, Trajectory, inverse_dynamics, load_robot
 from vsacli.base.arrays import FloatArray
 from vsacli.robot.model import Robot
 from vsacli.studies.identification.conditioning import conditioned
-from vsacli.studies.identification.fitted_system import solution
+from vsacli.studies.identification.fitted_system import fit_system
 from vsacli.studies.identification.motor_equations import GROUPS, motor_systems
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -73,7 +73,7 @@ def errors() -> Iterator[dict[str, float]]:
         )
         signals = conditioned(time, q_read, theta, torque, BANDWIDTH)
         (system,) = motor_systems(robot, [0], GROUPS, [signals])
-        fit = solution(system, [signals]).fit
+        fit = fit_system(system, [signals]).fit
         off = (fit.values - system.before) / fit.standard_errors
         yield {name.rpartition(".")[2]: float(each) for name, each in zip(system.names, off, strict=True)}
 

@@ -13,7 +13,7 @@ from vsacli import Limits, Motor, laws, load_robot
 from vsacli.dynamics import limits
 from vsacli.results.store.reader import MAGNITUDE_DATASETS, RANGE_DATASETS
 from vsacli.studies.search import fixed_text
-from vsacli.studies.sizing.sizing import KEPT
+from vsacli.studies.sizing.sizing import SHARED_COLUMNS
 from vsacli.trajectory.curves.closed_form import TYPES, ClosedForm
 from vsacli.trajectory.curves.sequence import PARTS
 
@@ -38,7 +38,7 @@ def test_figures_draw_every_limit() -> None:
 
 
 def test_a_chosen_motor_keeps_every_field_of_motors() -> None:
-    assert {field.name for field in dataclasses.fields(Motor)} == {*KEPT, *OF_PLACE}
+    assert {field.name for field in dataclasses.fields(Motor)} == {*SHARED_COLUMNS, *OF_PLACE}
 
 
 def test_a_sequence_contains_every_type_of_position() -> None:

@@ -28,7 +28,7 @@ from vsacli import (
 from vsacli.studies.identification import fitted_text
 from vsacli.studies.identification.conditioning import ConditionedRecording, conditioned
 from vsacli.studies.identification.consistent_links import doubts_of, found_links
-from vsacli.studies.identification.fitted_system import Solution, solution
+from vsacli.studies.identification.fitted_system import Solution, fit_system
 from vsacli.studies.identification.identification_report import OK, numbers_of
 from vsacli.studies.identification.link_equations import link_system
 from vsacli.studies.identification.motor_equations import GROUPS, motor_systems
@@ -91,8 +91,8 @@ def measured(run: Result, seed: int) -> ConditionedRecording:
 def solved(robot: Robot, signals: ConditionedRecording) -> list[Solution]:
     """Motors, and last the links."""
     joints = range(len(robot.joints))
-    motors = [solution(each, [signals]) for each in motor_systems(robot, joints, GROUPS, [signals])]
-    return [*motors, solution(link_system(robot, GROUPS, motors), [signals])]
+    motors = [fit_system(each, [signals]) for each in motor_systems(robot, joints, GROUPS, [signals])]
+    return [*motors, fit_system(link_system(robot, GROUPS, motors), [signals])]
 
 
 def errors_of_base(links: Solution) -> np.ndarray:

@@ -12,7 +12,7 @@ from samples.marks import slow_but
 from samples.shipped import shipped_robot, shipped_run
 
 from vsacli import InputError, Robot, identify, inverse_dynamics
-from vsacli.studies.identification.fitted_system import solution
+from vsacli.studies.identification.fitted_system import fit_system
 from vsacli.studies.identification.motor_equations import GROUPS, motor_systems, with_friction
 
 ARM = Excitation(position=[0, 0, 0], reach=[0.4] * 3, stiffness=[1400] * 3, swing=[300] * 3)
@@ -72,7 +72,7 @@ def found(robot: Robot, record: Recorded) -> dict[str, tuple[float, float, float
     for system in motor_systems(sought, range(len(robot.joints)), GROUPS, [signals]):
         truth = system.before
         system.before = 1.1 * truth
-        fitted = solution(system, [signals])
+        fitted = fit_system(system, [signals])
         for at, number in enumerate(fitted.free):
             if np.isfinite(fitted.fit.standard_errors[at]):
                 figures = fitted.fit.values[at], fitted.fit.standard_errors[at], truth[number]

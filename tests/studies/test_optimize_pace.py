@@ -11,7 +11,7 @@ from samples.fixes import pendulum, rest_to_rest
 from vsacli import inverse_dynamics, load_trajectory, optimize
 from vsacli.studies.search.criteria import CRITERIA, Scale
 from vsacli.studies.search.loads import Ends
-from vsacli.studies.search.paced_motion import PacedJoint, PacedMotion, instants_of, retimed
+from vsacli.studies.search.paced_motion import PacedJoint, PacedMotion, checked_instants, retimed
 from vsacli.studies.search.paced_search import CheapestPaceSearch
 from vsacli.studies.search.splines import PacedSpaces, SplineSpace
 
@@ -36,7 +36,7 @@ def search(robot, trajectory, criterion, space):
         def _spaces(self, _pieces):
             return PacedSpaces(space, {})
 
-    motion = PacedMotion(robot, trajectory, instants_of(trajectory, DURATION))
+    motion = PacedMotion(robot, trajectory, checked_instants(trajectory, DURATION))
     joint = PacedJoint(motion, 0, 0.01, CRITERIA[criterion](), Scale(SIZE, DURATION))
     return InSpace(motion, [joint], [], Ends(), 0, lambda: None).best()
 

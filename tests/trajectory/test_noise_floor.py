@@ -59,7 +59,7 @@ def test_noise_alone_needs_no_fine_resolution(name: str, monkeypatch: pytest.Mon
     found = find_resolution(TIME, normal(NOISES[name]), 7, 4, KnownNoise())
     assert found is not None
     assert not found.accepted
-    assert found.total > resolution.ACCEPTED
+    assert found.total > resolution.MAX_DEVIATION
     spans = [bins.spans for bins, _ in tried]
     assert max(spans) <= 1024  # of 2048, which takes as long as all others together
 

@@ -354,7 +354,7 @@ def test_long_records_start_from_stretches(monkeypatch):
     for motion in (pauses, sweep):
         of = record(motion, "white, 1e-5 rad", 5)
         whole = fitted(of)
-        monkeypatch.setattr(resolution, "MOST_SPANS_OF_GRID", 64)
+        monkeypatch.setattr(resolution, "MAX_GRID_SPANS", 64)
         parts = fitted(of)
         monkeypatch.undo()
         assert len(parts.parts[0].knots) == len(whole.parts[0].knots)

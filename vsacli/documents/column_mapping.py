@@ -66,8 +66,8 @@ class MappedColumn:
             or split_heading(file_heading)[1] is not None
         ):
             return None
-        last, camel = _LAST_WORD.search(file_heading), _CAMEL.search(file_heading)
-        word = camel[1] if camel else last[1] if last else ""
+        last_word, camel_word = _LAST_WORD.search(file_heading), _CAMEL.search(file_heading)
+        word = camel_word[1] if camel_word else last_word[1] if last_word else ""
         return UNIT_WORDS.get(word.lower())
 
 
@@ -148,8 +148,8 @@ class ColumnMapping:
                 raise InputError.one(
                     f"columns: {name} is mapped to another column of the same file above", file, line
                 )
-        rest = REST in (self.ignore, other.ignore)
-        ignore = REST if rest else tuple(dict.fromkeys((*self.ignore, *other.ignore)))
+        ignores_rest = REST in (self.ignore, other.ignore)
+        ignore = REST if ignores_rest else tuple(dict.fromkeys((*self.ignore, *other.ignore)))
         skip_rows = tuple(sorted({*self.skip_rows, *other.skip_rows}))
         return ColumnMapping({**self.columns, **other.columns}, ignore, self.rate or other.rate, skip_rows)
 
@@ -169,61 +169,61 @@ class _ColumnSelection:
         self._problems: list[Problem] = []
 
     def select(self) -> ChosenColumns:
-        mapped = dict(self._assigned_columns())
+        mapped_columns = dict(self._assigned_columns())
         nanoseconds = self._find_nanoseconds()
-        used = dict(mapped)
+        used_columns = dict(mapped_columns)
         unknown_columns: list[str] = []
         ignored: list[str] = []
-        for place, heading in enumerate(self._header.columns):
-            if place in mapped or place == nanoseconds:
+        for index, heading in enumerate(self._header.columns):
+            if index in mapped_columns or index == nanoseconds:
                 continue
             name = split_heading(heading)[0]
-            if self._is_ignored(place, heading):
+            if self._is_ignored(index, heading):
                 ignored.append(heading)
             elif self._readable_names is None or name in self._readable_names:
-                used[place] = (heading, 1.0)
+                used_columns[index] = (heading, 1.0)
             else:
                 (ignored if self._mapping.ignore == REST else unknown_columns).append(heading)
-        self._note_repeated(heading for heading, _ in used.values())
+        self._note_repeated_names(heading for heading, _ in used_columns.values())
         if self._problems:
             raise InputError(self._problems)
-        places = tuple(sorted(used))
-        headings = tuple(used[place][0] for place in places)
-        time = next((place for place in places if split_heading(used[place][0])[0] == TIME), None)
-        factors = tuple(used[place][1] for place in places)
+        indices = tuple(sorted(used_columns))
+        headings = tuple(used_columns[index][0] for index in indices)
+        time = next((index for index in indices if split_heading(used_columns[index][0])[0] == TIME), None)
+        factors = tuple(used_columns[index][1] for index in indices)
         return ChosenColumns(
-            places, headings, factors, tuple(unknown_columns), tuple(ignored), time, nanoseconds
+            indices, headings, factors, tuple(unknown_columns), tuple(ignored), time, nanoseconds
         )
 
     def _assigned_columns(self) -> Iterator[tuple[int, tuple[str, float]]]:
         """Yield position, new heading and factor of each mapped column."""
-        names_by_place: dict[int, str] = {}
+        names_by_index: dict[int, str] = {}
         for name, source in self._mapping.columns.items():
             if self._readable_names is not None and name not in self._readable_names:
                 self._note(source, f"unknown name {name!r}{did_you_mean(name, self._readable_names)}")
                 continue
-            place = self._find_place(source.column, source)
-            if place is None:
+            index = self._find_index(source.column, source)
+            if index is None:
                 continue
-            file_heading = self._header.columns[place]
+            file_heading = self._header.columns[index]
             unit = source.undeclared_unit(file_heading)
-            if place in names_by_place:
+            if index in names_by_index:
                 self._note(
-                    source, f"{file_heading or source.column!r} is already mapped to {names_by_place[place]}"
+                    source, f"{file_heading or source.column!r} is already mapped to {names_by_index[index]}"
                 )
             elif unit is not None:
                 self._note(source, _unit_advice(name, file_heading, unit))
             else:
-                names_by_place[place] = name
-                yield place, (source.heading(name, file_heading), source.factor)
+                names_by_index[index] = name
+                yield index, (source.heading(name, file_heading), source.factor)
 
     def _find_nanoseconds(self) -> int | None:
         source = self._mapping.columns.get(TIME)
         if source is None or source.nanoseconds is None:
             return None
-        return self._find_place(source.nanoseconds, source)
+        return self._find_index(source.nanoseconds, source)
 
-    def _find_place(self, column: str | int, source: MappedColumn) -> int | None:
+    def _find_index(self, column: str | int, source: MappedColumn) -> int | None:
         """Return the position of a column; note a problem and return None if it is missing or ambiguous."""
         names = self._header.columns
         if isinstance(column, int):
@@ -231,26 +231,26 @@ class _ColumnSelection:
                 return column - 1
             self._note(source, f"{self._file} has {len(names)} columns, none with the number {column}")
             return None
-        bare = [split_heading(heading)[0] for heading in names]
-        for candidates in (names, bare):
-            places = [place for place, name in enumerate(candidates) if name == column]
-            if len(places) == 1:
-                return places[0]
-            if places:
-                numbers = " or ".join(str(place + 1) for place in places)
-                self._note(source, f"{column!r} appears {len(places)} times; give its number, {numbers}")
+        bare_names = [split_heading(heading)[0] for heading in names]
+        for candidates in (names, bare_names):
+            indices = [place for place, name in enumerate(candidates) if name == column]
+            if len(indices) == 1:
+                return indices[0]
+            if indices:
+                numbers = " or ".join(str(place + 1) for place in indices)
+                self._note(source, f"{column!r} appears {len(indices)} times; give its number, {numbers}")
                 return None
-        near = did_you_mean(column, [name for name in names if name])
-        self._note(source, f"{self._file} has no column {column!r}{near}")
+        suggestion = did_you_mean(column, [name for name in names if name])
+        self._note(source, f"{self._file} has no column {column!r}{suggestion}")
         return None
 
-    def _is_ignored(self, place: int, heading: str) -> bool:
+    def _is_ignored(self, index: int, heading: str) -> bool:
         ignore = self._mapping.ignore
         return ignore != REST and (
-            heading in ignore or split_heading(heading)[0] in ignore or place + 1 in ignore
+            heading in ignore or split_heading(heading)[0] in ignore or index + 1 in ignore
         )
 
-    def _note_repeated(self, headings: Iterable[str]) -> None:
+    def _note_repeated_names(self, headings: Iterable[str]) -> None:
         for name, count in Counter(split_heading(heading)[0] for heading in headings).items():
             source = self._mapping.columns.get(name)
             if count > 1 and source is not None:

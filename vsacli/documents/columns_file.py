@@ -124,8 +124,8 @@ class Columns(OwnKind):
 
     def schema(self, refer: Refer) -> Schema:
         """See `OwnKind.schema`."""
-        one = {"anyOf": [{"type": ["string", "integer"]}, refer(ColumnSource, None)]}
-        return {"type": "object", "minProperties": 1, "additionalProperties": one}
+        column_schema = {"anyOf": [{"type": ["string", "integer"]}, refer(ColumnSource, None)]}
+        return {"type": "object", "minProperties": 1, "additionalProperties": column_schema}
 
     def json_value(self, content: Any, of_record: Callable[[Any], Any]) -> Any:
         """See `OwnKind.json_value`."""
@@ -220,6 +220,6 @@ def parse_rate(rate_or_text: Any) -> float:
     except (ExpressionError, TypeError, ValueError):
         rate = math.nan
     if not 0 < rate <= LARGEST:
-        shown = f"{rate_or_text:g}" if isinstance(rate_or_text, float) else rate_or_text
-        raise InputError.one(f"rate: must be a positive number of samples per second, not {shown}")
+        rate_text = f"{rate_or_text:g}" if isinstance(rate_or_text, float) else rate_or_text
+        raise InputError.one(f"rate: must be a positive number of samples per second, not {rate_text}")
     return rate

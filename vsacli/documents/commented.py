@@ -117,12 +117,16 @@ class _Commented:
         self, kind: ValueKind, name: str, value: Any, comment: str, variant: str
     ) -> Iterator[_YamlLine]:
         """Yield a field with a value, in one line if all inside is explained already."""
-        first, *inside = self._field(kind, name, value, comment, variant)
-        if inside and self._in_later_entry and all(line.active and not line.comment for line in inside):
+        first_line, *inner_lines = self._field(kind, name, value, comment, variant)
+        if (
+            inner_lines
+            and self._in_later_entry
+            and all(line.active and not line.comment for line in inner_lines)
+        ):
             yield _YamlLine(f"{name}: {on_one_line(value)}", comment)
         else:
-            yield first
-            yield from inside
+            yield first_line
+            yield from inner_lines
 
     def _field_without_value(
         self, field: Field, name: str, default: Any, comment: str, variant: str
@@ -154,13 +158,13 @@ class _Commented:
                 yield _YamlLine(f"{name}:", comment)
                 yield from (line.inside() for line in self.record(cls, value, variant))
             case OneOf(variants):
-                chosen = value["type"]
-                other_types = ", ".join(word for word in variants if word != chosen)
+                chosen_type = value["type"]
+                other_types = ", ".join(word for word in variants if word != chosen_type)
                 yield _YamlLine(f"{name}:", comment)
                 yield _YamlLine(
-                    f"type: {chosen}", f"or {other_types}" if other_types and comment else ""
+                    f"type: {chosen_type}", f"or {other_types}" if other_types and comment else ""
                 ).inside()
-                yield from (line.inside() for line in self.record(variants[chosen], value, variant))
+                yield from (line.inside() for line in self.record(variants[chosen_type], value, variant))
             case Items() if kind.records or isinstance(value[0], list):
                 yield _YamlLine(f"{name}:", comment)
                 yield from self._entries(kind, value, variant)
@@ -177,13 +181,13 @@ class _Commented:
         if not kind.records:
             yield from (_YamlLine(f"- {on_one_line(entry)}").inside() for entry in values)
             return
-        outside = self._in_later_entry
+        was_in_later_entry = self._in_later_entry
         for value in values:
-            head, *rest = self.record(kind.records[""], value, variant)
-            yield head.inside("- ").inside()
-            yield from (line.inside().inside() for line in rest)
+            first_line, *other_lines = self.record(kind.records[""], value, variant)
+            yield first_line.inside("- ").inside()
+            yield from (line.inside().inside() for line in other_lines)
             self._in_later_entry = True
-        self._in_later_entry = outside
+        self._in_later_entry = was_in_later_entry
 
     def _comment(self, cls: type, name: str, field: Field, variant: str) -> str:
         """Return unit and meaning of a field, its forms where they are not obvious, and its source."""

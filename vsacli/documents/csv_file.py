@@ -47,7 +47,9 @@ MAX_KINDS = 10
 """Maximum number of kinds of problems to report."""
 MAX_SIMILAR = 1000
 """Number of problems of one kind after which reading stops."""
-MISSING = frozenset(("", *["nan", "+nan", "-nan", "nan(ind)", "-nan(ind)", "na", "n/a", "null", "none"]))
+MISSING_WORDS = frozenset(
+    ("", *["nan", "+nan", "-nan", "nan(ind)", "-nan(ind)", "na", "n/a", "null", "none"])
+)
 """Cells without a number, in lower case, as C compilers, spreadsheets and statistics programs write them."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d+,\d+(e[+-]?\d+)?\s*", re.IGNORECASE)
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(\[(?P<unit>[^\[\]]*)\])?")
@@ -95,9 +97,9 @@ def split_heading(text: str) -> tuple[str, str | None]:
 
 
 def read_header(
-    path: str | os.PathLike[str], numbered: Sequence[int] = (), skipped: Collection[int] = ()
+    path: str | os.PathLike[str], numbered_columns: Sequence[int] = (), skipped: Collection[int] = ()
 ) -> Header:
-    """Return the header of a CSV file with any column names; see `header_of` for `numbered` and `skipped`.
+    """Return the header of a CSV file with any names; see `header_of` for `numbered_columns` and `skipped`.
 
     Raises:
         InputError: the file cannot be read, or does not begin like a table.
@@ -106,7 +108,7 @@ def read_header(
     check_input_file(name, MAX_BYTES)
     try:
         with recognizing_other_formats(name), open(place_of(name), "rb") as content:
-            return header_of(content, name, strict=False, numbered=numbered, skipped=skipped)
+            return header_of(content, name, strict=False, numbered_columns=numbered_columns, skipped=skipped)
     except OSError as error:
         raise InputError.one(f"cannot be read: {error.strerror or error}", name) from None
 
@@ -116,7 +118,7 @@ def header_of(
     name: str,
     *,
     strict: bool = True,
-    numbered: Sequence[int] = (),
+    numbered_columns: Sequence[int] = (),
     skipped: Collection[int] = (),
 ) -> Header:
     """Return the header of a table.
@@ -125,29 +127,31 @@ def header_of(
         content: file content, read from the beginning.
         name: path for messages.
         strict: whether each column must have a unique name.
-        numbered: numbers of columns, from 1, that need no name: if all of them hold numbers, the line is a
-            row.
+        numbered_columns: numbers of columns, from 1, that need no name: if all of them hold numbers, the line
+            is a row.
         skipped: numbers of lines to leave out.
 
     Raises:
         InputError: with every problem of the line.
     """
     file = TextIOWrapper(content, encoding="utf-8-sig", errors="replace")
-    number, line, comment = 0, "\n", 0
-    while len(line) < MAX_HEADER and (
-        line == "\n" or line.startswith(COMMENT) or (line and number in skipped)
+    number, header_line, comment_line = 0, "\n", 0
+    while len(header_line) < MAX_HEADER and (
+        header_line == "\n" or header_line.startswith(COMMENT) or (header_line and number in skipped)
     ):
-        comment = number if line.startswith(COMMENT) else comment
-        number, line = number + 1, file.readline(MAX_HEADER)
+        comment_line = number if header_line.startswith(COMMENT) else comment_line
+        number, header_line = number + 1, file.readline(MAX_HEADER)
     file.detach()
-    text = line.partition(COMMENT)[0]
+    text = header_line.partition(COMMENT)[0]
     separator = separator_of(text)
     columns = tuple(cell.strip() for cell in split_cells(text.rstrip("\r\n"), separator))
-    numbers = [is_number(cell.replace(",", "," if separator == "," else ".")) for cell in columns]
-    if numbered and all(numbers[place - 1] for place in numbered if place <= len(columns)):
+    is_numeric = [is_number(cell.replace(",", "," if separator == "," else ".")) for cell in columns]
+    if numbered_columns and all(
+        is_numeric[column_number - 1] for column_number in numbered_columns if column_number <= len(columns)
+    ):
         return Header(0, separator, ("",) * len(columns), frozenset(skipped))
-    number = number if line else 0
-    messages = _header_problems(line, columns, comment, strict)
+    number = number if header_line else 0
+    messages = _header_problems(header_line, columns, comment_line, strict)
     problems = [Problem(name, number, message) for message in messages]
     if problems:
         raise InputError(problems)
@@ -156,9 +160,9 @@ def header_of(
 
 def separator_of(line: str) -> str:
     """Return the separator in a line, preferably the header."""
-    bare = _QUOTED.sub("_", line)
-    blanks = BLANKS if len(_UNIT.sub("", bare).split()) > 1 else SEPARATORS[-1]
-    return next((mark for mark in SEPARATORS if mark in bare), blanks)
+    unquoted = _QUOTED.sub("_", line)
+    blanks = BLANKS if len(_UNIT.sub("", unquoted).split()) > 1 else SEPARATORS[-1]
+    return next((separator for separator in SEPARATORS if separator in unquoted), blanks)
 
 
 def split_cells(line: str, separator: str) -> list[str]:
@@ -178,7 +182,7 @@ def is_number(cell: str) -> bool:
 
 def is_missing(cell: str) -> bool:
     """Return whether a cell says that there is no number, as empty ones do."""
-    return cell.strip().lower() in MISSING
+    return cell.strip().lower() in MISSING_WORDS
 
 
 def _header_problems(line: str, columns: tuple[str, ...], comment: int, strict: bool) -> Iterator[str]:
@@ -226,9 +230,9 @@ class RowsToRead(NamedTuple):
         """Whether no column is left out."""
         return len(self.used) == len(self.header.columns)
 
-    def name(self, place: int) -> str:
+    def name(self, index: int) -> str:
         """Return the name of a column in messages."""
-        return repr(self.header.columns[place] or place + 1)
+        return repr(self.header.columns[index] or index + 1)
 
     def texts(self) -> Iterator[tuple[int, list[str]]]:
         """Yield line number and cells of each row, without quotes.
@@ -236,11 +240,11 @@ class RowsToRead(NamedTuple):
         Raises:
             InputError: a row does not have as many cells as the header.
         """
-        count = len(self.header.columns)
+        cell_count = len(self.header.columns)
         for number, line in self.lines():
             cells = split_cells(line, self.header.separator)
-            if len(cells) != count:
-                raise InputError.one(wrong_count(count, len(cells)), self.path, number)
+            if len(cells) != cell_count:
+                raise InputError.one(wrong_count(cell_count, len(cells)), self.path, number)
             yield number, cells
 
     def lines(self) -> Iterator[tuple[int, str]]:
@@ -289,8 +293,8 @@ def read_numbers(rows: RowsToRead) -> FloatArray:
         values, reason = _load_with_numpy(rows, float)
     if not values.size:
         values, reason = _load_with_numpy(rows, float, _normalized_rows(rows))
-    odd = np.isinf(values) if rows.empty_cells else ~np.isfinite(values)
-    if values.shape[1] == len(rows.used) and not odd.any():
+    is_unusual = np.isinf(values) if rows.empty_cells else ~np.isfinite(values)
+    if values.shape[1] == len(rows.used) and not is_unusual.any():
         return values
     raise InputError(_row_problems(rows) or [Problem(rows.path, 0, f"cannot be read: {reason}")])
 
@@ -302,16 +306,16 @@ def read_integers(rows: RowsToRead) -> npt.NDArray[np.int64] | None:
 
 
 def _load_with_numpy(
-    rows: RowsToRead, kind: npt.DTypeLike, cleaned: Iterable[str] | None = None
+    rows: RowsToRead, dtype: npt.DTypeLike, cleaned: Iterable[str] | None = None
 ) -> tuple[npt.NDArray[Any], object]:
     """Return the rows of the file, or of cleaned lines, and the reason if there are none."""
-    header, used = rows.header, None if rows.all_used else rows.used
+    header, used_columns = rows.header, None if rows.all_used else rows.used
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # NumPy only warns if there are no rows, or no whole numbers
         try:
             values = np.loadtxt(
                 os.path.abspath(place_of(rows.path)) if cleaned is None else cleaned,
-                dtype=kind,
+                dtype=dtype,
                 delimiter="\t"
                 if cleaned is not None
                 else None
@@ -320,7 +324,7 @@ def _load_with_numpy(
                 comments=COMMENT,
                 encoding="latin-1",  # decodes any comment; numbers are ASCII
                 skiprows=header.line if cleaned is None else 0,
-                usecols=used if cleaned is None else None,
+                usecols=used_columns if cleaned is None else None,
                 ndmin=2,
             )
         except (ValueError, Warning, _IrregularError) as error:
@@ -337,24 +341,24 @@ def _is_regular(rows: RowsToRead) -> bool:
     expected, separator = len(rows.header.columns) - 1, ord(rows.header.separator)
     if rows.header.separator == BLANKS:
         return False
-    rest = b""
+    remainder = b""
     with open(place_of(rows.path), "rb") as file:
         for _ in range(rows.header.line):
             file.readline()
         while chunk := file.read(CHUNK):
-            text, _, rest = (rest + chunk).rpartition(b"\n")
-            if not _cells_count(text + b"\n" if text else b"", expected, separator):
+            lines, _, remainder = (remainder + chunk).rpartition(b"\n")
+            if not _has_cell_count(lines + b"\n" if lines else b"", expected, separator):
                 return False
-    return not rest or _cells_count(rest + b"\n", expected, separator)
+    return not remainder or _has_cell_count(remainder + b"\n", expected, separator)
 
 
-def _cells_count(text: bytes, expected: int, separator: int) -> bool:
-    if QUOTE.encode() in text or COMMENT.encode() in text or b"\r" in text.replace(b"\r\n", b""):
+def _has_cell_count(lines: bytes, expected: int, separator: int) -> bool:
+    if QUOTE.encode() in lines or COMMENT.encode() in lines or b"\r" in lines.replace(b"\r\n", b""):
         return False
-    letters = np.frombuffer(text, dtype=np.uint8)
-    ends = np.flatnonzero(letters == ord("\n"))
-    upto = np.searchsorted(np.flatnonzero(letters == separator), ends)
-    return bool(np.all(np.diff(upto, prepend=0) == expected))
+    characters = np.frombuffer(lines, dtype=np.uint8)
+    line_ends = np.flatnonzero(characters == ord("\n"))
+    separator_counts = np.searchsorted(np.flatnonzero(characters == separator), line_ends)
+    return bool(np.all(np.diff(separator_counts, prepend=0) == expected))
 
 
 class _IrregularError(Exception):
@@ -368,17 +372,19 @@ def _normalized_rows(rows: RowsToRead) -> Iterator[str]:
         cells = split_cells(line, header.separator)
         if len(cells) != len(header.columns):
             raise _IrregularError(line)
-        used = [cells[place].strip() for place in rows.used]  # also tabs, the separator of the result
+        used_cells = [cells[place].strip() for place in rows.used]  # also tabs, the separator of the result
         if rows.empty_cells:
-            used = ["nan" if not cell[-1:].isdigit() and is_missing(cell) else cell for cell in used]
-        yield "\t".join(map(decimals.with_points, used))
+            used_cells = [
+                "nan" if not cell[-1:].isdigit() and is_missing(cell) else cell for cell in used_cells
+            ]
+        yield "\t".join(map(decimals.with_points, used_cells))
 
 
 class _Decimals:
     """The decimal sign of a table, the same throughout; a comma only if it is not the separator."""
 
     def __init__(self, separator: str) -> None:
-        self._admitted = separator != ","
+        self._admits_comma = separator != ","
         self._sign = ""
 
     def with_points(self, cell: str) -> str:
@@ -386,7 +392,7 @@ class _Decimals:
         if "," not in cell and "." not in cell:
             return cell
         sign = "," if "," in cell else "."
-        if sign != (self._sign or sign) or (sign == "," and not self._admitted):
+        if sign != (self._sign or sign) or (sign == "," and not self._admits_comma):
             raise _IrregularError(cell)
         self._sign = sign
         return cell.replace(",", ".")
@@ -395,16 +401,16 @@ class _Decimals:
 def _row_problems(rows: RowsToRead) -> list[Problem]:
     """Return the first problem of each kind, with the number of similar problems."""
     problems_by_kind: dict[str, list[Problem]] = {}
-    empty, decimals = True, _Decimals(rows.header.separator)
+    is_empty, decimals = True, _Decimals(rows.header.separator)
     for number, line in rows.lines():
-        empty = False
+        is_empty = False
         for kind, message in _cell_problems(rows, line, decimals.with_points):
             problems_by_kind.setdefault(kind, []).append(Problem(rows.path, number, message))
         if len(problems_by_kind) > MAX_KINDS or any(
             len(similar) >= MAX_SIMILAR for similar in problems_by_kind.values()
         ):
             break
-    if empty:
+    if is_empty:
         return [Problem(rows.path, 0, "has a header but no rows of values")]
     problems = [_first_with_count(similar) for similar in list(problems_by_kind.values())[:MAX_KINDS]]
     if len(problems_by_kind) > MAX_KINDS:
@@ -426,15 +432,15 @@ def _cell_problems(
     rows: RowsToRead, line: str, with_point: Callable[[str], str]
 ) -> Iterator[tuple[str, str]]:
     """Yield kind and message of each problem of a row."""
-    separator, count = rows.header.separator, len(rows.header.columns)
+    separator, cell_count = rows.header.separator, len(rows.header.columns)
     cells = split_cells(line, separator)
-    if len(cells) != count:
-        doubled = separator == "," and len(cells) == 2 * count
-        hint = "; with decimal commas, semicolons or tabs stand between the columns" if doubled else ""
-        yield "count", f"{wrong_count(count, len(cells))}{hint}"
+    if len(cells) != cell_count:
+        is_doubled = separator == "," and len(cells) == 2 * cell_count
+        hint = "; with decimal commas, semicolons or tabs stand between the columns" if is_doubled else ""
+        yield "count", f"{wrong_count(cell_count, len(cells))}{hint}"
         return
-    for place in rows.used:
-        name, cell = rows.name(place), cells[place]
+    for index in rows.used:
+        name, cell = rows.name(index), cells[index]
         if rows.empty_cells and is_missing(cell):
             continue
         try:

@@ -87,11 +87,11 @@ def root_of(text: str) -> yaml.Node:
     return root
 
 
-def _texts_at(node: yaml.Node, key: str, place: _Words) -> Iterator[tuple[str, str]]:
+def _texts_at(node: yaml.Node, key: str, path_words: _Words) -> Iterator[tuple[str, str]]:
     for word, entry in _children_by_word(node):
         if word == key and isinstance(entry, yaml.ScalarNode):
-            yield ".".join((*place, word)), entry.value
-        yield from _texts_at(entry, key, (*place, word))
+            yield ".".join((*path_words, word)), entry.value
+        yield from _texts_at(entry, key, (*path_words, word))
 
 
 def _children_by_word(node: yaml.Node) -> Iterator[tuple[str, yaml.Node]]:
@@ -121,28 +121,28 @@ def _locate_edit(root: yaml.Node, words: _Words, value: Any) -> tuple[int, int, 
     return _insertion(node, f"{key}: {format_on_one_line(value)}")
 
 
-def _replacement(node: yaml.Node, replaced: yaml.Node, written: str) -> tuple[int, int, str]:
+def _replacement(node: yaml.Node, old_node: yaml.Node, new_text: str) -> tuple[int, int, str]:
     """Return the edit that replaces an entry of a node; a block value is replaced from its key on."""
-    block = isinstance(replaced, yaml.CollectionNode) and not replaced.flow_style
-    if block and isinstance(node, yaml.MappingNode):
-        key = next(key for key, entry in node.value if entry is replaced)
-        return key.end_mark.index, _end_of_text(replaced), f": {written}"
-    return replaced.start_mark.index, _end_of_text(replaced), written
+    is_block = isinstance(old_node, yaml.CollectionNode) and not old_node.flow_style
+    if is_block and isinstance(node, yaml.MappingNode):
+        key = next(key for key, entry in node.value if entry is old_node)
+        return key.end_mark.index, _end_of_text(old_node), f": {new_text}"
+    return old_node.start_mark.index, _end_of_text(old_node), new_text
 
 
 def _end_of_text(node: yaml.Node) -> int:
     """Return where the text of a node ends; a block ends with its last entry."""
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
-        last = node.value[-1]
-        return _end_of_text(last[1] if isinstance(last, tuple) else last)
+        last_entry = node.value[-1]
+        return _end_of_text(last_entry[1] if isinstance(last_entry, tuple) else last_entry)
     return node.end_mark.index
 
 
 def _insertion(node: yaml.MappingNode, entry: str) -> tuple[int, int, str]:
     """Return the edit that inserts an entry before the first one of a mapping."""
-    first = node.value[0][0].start_mark
-    start = first.index
-    return start, start, f"{entry}, " if node.flow_style else f"{entry}\n{' ' * first.column}"
+    first_mark = node.value[0][0].start_mark
+    start = first_mark.index
+    return start, start, f"{entry}, " if node.flow_style else f"{entry}\n{' ' * first_mark.column}"
 
 
 def format_on_one_line(value: Any) -> str:
@@ -166,10 +166,10 @@ def unaliased(text: str, paths: Iterable[str]) -> str:
     """
     paths_in_words = [tuple(path.split(".")) for path in paths]
     while True:
-        shared = _aliases_along(text, paths_in_words)
-        if not shared:
+        aliases = _aliases_along(text, paths_in_words)
+        if not aliases:
             return text
-        for start, end, node in sorted(shared, key=lambda alias: alias[0], reverse=True):
+        for start, end, node in sorted(aliases, key=lambda alias: alias[0], reverse=True):
             text = text[:start] + _flow_style(text, node) + text[end:]
 
 
@@ -213,18 +213,18 @@ def with_errors(text: str, errors: Mapping[str, str]) -> str:
         errors: errors by path, entries of lists by index; paths that do not exist are ignored.
     """
     root = root_of(text)
-    by_line: dict[int, list[str]] = {}
+    remarks_by_line: dict[int, list[str]] = {}
     for path, error in errors.items():
         *_, key = path.split(".")
         node = node_at(root, path)
         if node is not None:
-            by_line.setdefault(node.start_mark.line, []).append(f"{key} +- {error}")
+            remarks_by_line.setdefault(node.start_mark.line, []).append(f"{key} +- {error}")
     lines = text.split("\n")
-    ends = _content_ends(text)
-    for number, remarks in by_line.items():
-        line = _EARLIER_ERRORS.sub("", lines[number].rstrip())
-        mark_ = "; " if "#" in line[ends[number] :] else "  # "
-        lines[number] = line + mark_ + ", ".join(remarks)
+    content_ends = _content_ends(text)
+    for line_number, remarks in remarks_by_line.items():
+        line = _EARLIER_ERRORS.sub("", lines[line_number].rstrip())
+        separator = "; " if "#" in line[content_ends[line_number] :] else "  # "
+        lines[line_number] = line + separator + ", ".join(remarks)
     return "\n".join(lines)
 
 

@@ -183,17 +183,17 @@ class _Parser:
         self._nesting += 1
         if self._nesting > MAX_NESTING:
             raise ExpressionError(f"nested deeper than {MAX_NESTING} levels", self._next.place)
-        left, divided = self._operand(), False
+        left_step, has_division = self._operand(), False
         while (tightness := _BINDING.get(symbol := self._operator(), 0)) >= binding:
-            ambiguous = self._grammar.of_units and divided and symbol != "/"
+            ambiguous = self._grammar.of_units and has_division and symbol != "/"
             if ambiguous or (tightness == _POWER and not self._grammar.powers):
                 self._refuse("another operator")
             if symbol == self._next.text:
                 self._take()
-            divided |= symbol == "/"
-            left = self._step(symbol, left, self._expression(tightness + (tightness != _POWER)))
+            has_division |= symbol == "/"
+            left_step = self._step(symbol, left_step, self._expression(tightness + (tightness != _POWER)))
         self._nesting -= 1
-        return left
+        return left_step
 
     def _operator(self) -> str:
         """Return the next operator; between units it may be omitted."""
@@ -228,12 +228,12 @@ class _Parser:
         return self._step("^", unit, self._step("number", float(self._take().text)))
 
     def _word(self) -> int:
-        _, word, place = self._take()
+        _, word, position = self._take()
         if word in self._grammar.functions:
             return self._step(word, self._parentheses(f"( behind {word!r}"))
         if word not in self._grammar.names:
             valid_words = (*self._grammar.names, *self._grammar.functions)
-            raise ExpressionError(f"unknown word {word!r}", place, did_you_mean(word, valid_words))
+            raise ExpressionError(f"unknown word {word!r}", position, did_you_mean(word, valid_words))
         return self._step("name", word)
 
     def _parentheses(self, otherwise: str) -> int:
@@ -255,8 +255,8 @@ class _Parser:
         return token
 
     def _refuse(self, expected: str) -> NoReturn:
-        _, text, place = self._next
-        raise ExpressionError(f"expected {expected}, found {repr(text) if text else 'the end'}", place)
+        _, text, position = self._next
+        raise ExpressionError(f"expected {expected}, found {repr(text) if text else 'the end'}", position)
 
 
 BASES: dict[str, tuple[float, dict[str, int]]] = {
@@ -343,20 +343,20 @@ class Unit:
         self.dimensions = {name: exponent for name, exponent in dimensions.items() if exponent}
 
     def __mul__(self, other: Unit) -> Unit:
-        return self._times(other, 1)
+        return self._multiply_by_power(other, 1)
 
     def __truediv__(self, other: Unit) -> Unit:
-        return self._times(other, -1)
+        return self._multiply_by_power(other, -1)
 
     def __pow__(self, exponent: int) -> Unit:
-        return Unit(1.0, {})._times(self, exponent)
+        return Unit(1.0, {})._multiply_by_power(self, exponent)
 
-    def _times(self, other: Unit, power: int) -> Unit:
+    def _multiply_by_power(self, other: Unit, exponent: int) -> Unit:
         names = {**self.dimensions, **other.dimensions}
         dimensions = {
-            name: self.dimensions.get(name, 0) + power * other.dimensions.get(name, 0) for name in names
+            name: self.dimensions.get(name, 0) + exponent * other.dimensions.get(name, 0) for name in names
         }
-        return Unit(self.size * other.size**power, dimensions)
+        return Unit(self.size * other.size**exponent, dimensions)
 
 
 def conversion_factor(text: str, expected: str) -> float:
@@ -372,8 +372,8 @@ def conversion_factor(text: str, expected: str) -> float:
     expected_unit = _parse_unit(expected)
     written_unit = size_of_unit(text)
     if written_unit is None:
-        near = nearest(text, _units_like(expected_unit))
-        advice = f"did you mean [{near}]?" if near else _expected_unit_clause(expected)
+        suggestion = nearest(text, _units_like(expected_unit))
+        advice = f"did you mean [{suggestion}]?" if suggestion else _expected_unit_clause(expected)
         raise InputError.one(f"unknown unit [{text[: _UNITS.max_length]}]; {advice}")
     if written_unit.dimensions != expected_unit.dimensions:
         raise InputError.one(_wrong_dimensions(text, expected))
@@ -419,9 +419,9 @@ def _wrong_dimensions(text: str, expected: str) -> str:
     product_unit = size_of_unit(product)
     if product_unit is not None and product_unit.dimensions == _parse_unit(expected).dimensions:
         return f"[{text}] is not {kind_of_unit(expected) or 'of this kind'}; did you mean [{product}]?"
-    kind = kind_of_unit(text)
+    unit_kind = kind_of_unit(text)
     return (
-        f"[{text}] is {kind}, {_expected_unit_clause(expected)}"
-        if kind
+        f"[{text}] is {unit_kind}, {_expected_unit_clause(expected)}"
+        if unit_kind
         else f"[{text}] does not fit; {_expected_unit_clause(expected)}"
     )

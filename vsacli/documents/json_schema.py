@@ -84,10 +84,14 @@ class _SchemaBuilder:
         }
 
     def _field_schema(self, field: Field, default: Any) -> Schema:
-        described = field.doc if field.quantity == DIMENSIONLESS else f"{field.doc}, {field.quantity}"
-        shown = None if isinstance(field.kind, ItemsByName) else _json_default(default)
+        description = field.doc if field.quantity == DIMENSIONLESS else f"{field.doc}, {field.quantity}"
+        json_default = None if isinstance(field.kind, ItemsByName) else _json_default(default)
         schema = self._value_schema(field.kind, field.check)
-        return {"description": described, **schema, **({} if shown is None else {"default": shown})}
+        return {
+            "description": description,
+            **schema,
+            **({} if json_default is None else {"default": json_default}),
+        }
 
     def _value_schema(self, kind: ValueKind, check: Check | None) -> Schema:
         """Return the schema of values of a kind; their numbers must meet the condition."""
@@ -114,8 +118,8 @@ class _SchemaBuilder:
             case Items(item=item):
                 return _list_schema(self._value_schema(item, check))
             case PairOf(item):
-                one = self._value_schema(item, check)
-                return {"if": {"type": "array"}, "then": _list_schema(one, 2), "else": one}
+                item_schema = self._value_schema(item, check)
+                return {"if": {"type": "array"}, "then": _list_schema(item_schema, 2), "else": item_schema}
         return _single_value_schema(kind, check) or _numbers_schema(kind, check)
 
     def _variants_schema(self, variants: Mapping[str, type]) -> Schema:
@@ -191,8 +195,8 @@ def _numbers_schema(kind: ValueKind, check: Check | None) -> Schema:
         case NumberList():
             return _list_schema(_number_schema(kind.item.unit, check), kind.length)
         case Interval():
-            bound = _number_schema(kind.item.unit, None)
-            return {"anyOf": [*bound["anyOf"], _list_schema(bound, 2)]}
+            bound_schema = _number_schema(kind.item.unit, None)
+            return {"anyOf": [*bound_schema["anyOf"], _list_schema(bound_schema, 2)]}
         case NamedNumbers():
             return {"type": "object", "additionalProperties": _number_schema(ANY_SI_UNIT, check)}
         case PerJoint():

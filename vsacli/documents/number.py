@@ -102,8 +102,8 @@ def _describe_invalid_number(text: str, unit: str, error: ExpressionError) -> st
     if unit_problem := _describe_written_unit(text.strip(), unit):
         return f"{quoted(text)} {unit_problem}"
     expected = f"expected {expected_number(unit)}, found {quoted(text)}"
-    for form, advice in _REFUSED_FORMS.items():
-        if re.fullmatch(form, text.strip(), re.IGNORECASE):
+    for pattern, advice in _REFUSED_FORMS.items():
+        if re.fullmatch(pattern, text.strip(), re.IGNORECASE):
             return f"{expected}; {advice}"
     if not error.place:
         return f"{expected}; {error.reason}"

@@ -160,19 +160,19 @@ def replace_all(
 
 
 def _replace_in_turn(record: _Record, values: Mapping[str, Any], scope: Scope) -> _Record:
-    refused: dict[str, Any] = {}
-    first = None
+    refused_values: dict[str, Any] = {}
+    first_error = None
     for path, value in values.items():
         try:
             record = _Replacements(scope).in_record(record, [_NewValue.of(path, value)], ())
         except InputError as error:
-            first = first or ReplacementError(error.problems, path)
-            refused[path] = value
-    if first is None:
+            first_error = first_error or ReplacementError(error.problems, path)
+            refused_values[path] = value
+    if first_error is None:
         return record
-    if len(refused) == len(values):
-        raise first
-    return _replace_in_turn(record, refused, scope)
+    if len(refused_values) == len(values):
+        raise first_error
+    return _replace_in_turn(record, refused_values, scope)
 
 
 def _node_of_value(value: Any) -> Node:
@@ -220,14 +220,16 @@ class _Replacements(NamedTuple):
         """Return a record with the replacements in it."""
         cls: type = type(record)
         fields = declared_fields(cls)
-        chosen = getattr(record, getattr(cls, "unit_variant", ""), None)
-        variant = variant_inside(cls, chosen, self.scope.variant)
-        inside, contents = _Replacements(self.scope._replace(variant=variant)), {}
-        for word, within in _by_first_word(changes).items():
+        variant_choice = getattr(record, getattr(cls, "unit_variant", ""), None)
+        variant = variant_inside(cls, variant_choice, self.scope.variant)
+        inner_replacements, contents = _Replacements(self.scope._replace(variant=variant)), {}
+        for word, inner_changes in _by_first_word(changes).items():
             if word not in fields:
                 raise _missing_word_error(word, fields, place)
             kind = fields[word][0].kind
-            contents[word] = inside.in_value(kind, getattr(record, word), within, (*place, word))
+            contents[word] = inner_replacements.in_value(
+                kind, getattr(record, word), inner_changes, (*place, word)
+            )
         try:
             return record.with_fields(contents)
         except InvalidRecordError as error:
@@ -242,8 +244,8 @@ class _Replacements(NamedTuple):
         if not all(each.words for each in changes):
             _check_single(changes, place)
             return self._read_value(kind, node, place)
-        named = isinstance(kind, ItemsByName) and len(words) == 1 and words[0] != ALL
-        if named and isinstance(node, MapNode):
+        is_named_entry = isinstance(kind, ItemsByName) and len(words) == 1 and words[0] != ALL
+        if is_named_entry and isinstance(node, MapNode):
             _check_single(changes, place)
             return self._with_entry(kind, content or (), words[0], node, place)
         if content is None:
@@ -278,9 +280,9 @@ class _Replacements(NamedTuple):
     ) -> Any:
         """Return both sides of a joint; equal sides stay one object."""
         if content[0] == content[1]:
-            of_both = [each.inside if each.words[0] == ALL else each for each in changes]
-            both = self.in_value(kind.item, content[0], of_both, place)
-            return both, both
+            side_changes = [each.inside if each.words[0] == ALL else each for each in changes]
+            new_side = self.in_value(kind.item, content[0], side_changes, place)
+            return new_side, new_side
         for words, _ in changes:
             if words[0] != ALL:
                 choices = f"0, 1 or {ALL}, as in {_dotted_path((*place, '0', *words))}"
@@ -310,10 +312,12 @@ class _Replacements(NamedTuple):
             nonempty_indices = [index for index, entry in enumerate(entries) if entry is not None]
             for index in nonempty_indices if word == ALL else [indices[word]]:
                 by_index.setdefault(index, []).append(change.inside)
-        for index, within in by_index.items():
-            inside = _Replacements(self.scope.of_member(names[index]))
+        for index, inner_changes in by_index.items():
+            member_replacements = _Replacements(self.scope.of_member(names[index]))
             entry_place = (*place, names[index] or str(index))
-            entries[index] = inside.in_value(entry_kind, content[index], within, entry_place)
+            entries[index] = member_replacements.in_value(
+                entry_kind, content[index], inner_changes, entry_place
+            )
         return tuple(entries)
 
     def _with_entry(
@@ -324,8 +328,8 @@ class _Replacements(NamedTuple):
         index = _indices(names).get(word)
         name = word if index is None else names[index]
         entries = {key: TextNode(0, name, plain=False), **mapping.entries}
-        named = mapping._replace(entries=entries, key_lines={key: 0, **mapping.key_lines})
-        entry = self._read_value(kind.item or kind, named, (*place, name))
+        named_mapping = mapping._replace(entries=entries, key_lines={key: 0, **mapping.key_lines})
+        entry = self._read_value(kind.item or kind, named_mapping, (*place, name))
         return tuple({**dict(zip(names, content, strict=True)), name: entry}.values())
 
 

@@ -160,10 +160,10 @@ def _name_of_path(path: NumberPath) -> str:
 
 
 def _guess_unit(measured: Measured, other: OtherUnit) -> str:
-    meant = f"did you mean {measured.value:.6g} {other.unit}"
+    question = f"did you mean {measured.value:.6g} {other.unit}"
     if measured.unit in ANGLES and other.unit == "deg":
-        return f"{meant}?"
-    return f"{meant}, which is {measured.value * other.factor:.4g} {measured.unit}?"
+        return f"{question}?"
+    return f"{question}, which is {measured.value * other.factor:.4g} {measured.unit}?"
 
 
 def _path_to_report(path: NumberPath, other: OtherUnit | None) -> NumberPath:
@@ -211,7 +211,7 @@ class ValuesInFile:
 
     def as_in_file(self, measured: Measured) -> Measured | None:
         """Return the number with the path to its scalar, which all joints may share; None if it differs."""
-        node, left = self.node_along(measured.path)
+        node, remaining_steps = self.node_along(measured.path)
         if not isinstance(node, TextNode) or math.isnan(measured.value):
             return measured
         try:
@@ -220,7 +220,7 @@ class ValuesInFile:
             return None
         if abs(value) != abs(measured.value):
             return None
-        return measured._replace(path=measured.path[: len(measured.path) - len(left)], value=value)
+        return measured._replace(path=measured.path[: len(measured.path) - len(remaining_steps)], value=value)
 
     def in_angles(self, measured: Measured) -> bool:
         """Return whether the file has this number as an expression with `deg` or `pi`."""
@@ -253,15 +253,17 @@ def implausible_measurements(
         written: file of the subject, if any.
         rules_with_findings: names of rules with findings elsewhere.
     """
-    outside_by_rule: dict[str, list[Measured]] = {}
+    implausible_by_rule: dict[str, list[Measured]] = {}
     with np.errstate(all="ignore"):  # extreme values may have an infinite size
         for rule in rules:
-            if {*outside_by_rule, *rules_with_findings}.isdisjoint(rule.explained_by):
-                outside = [measured for measured in rule.measure(subject) if not rule.admits(measured.size)]
+            if {*implausible_by_rule, *rules_with_findings}.isdisjoint(rule.explained_by):
+                implausible = [
+                    measured for measured in rule.measure(subject) if not rule.admits(measured.size)
+                ]
                 if rule.in_angles and written is not None:
-                    outside = [measured for measured in outside if not written.in_angles(measured)]
-                outside_by_rule |= {rule.name: outside} if outside else {}
-    return outside_by_rule
+                    implausible = [measured for measured in implausible if not written.in_angles(measured)]
+                implausible_by_rule |= {rule.name: implausible} if implausible else {}
+    return implausible_by_rule
 
 
 def implausible_values(
@@ -274,7 +276,7 @@ def implausible_values(
         rules: see `implausible_measurements`.
         judged: its other arguments, several times for a tree: once for each subtree.
     """
-    outside_by_rule = [implausible_measurements(rules, *each) for each in judged]
+    implausible_by_rule = [implausible_measurements(rules, *each) for each in judged]
     problems = (
         problem
         for rule in rules
@@ -282,7 +284,7 @@ def implausible_values(
             rule,
             [
                 (measured, written)
-                for (_, written, _), outside in zip(judged, outside_by_rule, strict=True)
+                for (_, written, _), outside in zip(judged, implausible_by_rule, strict=True)
                 for measured in outside.get(rule.name, ())
             ],
         )

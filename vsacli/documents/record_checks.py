@@ -75,8 +75,10 @@ class DeclaredRecord:
         """
         record = replaced_unchecked(self, contents)
         fields = declared_fields(type(self))
-        by_field = (_problems_of_field(fields[name], name, content) for name, content in contents.items())
-        _refuse(record, chain.from_iterable(by_field))
+        problems_by_field = (
+            _problems_of_field(fields[name], name, content) for name, content in contents.items()
+        )
+        _refuse(record, chain.from_iterable(problems_by_field))
         _refuse(record, record._problems())
         return record
 
@@ -89,8 +91,8 @@ class DeclaredRecord:
 
 
 def _refuse(record: DeclaredRecord, problems: Iterable[FieldProblem]) -> None:
-    if refused := list(problems):
-        raise InvalidRecordError(type(record).__name__, refused)
+    if problem_list := list(problems):
+        raise InvalidRecordError(type(record).__name__, problem_list)
 
 
 def construct_unchecked(cls: type[_Record], values: Mapping[str, Any]) -> _Record:
@@ -102,8 +104,8 @@ def construct_unchecked(cls: type[_Record], values: Mapping[str, Any]) -> _Recor
 
 def replaced_unchecked(record: _Record, contents: Mapping[str, Any]) -> _Record:
     """Return a record with other values in some fields, without its checks and cached values."""
-    same = {name: getattr(record, name) for name in _defaults(type(record))}
-    return construct_unchecked(type(record), {**same, **contents})
+    values = {name: getattr(record, name) for name in _defaults(type(record))}
+    return construct_unchecked(type(record), {**values, **contents})
 
 
 _defaults: Callable[[type], Mapping[str, Any]] = cache(
@@ -159,8 +161,8 @@ def _number_problems(
 def _repeated_entries(key: str, content: Iterable[Any], path: FieldPath) -> Iterator[FieldProblem]:
     """Yield a problem for each entry of a list whose text under a key occurred before."""
     words = [getattr(entry, key) for entry in content]
-    for index, first in repetitions(words):
-        yield FieldProblem((*path, index, key), already_used(words[index], f"by entry {first}"))
+    for index, first_index in repetitions(words):
+        yield FieldProblem((*path, index, key), already_used(words[index], f"by entry {first_index}"))
 
 
 def _has_unit(kind: ValueKind) -> bool:
@@ -176,10 +178,10 @@ def _problem_in_units(kind: ValueKind, path: FieldPath, message: str) -> FieldPr
 
 def repetitions(words: Iterable[str | None]) -> Iterator[tuple[int, int]]:
     """Yield the index of each word that occurred before, and that of its first occurrence; skip None."""
-    seen: dict[str, int] = {}
+    first_indices: dict[str, int] = {}
     for index, word in enumerate(words):
-        if word is not None and seen.setdefault(word, index) != index:
-            yield index, seen[word]
+        if word is not None and first_indices.setdefault(word, index) != index:
+            yield index, first_indices[word]
 
 
 def already_used(word: str, where: str) -> str:
@@ -213,8 +215,8 @@ def _unprintable(content: str, allowed: str) -> str | None:
     """Return the problem of a text with control characters or writing-direction marks; None without one."""
     for letter in content:
         if not (letter.isprintable() or letter in allowed):
-            what = "has a line break" if letter == "\n" else f"has the character {letter!r}"
-            return f"{what}, which cannot be printed in one line; remove it"
+            fault = "has a line break" if letter == "\n" else f"has the character {letter!r}"
+            return f"{fault}, which cannot be printed in one line; remove it"
     return None
 
 

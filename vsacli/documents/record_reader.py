@@ -53,7 +53,7 @@ from vsacli.documents.record_checks import (
 )
 from vsacli.documents.tree import INVALID, NULLS, ListNode, MapNode, Node, Scope, TextNode, all_valid, quoted
 
-TRUTHS = ("true", "false")
+BOOLEAN_LITERALS = ("true", "false")
 WITHOUT_UNIT = NumberWithUnit(DIMENSIONLESS)
 NOT_TEXTS = BOOLEANS | NULLS
 """Words without quotes that are no texts in YAML, in lower case."""
@@ -66,22 +66,22 @@ def read_record(
     prefix = f"{label}: " if label else ""
     scope = scope_inside(scope, cls, node)
     fields = declared_fields(cls)
-    mistyped = _refuse_unknown_keys(cls, node, (*fields, *beside), scope)
+    mistyped_keys = _refuse_unknown_keys(cls, node, (*fields, *beside), scope)
     values: dict[str, Any] = {}
     for name, (field, default) in fields.items():
         if name in node.entries:
             values[name] = read_value(field.kind, node.entries[name], name, scope)
-        elif default is REQUIRED and name not in mistyped:
+        elif default is REQUIRED and name not in mistyped_keys:
             _note_missing(name, field, node, prefix, scope)
             values[name] = INVALID
-    valid = {name: content for name, content in values.items() if content is not INVALID}
-    problems = list(field_problems(cls, valid))
+    valid_values = {name: content for name, content in values.items() if content is not INVALID}
+    problems = list(field_problems(cls, valid_values))
     if problems:
         _note_field_problems(problems, fields, node, scope)
-    if problems or len(valid) < len(values) or not mistyped.isdisjoint(fields):
+    if problems or len(valid_values) < len(values) or not mistyped_keys.isdisjoint(fields):
         return INVALID
     try:
-        return cls.of_valid_fields(valid)
+        return cls.of_valid_fields(valid_values)
     except InvalidRecordError as error:
         _note_record_problems(error.fields, node, prefix, scope)
     except InputError as error:
@@ -93,8 +93,10 @@ def scope_inside(scope: Scope, cls: type, node: MapNode) -> Scope:
     """Return the scope of the values in a record."""
     if not hasattr(cls, "unit_variant"):
         return scope
-    chosen = _scalar_entry(node, cls.unit_variant)
-    return scope._replace(variant=variant_inside(cls, chosen.text if chosen else None, scope.variant))
+    variant_node = _scalar_entry(node, cls.unit_variant)
+    return scope._replace(
+        variant=variant_inside(cls, variant_node.text if variant_node else None, scope.variant)
+    )
 
 
 def _scalar_entry(node: Node, key: str) -> TextNode | None:
@@ -104,7 +106,7 @@ def _scalar_entry(node: Node, key: str) -> TextNode | None:
 
 def _refuse_unknown_keys(cls: type, node: MapNode, valid_keys: Collection[str], scope: Scope) -> set[str]:
     """Note unknown keys; return the known keys probably meant, which are then not reported as missing."""
-    meant: set[str] = set()
+    intended_keys: set[str] = set()
     for key, line in node.key_lines.items():
         if key in valid_keys:
             continue
@@ -112,8 +114,8 @@ def _refuse_unknown_keys(cls: type, node: MapNode, valid_keys: Collection[str], 
             scope.problems.add(line, f"{key!r} is not supported yet")
         else:
             scope.problems.add(line, f"unknown key {quoted(key)}{did_you_mean(key, valid_keys)}")
-            meant.update(filter(None, [nearest(key, valid_keys)]))
-    return meant - node.entries.keys()
+            intended_keys.update(filter(None, [nearest(key, valid_keys)]))
+    return intended_keys - node.entries.keys()
 
 
 def _note_missing(name: str, field: Field, node: MapNode, prefix: str, scope: Scope) -> None:
@@ -129,15 +131,17 @@ def _note_field_problems(
 ) -> None:
     """Note the problems of fields; joints with the same problem of a field share a message."""
     members = list(scope.members)
-    equal: dict[tuple[str, int, str, str], list[str]] = {}
+    joints_by_problem: dict[tuple[str, int, str, str], list[str]] = {}
     for problem in problems:
         name = str(problem.path[0])
-        of_joints = fields[name][0].kind.per_joint
-        joint = members[int(problem.path[-1])] if of_joints else ""
-        message = problem.in_units(scope.members[joint] if of_joints else scope.variant).message
-        fault = "" if of_joints else f"{name}: {problem.message}"
-        equal.setdefault((name, line_along(problem.path, node, scope), message, fault), []).append(joint)
-    for (name, line, message, fault), joints in equal.items():
+        is_per_joint = fields[name][0].kind.per_joint
+        joint = members[int(problem.path[-1])] if is_per_joint else ""
+        message = problem.in_units(scope.members[joint] if is_per_joint else scope.variant).message
+        fault = "" if is_per_joint else f"{name}: {problem.message}"
+        joints_by_problem.setdefault(
+            (name, line_along(problem.path, node, scope), message, fault), []
+        ).append(joint)
+    for (name, line, message, fault), joints in joints_by_problem.items():
         scope.problems.add(line, f"{name}{_joints_with_problem(joints, members)}: {message}", fault)
 
 
@@ -210,7 +214,7 @@ def _read_integer(_kind: Integer, node: Node, label: str, scope: Scope) -> Any:
 
 
 def _read_boolean(_kind: Boolean, node: Node, label: str, scope: Scope) -> Any:
-    if isinstance(node, TextNode) and node.plain and node.text in TRUTHS:
+    if isinstance(node, TextNode) and node.plain and node.text in BOOLEAN_LITERALS:
         return node.text == "true"
     return scope.unexpected(node, "true or false", label)
 
@@ -293,14 +297,16 @@ def _read_items_by_name(kind: ItemsByName, node: Node, label: str, scope: Scope)
         return INVALID
     records = []
     for name, entry in node.entries.items():
-        line, named = node.key_lines[name], entry
+        line, entry_with_name = node.key_lines[name], entry
         if isinstance(entry, MapNode):
             if kind.unique in entry.entries:
                 message = f"{label}.{name}: leave out {kind.unique!r}; the key {name!r} is the {kind.unique}"
                 scope.problems.add(entry.key_lines[kind.unique], message)
             entries = {**entry.entries, kind.unique: TextNode(line, name, plain=False)}
-            named = entry._replace(entries=entries, key_lines={**entry.key_lines, kind.unique: line})
-        records.append(read_value(kind.item, named, f"{label}.{name}", scope))
+            entry_with_name = entry._replace(
+                entries=entries, key_lines={**entry.key_lines, kind.unique: line}
+            )
+        records.append(read_value(kind.item, entry_with_name, f"{label}.{name}", scope))
     return all_valid(records)
 
 
@@ -308,9 +314,9 @@ def _note_repeated(key: str, node: ListNode, label: str, scope: Scope) -> bool:
     """Note the entries of a list whose text under a key occurred before; return whether there are any."""
     entries = [_scalar_entry(item, key) for item in node.items]
     repeated = list(repetitions(entry.text if entry else None for entry in entries))
-    for index, first in repeated:
-        line, before = (line_along((place, key), node, scope) for place in (index, first))
-        message = already_used(entries[index].text, f"in line {before}")  # type: ignore[union-attr]
+    for index, first_index in repeated:
+        line, first_line = (line_along((place, key), node, scope) for place in (index, first_index))
+        message = already_used(entries[index].text, f"in line {first_line}")  # type: ignore[union-attr]
         scope.problems.add(line, f"{label}.{key}: {message}")
     return bool(repeated)
 
@@ -318,8 +324,8 @@ def _note_repeated(key: str, node: ListNode, label: str, scope: Scope) -> bool:
 def _read_one_or_more(kind: OneOrMore, node: Node, label: str, scope: Scope) -> Any:
     if isinstance(node, ListNode):
         return _read_items(kind, node, label, scope)
-    one = read_value(kind.item, node, label, scope)
-    return one if one is INVALID else (one,)
+    single_value = read_value(kind.item, node, label, scope)
+    return single_value if single_value is INVALID else (single_value,)
 
 
 def _read_pair(kind: PairOf, node: Node, label: str, scope: Scope) -> Any:
@@ -329,8 +335,8 @@ def _read_pair(kind: PairOf, node: Node, label: str, scope: Scope) -> Any:
         scope.problems.add(node.line, f"{label}: expected {expected}, found the keys {keys}")
         return INVALID
     if not isinstance(node, ListNode):
-        both = read_value(kind.item, node, label, scope)
-        return both if both is INVALID else (both, both)
+        side_value = read_value(kind.item, node, label, scope)
+        return side_value if side_value is INVALID else (side_value, side_value)
     if len(node.items) != 2:
         return scope.unexpected(node, "one value for both sides or a list of 2", label)
     return all_valid([read_value(kind.item, item, label, scope) for item in node.items])
@@ -405,8 +411,8 @@ def _read_mapping(kind: RecordOf, node: Node, label: str, scope: Scope) -> Any:
         return read_record(kind.cls, node, label, scope)
     required = (name for name, (_, default) in declared_fields(kind.cls).items() if default is REQUIRED)
     keys = [name for name in required if name != getattr(kind.cls, "keyed_by", None)]
-    needed = f" with the {'key' if len(keys) == 1 else 'keys'} {', '.join(keys)}" if keys else ""
-    return scope.unexpected(node, f"a mapping{needed}", label)
+    keys_clause = f" with the {'key' if len(keys) == 1 else 'keys'} {', '.join(keys)}" if keys else ""
+    return scope.unexpected(node, f"a mapping{keys_clause}", label)
 
 
 def _read_one_of(kind: OneOf, node: Node, label: str, scope: Scope) -> Any:

@@ -73,29 +73,41 @@ def find_surroundings(path: str | os.PathLike[str]) -> Surroundings:
     except OSError:
         return Surroundings()
     lines = list(filled_lines(beginning, NO_HEADER))
-    for top in range(min(MOST_ABOVE, len(lines) - FEWEST_ROWS)):
-        texts = _texts_below([content for _, content in lines], top)
+    for top_index in range(min(MOST_ABOVE, len(lines) - FEWEST_ROWS)):
+        texts = _texts_below([content for _, content in lines], top_index)
         if texts is not None:
-            below = range(top + 1, top + 1 + len(texts))
-            numbers = tuple(lines[at][0] for at in (*range(top), *below))
-            return Surroundings(numbers, lines[top][0], texts[0] if texts else ())
+            text_indices = range(top_index + 1, top_index + 1 + len(texts))
+            numbers = tuple(lines[index][0] for index in (*range(top_index), *text_indices))
+            return Surroundings(numbers, lines[top_index][0], texts[0] if texts else ())
     return Surroundings()
 
 
-def _texts_below(lines: Sequence[str], top: int) -> list[tuple[str, ...]] | None:
+def _texts_below(lines: Sequence[str], top_index: int) -> list[tuple[str, ...]] | None:
     """Return the rows of texts below a line if it is a header or the first row of a table; else None."""
-    separator = separator_of(lines[top])
+    separator = separator_of(lines[top_index])
     rows = [tuple(cell.strip() for cell in split_cells(line, separator)) for line in lines]
-    width = len(rows[top])
-    if width < 2 or any(len(row) != width for row in rows[top:]):
+    width = len(rows[top_index])
+    if width < 2 or any(len(row) != width for row in rows[top_index:]):
         return None
-    values = [sum(_is_value(cell, separator) for cell in row) for row in rows]
-    is_row = [count > 0 or all(map(is_missing, row)) for row, count in zip(rows, values, strict=True)]
-    first = next((at for at in range(top + 1, len(rows)) if is_row[at]), len(rows))
-    enough = len(rows) - first >= FEWEST_ROWS and all(is_row[first:]) and first - top <= 1 + MOST_TEXTS
-    rows_above = any(len(row) == width <= 2 * count for row, count in zip(rows[:top], values, strict=False))
-    late = any(map(_names_times, rows[top + 1 : first])) and not _names_times(rows[top])
-    return rows[top + 1 : first] if enough and not rows_above and not late else None
+    value_counts = [sum(_is_value(cell, separator) for cell in row) for row in rows]
+    is_row = [count > 0 or all(map(is_missing, row)) for row, count in zip(rows, value_counts, strict=True)]
+    first_row = next((index for index in range(top_index + 1, len(rows)) if is_row[index]), len(rows))
+    has_enough_rows = (
+        len(rows) - first_row >= FEWEST_ROWS
+        and all(is_row[first_row:])
+        and first_row - top_index <= 1 + MOST_TEXTS
+    )
+    rows_above = any(
+        len(row) == width <= 2 * count for row, count in zip(rows[:top_index], value_counts, strict=False)
+    )
+    is_below_header = any(map(_names_times, rows[top_index + 1 : first_row])) and not _names_times(
+        rows[top_index]
+    )
+    return (
+        rows[top_index + 1 : first_row]
+        if has_enough_rows and not rows_above and not is_below_header
+        else None
+    )
 
 
 def _names_times(row: Sequence[str]) -> bool:
@@ -120,8 +132,8 @@ def naming_lines_to_skip(name: str, skipped: Collection[int]) -> Iterator[None]:
         lines, header, units = find_surroundings(name)
         if set(lines) <= set(skipped):
             raise
-        above = sum(line < header for line in lines)
-        clauses = [f"{counted(above, 'line')} above the header in line {header}"] if above else []
+        above_count = sum(line < header for line in lines)
+        clauses = [f"{counted(above_count, 'line')} above the header in line {header}"] if above_count else []
         clauses += [f"below it a row of texts, such as units: {', '.join(units)[:60]}"] if units else []
         message = (
             f"has {' and '.join(clauses)}; leave them out by skip_rows: {list(lines)} next to `file` or in a"
@@ -190,13 +202,16 @@ class CsvTable:
 
     def without_hollow_columns(self) -> CsvTable:
         """Return the columns that hold a number; the others become `hollow`."""
-        empty = np.isnan(self.values).all(axis=0) & (len(self.values) > 0)
-        if not empty.any():
+        is_empty = np.isnan(self.values).all(axis=0) & (len(self.values) > 0)
+        if not is_empty.any():
             return self
-        full = np.flatnonzero(~empty).tolist()
-        hollow = tuple(split_heading(self.columns[index])[0] for index in np.flatnonzero(empty).tolist())
+        full_indices = np.flatnonzero(~is_empty).tolist()
+        hollow = tuple(split_heading(self.columns[index])[0] for index in np.flatnonzero(is_empty).tolist())
         return replace(
-            self, columns=tuple(self.columns[at] for at in full), values=self.values[:, full], hollow=hollow
+            self,
+            columns=tuple(self.columns[at] for at in full_indices),
+            values=self.values[:, full_indices],
+            hollow=hollow,
         )
 
     def with_joined_rows(self) -> CsvTable:
@@ -213,13 +228,13 @@ class CsvTable:
         intervals = np.abs(np.diff(stamps[has_number[:, int(np.argmax(has_number.sum(axis=0)))]]))
         # seconds since 1970 have 7 decimals in floating point
         rounding = 2 * float(np.spacing(np.abs(stamps).max()))
-        near = max(rounding, SAME_STAMP * float(np.median(intervals)) if intervals.size else 0.0)
-        starts = np.append(0, np.flatnonzero(~(np.abs(np.diff(stamps)) <= near)) + 1)
-        filled = np.add.reduceat(has_number.astype(int), starts, axis=0)
-        if len(starts) == len(stamps) or filled.max() > 1:
+        stamp_tolerance = max(rounding, SAME_STAMP * float(np.median(intervals)) if intervals.size else 0.0)
+        starts = np.append(0, np.flatnonzero(~(np.abs(np.diff(stamps)) <= stamp_tolerance)) + 1)
+        filled_counts = np.add.reduceat(has_number.astype(int), starts, axis=0)
+        if len(starts) == len(stamps) or filled_counts.max() > 1:
             return self
         values = np.add.reduceat(np.nan_to_num(self.values), starts, axis=0)
-        values[:, self._signals] = np.where(filled > 0, values[:, self._signals], np.nan)
+        values[:, self._signals] = np.where(filled_counts > 0, values[:, self._signals], np.nan)
         values[:, time_column] = stamps[starts]
         kept = starts if self.kept is None else self.kept[starts]
         return replace(self, values=values, kept=kept, joined=len(stamps) - len(starts))
@@ -246,8 +261,8 @@ class RowLines:
 
     def of(self, row: int) -> int:
         """Return the line number of a row counted from 0; 0 if the file no longer exists."""
-        place = row if self.kept is None else int(self.kept[row])
-        return int(self._numbers[place]) if place < len(self._numbers) else 0
+        file_row = row if self.kept is None else int(self.kept[row])
+        return int(self._numbers[file_row]) if file_row < len(self._numbers) else 0
 
     @cached_property
     def _numbers(self) -> IndexArray:
@@ -290,7 +305,7 @@ def read_table(
                     content,
                     name,
                     strict=not mapping,
-                    numbered=mapping.numbers,
+                    numbered_columns=mapping.numbers,
                     skipped=mapping.skip_rows,
                 )
                 digest, text = _digest_and_text(content, name)

@@ -103,14 +103,16 @@ def read_clock(text: str) -> ClockTime | None:
     if match["half"]:
         hours = hours % 12 + 12 * (match["half"].upper() == "PM")
     fraction = (match["fraction"] or match["after_colon"] or "").ljust(DIGITS, "0")[:DIGITS]
-    whole = hours * 3600 + int(match["minutes"]) * 60 + int(match["seconds"]) - _zone_offset(match["zone"])
+    total_seconds = (
+        hours * 3600 + int(match["minutes"]) * 60 + int(match["seconds"]) - _zone_offset(match["zone"])
+    )
     if match["year"] is not None:
         try:
             day = date(int(match["year"]), int(match["month"]), int(match["day"]))
         except ValueError:
             return None
-        whole += (day.toordinal() - date(1970, 1, 1).toordinal()) * 86400
-    return ClockTime(whole * NANOSECONDS + int(fraction), match["year"] is not None)
+        total_seconds += (day.toordinal() - date(1970, 1, 1).toordinal()) * 86400
+    return ClockTime(total_seconds * NANOSECONDS + int(fraction), match["year"] is not None)
 
 
 def _zone_offset(zone: str | None) -> int:
@@ -126,16 +128,16 @@ def nanoseconds_since_first(clocks: Sequence[ClockTime]) -> npt.NDArray[np.int64
 
     A time of day that is more than twelve hours earlier than the one before it belongs to the next day.
     """
-    since = np.array([each.nanoseconds for each in clocks], dtype=np.int64)
+    elapsed = np.array([each.nanoseconds for each in clocks], dtype=np.int64)
     if not clocks[0].dated:
-        since[1:] += DAY * np.cumsum(np.diff(since) < -12 * HOUR)
-    return np.asarray(since - since[0])
+        elapsed[1:] += DAY * np.cumsum(np.diff(elapsed) < -12 * HOUR)
+    return np.asarray(elapsed - elapsed[0])
 
 
 def unit_of_steps(step: float) -> str | None:
     """Return the first unit other than the second in which a sampling interval is a usual one."""
-    low, high = USUAL_STEPS
-    return next((unit for unit, size in UNITS.items() if low <= step * size <= high), None)
+    min_step, max_step = USUAL_STEPS
+    return next((unit for unit, size in UNITS.items() if min_step <= step * size <= max_step), None)
 
 
 def guessed_unit(stamps: Sequence[float]) -> tuple[str | None, str]:

@@ -33,20 +33,22 @@ def divide_changes_by_file(changes: Changes) -> ChangesByFile:
     by_file = ChangesByFile({}, {})
     for (path, value), change in zip(changes.items(), format_changes(changes), strict=True):
         check_path_of_change(path, change)
-        first = path.partition(".")[0]
-        if first not in robot and first not in trajectory:
-            hint = _hint(path, [key for key in (*robot, *trajectory) if key not in KEPT])
-            raise ChangeError.of(change, f"neither robot nor trajectory has {first!r} at the top level{hint}")
-        of = by_file.robot if first in robot else by_file.trajectory
-        of[path] = value  # type: ignore[index]
+        first_key = path.partition(".")[0]
+        if first_key not in robot and first_key not in trajectory:
+            hint = _path_suggestion(path, [key for key in (*robot, *trajectory) if key not in KEPT])
+            raise ChangeError.of(
+                change, f"neither robot nor trajectory has {first_key!r} at the top level{hint}"
+            )
+        file_changes = by_file.robot if first_key in robot else by_file.trajectory
+        file_changes[path] = value  # type: ignore[index]
     return by_file
 
 
-def _hint(path: str, keys: Sequence[str]) -> str:
+def _path_suggestion(path: str, keys: Sequence[str]) -> str:
     """Return a clause with the paths that end with this one, or else the nearest of the keys at the top."""
-    word = path.rpartition(".")[2]
-    valid = dict.fromkeys((*declared_paths(RobotFile), *declared_paths(OF_ANY_ROBOT)))
-    for ending in (path, word if nearest(path.partition(".")[0], keys) is None else path):
-        if longer := [each for each in valid if each.endswith(f".{ending}")]:
+    last_key = path.rpartition(".")[2]
+    valid_paths = dict.fromkeys((*declared_paths(RobotFile), *declared_paths(OF_ANY_ROBOT)))
+    for ending in (path, last_key if nearest(path.partition(".")[0], keys) is None else path):
+        if longer := [each for each in valid_paths if each.endswith(f".{ending}")]:
             return f"; did you mean {listed(longer, MOST_NEAR)}?"
     return did_you_mean(path.partition(".")[0], keys)

@@ -110,25 +110,25 @@ class TrajectoryFile(DeclaredRecord):
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:
         """Yield the problems of formulas that cannot last this long, in s."""
         for signal, formula in self.formulas.items():
-            place = signal.key.split(".")
-            yield from (problem.inside(*place) for problem in formula.problems_over(duration))
+            path = signal.key.split(".")
+            yield from (problem.inside(*path) for problem in formula.problems_over(duration))
 
     def _wrench_problems(self) -> Iterator[FieldProblem]:
         """Yield the problems of wrenches on tools that the robot does not have, or that are not named."""
-        declared: tuple[Declaration, ...] = getattr(self, WRENCHES) or ()
+        declarations: tuple[Declaration, ...] = getattr(self, WRENCHES) or ()
         key = WRENCH.key if getattr(self, WRENCH.key) else WRENCHES
-        if declared and key == WRENCH.key:
+        if declarations and key == WRENCH.key:
             yield FieldProblem((key,), f"give `{key}` or `{WRENCHES}`, not both")
-        elif self.tools == () and (declared or key == WRENCH.key):
+        elif self.tools == () and (declarations or key == WRENCH.key):
             yield FieldProblem((key,), "the robot has no tools; name them by `tools` in its file")
         elif self.tools is not None and len(self.tools) > 1 and key == WRENCH.key:
             example = f"{WRENCHES}: {{{self.tools[0]}: {{type: ..., frame: ..., ...}}}}"
             yield FieldProblem((key,), f"the robot has the tools {', '.join(self.tools)}; give `{example}`")
         elif self.tools is not None:
-            for each in declared:
+            for each in declarations:
                 if each.name not in self.tools:
-                    hint = did_you_mean(each.name, self.tools)
-                    yield FieldProblem((key, each.name), f"the robot has no tool {each.name!r}{hint}")
+                    suggestion = did_you_mean(each.name, self.tools)
+                    yield FieldProblem((key, each.name), f"the robot has no tool {each.name!r}{suggestion}")
 
     def _device_problems(self) -> Iterator[FieldProblem]:
         for signal in self.declared:
@@ -179,16 +179,18 @@ def trajectory_file_class(
     """
     fields = {POSITION.key: value(declared_as(Use(POSITION, rigid)), POSITION.meaning)}
     for key, signal in COMMANDED.items():
-        needed = key in taken and signal.device is None
-        meaning = signal.meaning + ("; may be absent if there are none" if needed else "")
-        fields[key] = value(declared_as(Use(signal)), meaning, default=REQUIRED if needed else None)
+        is_required = key in taken and signal.device is None
+        meaning = signal.meaning + ("; may be absent if there are none" if is_required else "")
+        fields[key] = value(declared_as(Use(signal)), meaning, default=REQUIRED if is_required else None)
     fields[WRENCH.key] = value(declared_as(Use(WRENCH)), WRENCH.meaning, default=None)
     by_tool = ItemsByName(declared_as(Use(WRENCH, by_tool=True)), "tool")
     meaning = "wrenches by tool, for a robot with several: each as `wrench`, with its own frame"
     fields[WRENCHES] = value(by_tool, meaning, default=None)
-    signals = [(name, Any, field) for name, field in fields.items()]
-    further = {"__doc__": TrajectoryFile.__doc__, "untaken": untaken, "tools": tools}
-    return make_dataclass("TrajectoryFile", signals, bases=(TrajectoryFile,), namespace=further, frozen=True)
+    signal_fields = [(name, Any, field) for name, field in fields.items()]
+    namespace = {"__doc__": TrajectoryFile.__doc__, "untaken": untaken, "tools": tools}
+    return make_dataclass(
+        "TrajectoryFile", signal_fields, bases=(TrajectoryFile,), namespace=namespace, frozen=True
+    )
 
 
 OF_ANY_ROBOT = trajectory_file_class(frozenset(), rigid=True)
@@ -263,11 +265,11 @@ def declared_trajectory(
     document, source = apply_changes(*read_trajectory(path, joints), changes, joints.types, joints.exempt)
     recordings = _read_recordings(document, Path(path).parent, joints, progress)
     with _blaming_change(changes, "rate"):
-        declared = _declared_times(document, recordings, source.path)
+        declared_times = _declared_times(document, recordings, source.path)
     if recordings:
-        _check_lasting(document, declared, source.path, joints.names)
+        _check_lasting(document, declared_times, source.path, joints.names)
     times, profiles = _stretch_profiles(
-        document.slow_down, declared, _declared_profiles(document, declared, recordings)
+        document.slow_down, declared_times, _declared_profiles(document, declared_times, recordings)
     )
     motion = profiles[POSITION.key] if POSITION in document.formulas else None
     numbers = tuple(numbers_in_record(document, joints.types))
@@ -279,12 +281,12 @@ def declared_trajectory(
         name=document.name,
         warnings=[
             *(warning for recording in recordings for warning in recording.warnings),
-            *_formula_warnings(document, declared, joints),
+            *_formula_warnings(document, declared_times, joints),
             *trajectory_findings(robot, numbers, times, motion, source),
         ],
         notes=[
             *(note for recording in recordings for note in recording.notes),
-            *_formula_notes(document, declared),
+            *_formula_notes(document, declared_times),
         ],
         sources=[source, *(recording.source for recording in recordings)],
     )
@@ -337,19 +339,19 @@ def _read_recordings(
     from vsacli.documents.column_mapping import ColumnMapping
     from vsacli.trajectory.recorded.recording import read_recorded_signals
 
-    wanted: dict[Path, dict[Signal, FitChoice]] = defaultdict(dict)
+    fits_by_file: dict[Path, dict[Signal, FitChoice]] = defaultdict(dict)
     mappings: dict[Path, ColumnMapping] = defaultdict(lambda: ColumnMapping(rate=document.rate))
-    for signal, declared in document.recorded.items():
-        file = folder / declared.file
-        wanted[file][signal] = declared.fit_choice
-        mappings[file] = mappings[file].combined_with(declared.mapping)
+    for signal, declaration in document.recorded.items():
+        file = folder / declaration.file
+        fits_by_file[file][signal] = declaration.fit_choice
+        mappings[file] = mappings[file].combined_with(declaration.mapping)
 
     resampled, unwrap = document.rate is not None, getattr(document.recorded.get(POSITION), "unwrap", False)
     recordings = [
         read_recorded_signals(
             file, joints, fits, mappings[file], resampled=resampled, unwrap=unwrap, progress=progress
         )
-        for file, fits in wanted.items()
+        for file, fits in fits_by_file.items()
     ]
     for other in recordings[1:]:
         recordings[0].check_times(other)
@@ -378,14 +380,14 @@ def _declared_wrench(
     document: TrajectoryFile, profiles: Mapping[str, Profile], joints: CommandedJoints
 ) -> WrenchProfile | None:
     """Return the wrenches on the tools; None without any."""
-    declared = {signal: each for signal, each in document.declared.items() if signal.components}
-    if not declared:
+    declarations = {signal: each for signal, each in document.declared.items() if signal.components}
+    if not declarations:
         return None
     frames = dict.fromkeys(joints.wrenches.values()) | {
-        signal: each.frame for signal, each in declared.items()
+        signal: each.frame for signal, each in declarations.items()
     }
-    frame = next(iter(declared.values())).frame if len(joints.tools) == 1 else tuple(frames.values())
-    return WrenchProfile({signal: profiles[signal.key] for signal in declared}, frame)
+    frame = next(iter(declarations.values())).frame if len(joints.tools) == 1 else tuple(frames.values())
+    return WrenchProfile({signal: profiles[signal.key] for signal in declarations}, frame)
 
 
 def _stretch_profiles(

@@ -90,9 +90,9 @@ class WrenchProfile:
         expected = len(WRENCH_AXES) if by_tool else wrench_components(self.frame)
         for profile in self.profiles.values():
             if profile.components != expected:
-                each = "" if by_tool or isinstance(self.frame, str) else ", of each tool"
-                of_tool = f"{expected} ({', '.join(WRENCH_AXES)}{each})"
-                raise InputError.one(f"the wrench has {profile.components} components, not {of_tool}")
+                tool_clause = "" if by_tool or isinstance(self.frame, str) else ", of each tool"
+                expected_text = f"{expected} ({', '.join(WRENCH_AXES)}{tool_clause})"
+                raise InputError.one(f"the wrench has {profile.components} components, not {expected_text}")
 
     @property
     def profiles(self) -> Mapping[Signal, Profile]:
@@ -108,14 +108,14 @@ class WrenchProfile:
 
         They are zero on tools on which nothing acts.
         """
-        parts = {signal: rows(profile) for signal, profile in self.profiles.items()}
-        if WRENCH in parts:
-            return parts[WRENCH]
-        orders, _, samples = next(iter(parts.values())).shape
-        joined = np.zeros((orders, wrench_components(self.frame), samples))
-        for signal, part in parts.items():
-            joined[:, signal.columns] = part
-        return joined
+        rows_by_signal = {signal: rows(profile) for signal, profile in self.profiles.items()}
+        if WRENCH in rows_by_signal:
+            return rows_by_signal[WRENCH]
+        orders, _, samples = next(iter(rows_by_signal.values())).shape
+        wrench_rows = np.zeros((orders, wrench_components(self.frame), samples))
+        for signal, profile_rows in rows_by_signal.items():
+            wrench_rows[:, signal.columns] = profile_rows
+        return wrench_rows
 
     def changed(self, change: Callable[[Signal, Profile], Profile]) -> WrenchProfile:
         """Return the wrenches with `change` applied to each of `profiles`."""

@@ -60,10 +60,10 @@ class UniformTimes:
                 f"duration and rate must be positive, not {self.duration:.4g} s and {self.rate:.4g} Hz"
             )
         if self.duration * self.rate > MAX_STEPS:
-            samples, most = f"{self.duration * self.rate:.4g}", f"{MAX_STEPS:.4g}"
+            samples, max_samples = f"{self.duration * self.rate:.4g}", f"{MAX_STEPS:.4g}"
             raise InputError.one(
                 f"duration {self.duration:.4g} s times rate {self.rate:.4g} Hz gives {samples} samples; "
-                f"at most {most} are possible; lower rate or duration"
+                f"at most {max_samples} are possible; lower rate or duration"
             )
 
     @property

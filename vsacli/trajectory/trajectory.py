@@ -99,7 +99,7 @@ class Trajectory:
         sources: files that the trajectory was read from.
     """
 
-    _of_functions = False
+    _is_functional = False
     """Whether samples are values of smooth functions, like those at any other time."""
 
     def __init__(
@@ -122,10 +122,10 @@ class Trajectory:
             InputError: the numbers of joints or the spans differ.
         """
         self.times, self.position, self.wrench, self.name = times, position, wrench, name
-        nothing = (math.nan,) * self.joints
+        no_command = (math.nan,) * self.joints
         self.commanded = {
             key: commanded.get(key)
-            or ConstantProfile(signal=signal, span=(0.0, self.duration), value=nothing)
+            or ConstantProfile(signal=signal, span=(0.0, self.duration), value=no_command)
             for key, signal in COMMANDED.items()
             if key in commanded or signal.device is None
         }
@@ -136,8 +136,8 @@ class Trajectory:
     @property
     def located_warnings(self) -> tuple[Problem, ...]:
         """Warnings about times and profiles, with the line of a value in the file if known."""
-        of_profiles = (each for _, profile in self.profiles() for each in profile.warnings)
-        messages = (*self._source_warnings, *of_profiles)
+        profile_warnings = (each for _, profile in self.profiles() for each in profile.warnings)
+        messages = (*self._source_warnings, *profile_warnings)
         return tuple(each if isinstance(each, Problem) else Problem("", 0, each) for each in messages)
 
     @property
@@ -148,14 +148,14 @@ class Trajectory:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on the interpretation of times and profiles, where that is not obvious."""
-        of_profiles = (each for _, profile in self.profiles() for each in profile.notes)
-        return (*self._source_notes, *self.times.notes, *of_profiles)
+        profile_notes = (each for _, profile in self.profiles() for each in profile.notes)
+        return (*self._source_notes, *self.times.notes, *profile_notes)
 
     def __repr__(self) -> str:
         first, last = self.times.span
-        pushed = "" if self.wrench is None else ", with a wrench"
-        size = f"{self.joints} joints, {self.samples} samples, {first:g} to {last:g} s"
-        return f"Trajectory {self.name}: {size}{pushed}"
+        wrench_clause = "" if self.wrench is None else ", with a wrench"
+        size_text = f"{self.joints} joints, {self.samples} samples, {first:g} to {last:g} s"
+        return f"Trajectory {self.name}: {size_text}{wrench_clause}"
 
     def _repr_html_(self) -> str:
         from html import escape  # needed only in notebooks
@@ -247,8 +247,10 @@ class Trajectory:
             for signal in arrays_by_signal
             if signal.is_wrench and signal.key in profiles
         }
-        exerted = WrenchProfile(wrenches, wrench_frame) if wrenches else None
-        return cls(times, profiles[POSITION.key], profiles, wrench=exerted, name=name, warnings=warnings)
+        wrench_profile = WrenchProfile(wrenches, wrench_frame) if wrenches else None
+        return cls(
+            times, profiles[POSITION.key], profiles, wrench=wrench_profile, name=name, warnings=warnings
+        )
 
     @property
     def joints(self) -> int:
@@ -263,11 +265,11 @@ class Trajectory:
 
     def commanding(self, signal: Signal, value: tuple[float, ...], note: str) -> Trajectory:
         """Return the trajectory with a constant as a further signal; NaN for joints it does not command."""
-        same = copy(self)
+        commanded_trajectory = copy(self)
         constant = ConstantProfile(signal=signal, span=(0.0, self.duration), value=value)
-        same.commanded = {**self.commanded, signal.key: constant}
-        same._source_notes = (*self._source_notes, note)
-        return same
+        commanded_trajectory.commanded = {**self.commanded, signal.key: constant}
+        commanded_trajectory._source_notes = (*self._source_notes, note)
+        return commanded_trajectory
 
     @property
     def samples(self) -> int:
@@ -288,7 +290,7 @@ class Trajectory:
     def block(self, start: int, stop: int) -> Motion:
         """Return the motion at samples start..stop-1; like a slice, clipped at the last sample."""
         time = self.times.block(start, stop)
-        if self._of_functions:
+        if self._is_functional:
             return self.at(time)
         return self._motion(time, lambda profile: profile.samples(start, stop, time - self.start))
 
@@ -303,16 +305,16 @@ class Trajectory:
 
     def _motion(self, time: FloatArray, rows: Callable[[Profile], FloatArray]) -> Motion:
         """Return the motion at times, (samples,) or (), from a function that gives the rows of a profile."""
-        shaped: Callable[[FloatArray], FloatArray] = over_time if time.ndim else itemgetter((..., 0))
+        over_samples: Callable[[FloatArray], FloatArray] = over_time if time.ndim else itemgetter((..., 0))
         commanded = {
-            name: shaped(row)
+            name: over_samples(row)
             for key, profile in self.commanded.items()
             for name, row in zip(COMMANDED[key].names, rows(profile), strict=True)
         }
         wrench = None
         if self.wrench is not None:
-            wrench = Wrench(*map(shaped, self.wrench.rows(rows)), frame=self.wrench.frame)
-        q, dq, ddq, d3q, d4q = map(shaped, rows(self.position))
+            wrench = Wrench(*map(over_samples, self.wrench.rows(rows)), frame=self.wrench.frame)
+        q, dq, ddq, d3q, d4q = map(over_samples, rows(self.position))
         return Motion(time, q, dq, ddq, d3q, d4q, commanded, wrench=wrench)
 
     @property
@@ -361,7 +363,7 @@ class Trajectory:
     def sampled(self, times: Times) -> Trajectory:
         """Return the same functions at other sample times, from the first time on and not beyond the last."""
         derived = self._derived(lambda _, profile: profile, times)
-        derived._of_functions = True
+        derived._is_functional = True
         return derived
 
     def from_zero(self) -> Trajectory:
@@ -378,7 +380,7 @@ class Trajectory:
     @property
     def known_between(self) -> bool:
         """Whether `at` agrees with the samples; False if derivatives are given there alone."""
-        return self._of_functions or all(profile.known_between for _, profile in self.profiles())
+        return self._is_functional or all(profile.known_between for _, profile in self.profiles())
 
     @property
     def breakpoints(self) -> FloatArray:
@@ -394,16 +396,21 @@ class Trajectory:
             profiles are analytic. Each piece gets as many times as evenly spread ones fall into it, respaced
             evenly within the piece. Pieces too narrow for differences are skipped.
         """
-        ends = self.breakpoints
-        wide = np.diff(ends) > NARROWEST_PIECE * self.duration
-        starts, stops = ends[:-1][wide], ends[1:][wide]
-        spread = ends[0] + self.duration * (np.arange(count) + 0.5) / count
-        after = np.searchsorted(starts, spread, side="right") - 1
-        piece, which, hits = np.unique(np.maximum(after, 0), return_inverse=True, return_counts=True)
-        rank = np.arange(count) - (np.cumsum(hits) - hits)[which]
-        left, right = starts[piece][which], stops[piece][which]
-        time = left + (right - left) * (rank + 0.5) / hits[which]
-        return time, np.minimum(time - left, right - time)
+        piece_ends = self.breakpoints
+        is_wide = np.diff(piece_ends) > NARROWEST_PIECE * self.duration
+        starts, stops = piece_ends[:-1][is_wide], piece_ends[1:][is_wide]
+        spread_times = piece_ends[0] + self.duration * (np.arange(count) + 0.5) / count
+        piece_indices = np.searchsorted(starts, spread_times, side="right") - 1
+        pieces, piece_of_time, times_per_piece = np.unique(
+            np.maximum(piece_indices, 0), return_inverse=True, return_counts=True
+        )
+        rank_in_piece = np.arange(count) - (np.cumsum(times_per_piece) - times_per_piece)[piece_of_time]
+        piece_starts, piece_stops = starts[pieces][piece_of_time], stops[pieces][piece_of_time]
+        time = (
+            piece_starts
+            + (piece_stops - piece_starts) * (rank_in_piece + 0.5) / times_per_piece[piece_of_time]
+        )
+        return time, np.minimum(time - piece_starts, piece_stops - time)
 
 
 def _wrenches_by_tool(
@@ -417,34 +424,34 @@ def _wrenches_by_tool(
     if isinstance(frame, str):
         return {WRENCH: tuple(arrays)}
     shape = (samples, len(frame), len(WRENCH_AXES))
-    by_tool: dict[str, FloatArray | None] = dict.fromkeys(WRENCH.names)
+    arrays_by_name: dict[str, FloatArray | None] = dict.fromkeys(WRENCH.names)
     for name, array in zip(WRENCH.names, arrays, strict=True):
         if array is not None:
-            numbers = np.asarray(array, dtype=np.float64)
-            if numbers.shape not in (shape, (samples, shape[1] * shape[2])):
-                raise InputError.one(f"{name} has the shape {numbers.shape}, expected {shape}")
-            by_tool[name] = numbers = numbers.reshape(shape)
-            for tool, of_tool in enumerate(frame):
-                if of_tool is None and numbers[:, tool].any():
+            wrench_array = np.asarray(array, dtype=np.float64)
+            if wrench_array.shape not in (shape, (samples, shape[1] * shape[2])):
+                raise InputError.one(f"{name} has the shape {wrench_array.shape}, expected {shape}")
+            arrays_by_name[name] = wrench_array = wrench_array.reshape(shape)
+            for tool, tool_frame in enumerate(frame):
+                if tool_frame is None and wrench_array[:, tool].any():
                     raise InputError.one(f"a {name} is given for tool {tool}, which has no frame")
     return {
         wrench_on(f"tool_{tool}", tool): tuple(
-            None if rows is None else rows[:, tool] for rows in by_tool.values()
+            None if rows is None else rows[:, tool] for rows in arrays_by_name.values()
         )
-        for tool, of_tool in enumerate(frame)
-        if of_tool is not None
+        for tool, tool_frame in enumerate(frame)
+        if tool_frame is not None
     }
 
 
 def _arrays_by_signal(
-    of_joints: Mapping[str, ArrayLike | None],
+    arrays_by_name: Mapping[str, ArrayLike | None],
 ) -> dict[Signal, tuple[ArrayLike | None, ...]]:
     """Return commanded signals with their derivatives, from arrays by name.
 
     Raises:
         TypeError: a signal does not exist.
     """
-    unknown = of_joints.keys() - set(commanded_names())
-    if unknown:
-        raise TypeError(f"no signal is called {', '.join(sorted(unknown))}")
-    return {signal: tuple(map(of_joints.get, signal.names)) for signal in COMMANDED.values()}
+    unknown_names = arrays_by_name.keys() - set(commanded_names())
+    if unknown_names:
+        raise TypeError(f"no signal is called {', '.join(sorted(unknown_names))}")
+    return {signal: tuple(map(arrays_by_name.get, signal.names)) for signal in COMMANDED.values()}

@@ -162,7 +162,7 @@ def read_first_rows(path: str | os.PathLike[str]) -> FirstRows:
     """
     name = os.fspath(path)
     lines, _, units = find_surroundings(name)
-    header = read_header(name, numbered=(1,), skipped=lines)
+    header = read_header(name, numbered_columns=(1,), skipped=lines)
     decimal_point = "," if header.separator == "," else "."
     rows = islice(RowsToRead(name, header, (), empty_cells=True).texts(), FIRST_ROWS)
     cells = [[cell.replace(",", decimal_point) for cell in row] for _, row in rows]

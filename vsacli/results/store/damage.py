@@ -23,7 +23,7 @@ from vsacli.base.arrays import FloatArray
 from vsacli.base.did_you_mean import near_file
 from vsacli.base.errors import InputError, StorageError
 from vsacli.documents.source import HDF5_SIGNATURE
-from vsacli.trajectory.curves.closed_form import LONGEST
+from vsacli.trajectory.curves.closed_form import MAX_DURATION
 
 SCALES = "DIMENSION_LIST"
 """Attribute of HDF5 datasets with coordinates."""
@@ -262,7 +262,7 @@ def check_times(time: FloatArray) -> None:
     if not ascending.all():
         sample = int(np.argmin(ascending))
         raise DamageError(f"{time[sample + 1]:.9g} s follows {time[sample]:.9g} s, at sample {sample + 1}")
-    if time.size and not max(-time[0], time[-1]) <= LONGEST:
+    if time.size and not max(-time[0], time[-1]) <= MAX_DURATION:
         raise DamageError(f"they go from {time[0]:.3g} to {time[-1]:.3g} s")
 
 

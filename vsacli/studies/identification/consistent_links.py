@@ -34,31 +34,31 @@ WEIGHT = 1.0
 determines little, links should deviate by a standard error rather than be far from the file. With 0.01, a
 link came out with 141 kg."""
 
-WITHIN = 3.0
+MAX_LINK_DEVIATION = 3.0
 """Largest deviation of consistent links from the result, in standard errors: one of forty parameters exceeds
 two by chance."""
 
-LEAST_MASS = 1e-3
+MIN_MASS_SHARE = 1e-3
 """Mass of the reference body for a link without mass, relative to the heaviest link."""
 
-LEAST_RADIUS = 5e-3
+MIN_GYRATION_RADIUS = 5e-3
 """Radius of gyration of the reference body for a link without inertia, m."""
 
-SIGNED = 10.0
+SIGNED_SHIFT = 10.0
 """Shift of a parameter of any sign, such as an offset, relative to its size, that makes it a positive one."""
 
-SHARP = 1e-6
+MIN_STANDARD_ERROR = 1e-6
 """Lower bound of standard errors, relative to the value or 1, so that exact recordings have a covariance."""
 
-LIGHTER = 2.0
+WEIGHT_RATIO = 2.0
 """Ratio of successive weights that lead from the file's links to the identified ones, each minimum being the
 next start. With 10, a quarter of random arms a thousand standard errors away did not converge; with 3, all
 did."""
 
-STEPS = 100
+MAX_NEWTON_STEPS = 100
 """Limit on Newton steps per weight; one to ten suffice."""
 
-ARRIVED = 1e-6
+DECREMENT_TOLERANCE = 1e-6
 """Newton decrement at a minimum: half its square is the remaining gain. Steps by 1/(1 + decrement) keep links
 consistent (S. Boyd, L. Vandenberghe, Convex Optimization, 2004, section 9.6)."""
 
@@ -82,7 +82,7 @@ class LinkEstimate(NamedTuple):
     @property
     def spread(self) -> FloatArray:
         """Covariance that is not singular for recordings without noise."""
-        errors = SHARP * np.maximum(np.abs(self.values), 1.0)
+        errors = MIN_STANDARD_ERROR * np.maximum(np.abs(self.values), 1.0)
         return np.asarray(self.covariance + np.diag(errors**2))
 
 
@@ -103,7 +103,7 @@ class ConsistentLinks(NamedTuple):
     @property
     def within(self) -> bool:
         """Whether consistent links agree with the result within its errors."""
-        return bool(np.all(np.abs(self.off) <= WITHIN))
+        return bool(np.all(np.abs(self.off) <= MAX_LINK_DEVIATION))
 
 
 def consistent_links(robot: Robot, estimate: LinkEstimate) -> ConsistentLinks:
@@ -116,18 +116,20 @@ def consistent_links(robot: Robot, estimate: LinkEstimate) -> ConsistentLinks:
     if not len(estimate.values):
         return ConsistentLinks((), estimate.values)
     bodies = np.concatenate([_body_near(joint.link, robot) for joint in robot.joints])
-    parts, shift = _parts_near(estimate, len(bodies))
-    root = np.asarray(np.linalg.cholesky(estimate.spread), dtype=np.float64)
-    problem = _ConsistencyProblem.of(estimate, root, bodies, parts, shift)
-    of_links, of_parts = _nearest_parameters(problem, np.concatenate((bodies, parts)))
-    found = np.concatenate((of_links.ravel(), of_parts))
-    off = (estimate.shares @ found - estimate.values) / np.linalg.norm(root, axis=1)
-    nearest = ConsistentLinks((), off)
+    parts, shift = _positive_parts_near(estimate, len(bodies))
+    covariance_root = np.asarray(np.linalg.cholesky(estimate.spread), dtype=np.float64)
+    problem = _ConsistencyProblem.of(estimate, covariance_root, bodies, parts, shift)
+    link_parameters, part_values = _nearest_parameters(problem, np.concatenate((bodies, parts)))
+    parameters = np.concatenate((link_parameters.ravel(), part_values))
+    deviations = (estimate.shares @ parameters - estimate.values) / np.linalg.norm(covariance_root, axis=1)
+    nearest = ConsistentLinks((), deviations)
     if not nearest.within:
         return nearest  # its links are almost inconsistent: with hardly any mass, or flat
-    values = dict(zip(map(str, estimate.parts), map(float, of_parts), strict=True))
-    changed = estimate.shares[:, : len(bodies)].any()
-    return nearest._replace(links=tuple(map(link_of, of_links)) if changed else (), parts=values)
+    values = dict(zip(map(str, estimate.parts), map(float, part_values), strict=True))
+    determines_links = estimate.shares[:, : len(bodies)].any()
+    return nearest._replace(
+        links=tuple(map(link_of, link_parameters)) if determines_links else (), parts=values
+    )
 
 
 def pseudo_inertia(parameters: FloatArray) -> FloatArray:
@@ -135,45 +137,45 @@ def pseudo_inertia(parameters: FloatArray) -> FloatArray:
     return np.asarray(np.tensordot(parameters, _BASIS, axes=1))
 
 
-def _basis() -> FloatArray:
+def _inertia_basis() -> FloatArray:
     """Return the pseudo-inertias of one unit of each parameter, (10, 4, 4)."""
-    found = np.zeros((len(SYMBOLS), 4, 4))
-    found[0, 3, 3] = 1.0
+    basis = np.zeros((len(SYMBOLS), 4, 4))
+    basis[0, 3, 3] = 1.0
     for axis in range(3):
-        found[1 + axis, axis, 3] = found[1 + axis, 3, axis] = 1.0
-        found[4 + axis, :3, :3] = np.eye(3) / 2
-        found[4 + axis, axis, axis] = -0.5
-    for place, (row, column) in enumerate(((0, 1), (0, 2), (1, 2)), 7):
-        found[place, row, column] = found[place, column, row] = -1.0
-    return found
+        basis[1 + axis, axis, 3] = basis[1 + axis, 3, axis] = 1.0
+        basis[4 + axis, :3, :3] = np.eye(3) / 2
+        basis[4 + axis, axis, axis] = -0.5
+    for index, (row, column) in enumerate(((0, 1), (0, 2), (1, 2)), 7):
+        basis[index, row, column] = basis[index, column, row] = -1.0
+    return basis
 
 
-_BASIS = _basis()
+_BASIS = _inertia_basis()
 
 
 def _body_near(link: Link, robot: Robot) -> FloatArray:
     """Return the parameters of a link, (10,), changed only as far as consistency requires."""
-    heaviest = max(each.link.mass for each in robot.joints) or 1.0
-    mass, com = max(link.mass, LEAST_MASS * heaviest), np.array(link.com)
+    max_mass = max(each.link.mass for each in robot.joints) or 1.0
+    mass, com = max(link.mass, MIN_MASS_SHARE * max_mass), np.array(link.com)
     inertia = link.inertia.tensor
-    spread, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
-    spread = np.maximum(spread, mass * LEAST_RADIUS**2)
-    central = (axes * (spread.sum() - spread)) @ axes.T
-    return about_origin(np.array([mass, *com, *tensor_entries(central)]))
+    second_moments, axes = np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
+    second_moments = np.maximum(second_moments, mass * MIN_GYRATION_RADIUS**2)
+    central_inertia = (axes * (second_moments.sum() - second_moments)) @ axes.T
+    return about_origin(np.array([mass, *com, *tensor_entries(central_inertia)]))
 
 
-def _parts_near(estimate: LinkEstimate, bodies: int) -> tuple[FloatArray, FloatArray]:
+def _positive_parts_near(estimate: LinkEstimate, bodies: int) -> tuple[FloatArray, FloatArray]:
     """Return values near those of the further parameters, and what is added to make them positive, (parts,).
 
     Positive ones are at least a small share of their sums.
     """
-    of_file = np.array([each.value for each in estimate.parts])
+    file_values = np.array([each.value for each in estimate.parts])
     with np.errstate(divide="ignore"):
-        sizes = np.abs(estimate.values)[:, None] / np.abs(estimate.shares[:, bodies:])
-    least = np.maximum(LEAST_MASS * np.min(sizes, axis=0, initial=1.0), SHARP)
-    positive = ["positive" in each.requirement for each in estimate.parts]
-    return np.where(positive, np.maximum(of_file, least), of_file), np.where(
-        positive, 0.0, SIGNED * np.maximum(np.abs(of_file), least)
+        sum_bounds = np.abs(estimate.values)[:, None] / np.abs(estimate.shares[:, bodies:])
+    min_values = np.maximum(MIN_MASS_SHARE * np.min(sum_bounds, axis=0, initial=1.0), MIN_STANDARD_ERROR)
+    is_positive = ["positive" in each.requirement for each in estimate.parts]
+    return np.where(is_positive, np.maximum(file_values, min_values), file_values), np.where(
+        is_positive, 0.0, SIGNED_SHIFT * np.maximum(np.abs(file_values), min_values)
     )
 
 
@@ -201,74 +203,86 @@ class _ConsistencyProblem(NamedTuple):
     def of(
         cls,
         estimate: LinkEstimate,
-        root: FloatArray,
+        covariance_root: FloatArray,
         bodies: FloatArray,
         parts: FloatArray,
         shift: FloatArray,
     ) -> _ConsistencyProblem:
-        """Return the problem for an estimate; `root` is a square root of its covariance."""
+        """Return the problem for an estimate; `covariance_root` is a square root of its covariance."""
         q, r = map(np.asarray, np.linalg.qr(estimate.shares.T, mode="complete"))
-        count = len(estimate.values)
-        to_estimate = q[:, :count]
-        center = to_estimate @ scipy.linalg.solve_triangular(r[:count], estimate.values, trans="T")
-        errors = to_estimate @ scipy.linalg.solve_triangular(r[:count], root, trans="T")
+        value_count = len(estimate.values)
+        estimate_basis = q[:, :value_count]
+        center = estimate_basis @ scipy.linalg.solve_triangular(r[:value_count], estimate.values, trans="T")
+        error_directions = estimate_basis @ scipy.linalg.solve_triangular(
+            r[:value_count], covariance_root, trans="T"
+        )
         inverse = np.asarray(
             np.linalg.inv(pseudo_inertia(bodies.reshape(-1, len(SYMBOLS)))), dtype=np.float64
         )
-        return cls(center, np.hstack((errors, q[:, count:])), count, inverse, shift, parts + shift)
+        return cls(
+            center,
+            np.hstack((error_directions, q[:, value_count:])),
+            value_count,
+            inverse,
+            shift,
+            parts + shift,
+        )
 
     def parameters(self, s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the standard parameters at s, (links, 10), and the further ones, (parts,)."""
         x: FloatArray = self.center + self.directions @ s
-        of_links, of_parts = np.split(x, [len(x) - len(self.shift)])
-        return of_links.reshape(-1, len(SYMBOLS)), of_parts
+        link_parameters, part_values = np.split(x, [len(x) - len(self.shift)])
+        return link_parameters.reshape(-1, len(SYMBOLS)), part_values
 
     def value(self, s: FloatArray, weight: float) -> float:
         """Return relative entropy plus half the squared errors over the weight; infinite if inconsistent."""
-        of_links, of_parts = self.parameters(s)
-        matrices, ratio = pseudo_inertia(of_links), (of_parts + self.shift) / self.reference
+        link_parameters, part_values = self.parameters(s)
+        matrices, part_ratios = pseudo_inertia(link_parameters), (part_values + self.shift) / self.reference
         try:
             np.linalg.cholesky(matrices)
         except np.linalg.LinAlgError:
             return np.inf
-        if np.any(ratio <= 0):
+        if np.any(part_ratios <= 0):
             return np.inf
         entropy = np.einsum("lij,lji->", self.inverse, matrices) - np.linalg.slogdet(matrices)[1].sum()
-        errors = s[: self.errors] @ s[: self.errors] / (2 * weight)
-        return float(entropy + errors + np.sum(ratio - np.log(ratio)))
+        error_cost = s[: self.errors] @ s[: self.errors] / (2 * weight)
+        return float(entropy + error_cost + np.sum(part_ratios - np.log(part_ratios)))
 
     def slopes(self, s: FloatArray, weight: float) -> tuple[FloatArray, FloatArray]:
         """Return the gradient and the Hessian of the value."""
-        of_links, of_parts = self.parameters(s)
-        inverse, of_part = np.linalg.inv(pseudo_inertia(of_links)), 1 / (of_parts + self.shift)
-        of_bodies = np.einsum("lij,pji->lp", self.inverse - inverse, _BASIS).ravel()
-        gradient = np.concatenate((of_bodies, 1 / self.reference - of_part))
-        moved = np.einsum("lij,pjk->lpik", inverse, _BASIS)
-        blocks = np.einsum("lpik,lqki->lpq", moved, moved)
-        hessian = np.diag(np.concatenate((0 * of_bodies, of_part**2)))
+        link_parameters, part_values = self.parameters(s)
+        inverse_inertias, inverse_parts = (
+            np.linalg.inv(pseudo_inertia(link_parameters)),
+            1 / (part_values + self.shift),
+        )
+        link_gradient = np.einsum("lij,pji->lp", self.inverse - inverse_inertias, _BASIS).ravel()
+        gradient = np.concatenate((link_gradient, 1 / self.reference - inverse_parts))
+        basis_products = np.einsum("lij,pjk->lpik", inverse_inertias, _BASIS)
+        blocks = np.einsum("lpik,lqki->lpq", basis_products, basis_products)
+        hessian = np.diag(np.concatenate((0 * link_gradient, inverse_parts**2)))
         for link, block in enumerate(blocks):
-            place = slice(link * len(SYMBOLS), (link + 1) * len(SYMBOLS))
-            hessian[place, place] = block
-        of_errors = np.where(np.arange(len(s)) < self.errors, 1 / weight, 0.0)
+            link_slice = slice(link * len(SYMBOLS), (link + 1) * len(SYMBOLS))
+            hessian[link_slice, link_slice] = block
+        error_weights = np.where(np.arange(len(s)) < self.errors, 1 / weight, 0.0)
         return (
-            self.directions.T @ gradient + of_errors * s,
-            self.directions.T @ hessian @ self.directions + np.diag(of_errors),
+            self.directions.T @ gradient + error_weights * s,
+            self.directions.T @ hessian @ self.directions + np.diag(error_weights),
         )
 
 
 def _nearest_parameters(problem: _ConsistencyProblem, start: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the parameters of links and the further ones with the least value, from a consistent start."""
     s = np.asarray(np.linalg.solve(problem.directions, start - problem.center), dtype=np.float64)
-    off = float(s[: problem.errors] @ s[: problem.errors])
-    lighter = int(np.ceil(np.log10(max(off, 1.0) / WEIGHT) / np.log10(LIGHTER)))
-    for power in range(lighter, -1, -1):
-        s = _minimum(problem, s, WEIGHT * LIGHTER**power)
+    squared_errors = float(s[: problem.errors] @ s[: problem.errors])
+    last_power = int(np.ceil(np.log10(max(squared_errors, 1.0) / WEIGHT) / np.log10(WEIGHT_RATIO)))
+    for power in range(last_power, -1, -1):
+        s = _newton_minimum(problem, s, WEIGHT * WEIGHT_RATIO**power)
     return problem.parameters(s)
 
 
-def _minimum(problem: _ConsistencyProblem, s: FloatArray, weight: float) -> FloatArray:
+def _newton_minimum(problem: _ConsistencyProblem, s: FloatArray, weight: float) -> FloatArray:
     """Return the minimum by Newton steps, halved until the value decreases, at most to 1/(1 + decrement)."""
-    for _ in range(STEPS):
+    for _ in range(MAX_NEWTON_STEPS):
         gradient, hessian = problem.slopes(s, weight)
         scale: FloatArray = 1 / np.sqrt(np.diagonal(hessian))
         try:
@@ -276,89 +290,106 @@ def _minimum(problem: _ConsistencyProblem, s: FloatArray, weight: float) -> Floa
         except np.linalg.LinAlgError:
             break  # almost inconsistent links, far from the identified values
         decrement = math.sqrt(max(-float(gradient @ step), 0.0))
-        if decrement <= ARRIVED:
+        if decrement <= DECREMENT_TOLERANCE:
             break
-        here, certain, part = problem.value(s, weight), 1 / (1 + decrement), 1.0
-        while part > certain and not problem.value(s + part * step, weight) < here:
-            part = max(part / 2, certain)
-        s = np.asarray(s + part * step)
+        value, certain_share, step_share = problem.value(s, weight), 1 / (1 + decrement), 1.0
+        while step_share > certain_share and not problem.value(s + step_share * step, weight) < value:
+            step_share = max(step_share / 2, certain_share)
+        s = np.asarray(s + step_share * step)
     return s
 
 
-def found_links(robot: Robot, found: Solution) -> ConsistentLinks:
+def found_links(robot: Robot, solution: Solution) -> ConsistentLinks:
     """Return the physically consistent links for the solution of a system of links.
 
     A sum of dampings or of friction that is held at zero has no parts.
     """
-    system = found.system
+    system = solution.system
     assert isinstance(system, LinkSystem), "of links"
-    estimate, among = _estimate(system, found)
-    nearest = consistent_links(robot, estimate)
-    own = system.base.shares[:, -len(system.parts) :] if system.parts else np.zeros((len(system.names), 0))
-    held = {
+    estimate, covariance_indices = _link_estimate(system, solution)
+    nearest_links = consistent_links(robot, estimate)
+    part_shares = (
+        system.base.shares[:, -len(system.parts) :] if system.parts else np.zeros((len(system.names), 0))
+    )
+    held_parts = {
         str(part): 0.0
-        for number, each in found.bound.items()
-        if system.sums[number] and each.value != system.before[number]
-        for part, share in zip(system.parts, own[number], strict=True)
+        for index, each in solution.bound.items()
+        if system.sums[index] and each.value != system.before[index]
+        for part, share in zip(system.parts, part_shares[index], strict=True)
         if share
     }
-    alone = (
-        dict(_separate_estimates(system, found, estimate, among, nearest))
-        if nearest.within and len(among)
+    separate_parts = (
+        dict(_separate_estimates(system, solution, estimate, covariance_indices, nearest_links))
+        if nearest_links.within and len(covariance_indices)
         else {}
     )
-    return nearest._replace(parts={**nearest.parts, **held, **alone})
+    return nearest_links._replace(parts={**nearest_links.parts, **held_parts, **separate_parts})
 
 
 def _separate_estimates(
-    system: LinkSystem, found: Solution, estimate: LinkEstimate, among: IndexArray, nearest: ConsistentLinks
+    system: LinkSystem,
+    solution: Solution,
+    estimate: LinkEstimate,
+    covariance_indices: IndexArray,
+    nearest_links: ConsistentLinks,
 ) -> Iterator[tuple[str, float]]:
     """Yield the likeliest values of parameters found alone, by path, where sums are those of the links.
 
     An offset, say, is hardly distinguished from gravity: with the links of the file, its likeliest value is
     another one, and the torques remain those found.
     """
-    change = nearest.off * np.sqrt(np.diagonal(estimate.spread))
-    weights = np.linalg.solve(estimate.spread, change)
-    for at, number in enumerate(found.free):
-        if number >= system.bodies and at not in among and np.isfinite(found.fit.standard_errors[at]):
-            value = float(found.fit.values[at] + found.fit.covariance[at, among] @ weights)
+    value_changes = nearest_links.off * np.sqrt(np.diagonal(estimate.spread))
+    weights = np.linalg.solve(estimate.spread, value_changes)
+    for free_index, number in enumerate(solution.free):
+        if (
+            number >= system.bodies
+            and free_index not in covariance_indices
+            and np.isfinite(solution.fit.standard_errors[free_index])
+        ):
+            value = float(
+                solution.fit.values[free_index]
+                + solution.fit.covariance[free_index, covariance_indices] @ weights
+            )
             if system.admissible(number, value) == value:
                 yield str(system.part(number)), value
 
 
-def _estimate(system: LinkSystem, found: Solution) -> tuple[LinkEstimate, IndexArray]:
+def _link_estimate(system: LinkSystem, solution: Solution) -> tuple[LinkEstimate, IndexArray]:
     """Return the identifiable sums and base parameters of links, and their indices among the free ones.
 
     A parameter of the file that was identified alone is none of them.
     """
-    fit, base, free = found.fit, system.base, list(found.free)
-    combined = {each.terms[0][0]: each.terms for each in fit.inseparable}
-    first = [at for at in range(len(free)) if at in combined or np.isfinite(fit.standard_errors[at])]
-    rows = np.zeros((len(first), len(base.kept)))
-    for row, at in zip(rows, first, strict=True):
-        for place, factor in combined.get(at, ((at, 1.0),)):
-            row[free[place]] = factor
+    fit, base, free = solution.fit, system.base, list(solution.free)
+    sum_terms = {each.terms[0][0]: each.terms for each in fit.inseparable}
+    identifiable_indices = [
+        at for at in range(len(free)) if at in sum_terms or np.isfinite(fit.standard_errors[at])
+    ]
+    rows = np.zeros((len(identifiable_indices), len(base.kept)))
+    for row, at in zip(rows, identifiable_indices, strict=True):
+        for free_index, factor in sum_terms.get(at, ((at, 1.0),)):
+            row[free[free_index]] = factor
     shares = rows @ base.shares
-    bodies = base.shares.shape[1] - len(system.parts)
-    there = np.flatnonzero([row[:bodies].any() or np.count_nonzero(row) > 1 for row in shares])
-    among = np.array(first, dtype=int)[there]
-    inside = np.flatnonzero(shares[there, bodies:].any(axis=0))
+    link_columns = base.shares.shape[1] - len(system.parts)
+    row_indices = np.flatnonzero([row[:link_columns].any() or np.count_nonzero(row) > 1 for row in shares])
+    covariance_indices = np.array(identifiable_indices, dtype=int)[row_indices]
+    part_indices = np.flatnonzero(shares[row_indices, link_columns:].any(axis=0))
     estimate = LinkEstimate(
-        shares=np.hstack((shares[there, :bodies], shares[there, bodies:][:, inside])),
-        values=(rows @ found.predicting)[there],
-        covariance=fit.covariance[np.ix_(among, among)],
-        parts=tuple(system.parts[at] for at in inside),
+        shares=np.hstack(
+            (shares[row_indices, :link_columns], shares[row_indices, link_columns:][:, part_indices])
+        ),
+        values=(rows @ solution.predicting)[row_indices],
+        covariance=fit.covariance[np.ix_(covariance_indices, covariance_indices)],
+        parts=tuple(system.parts[at] for at in part_indices),
     )
-    return estimate, among
+    return estimate, covariance_indices
 
 
 def doubts_of(links: ConsistentLinks) -> Iterator[str]:
     """Yield a sentence if no consistent links agree with the result."""
     if not links.within:
-        off = np.abs(links.off).max()
+        deviations = np.abs(links.off).max()
         yield (
             "no bodies near the links of the file have the base parameters found: "
-            f"some are {off:.2g} standard errors off, more than {WITHIN:g}, so the links stay as they are; "
-            "do forces act on the arm?"
+            f"some are {deviations:.2g} standard errors off, more than {MAX_LINK_DEVIATION:g}, so the links "
+            "stay as they are; do forces act on the arm?"
         )

@@ -49,8 +49,8 @@ class Equations(NamedTuple):
     def restricted(self, free: Sequence[int]) -> Equations:
         """Return the equations with slopes by some of the unknowns, by index."""
         noise, columns = self.noise, list(free)
-        of_free = noise and (lambda: (noise()[0], noise()[1][:, columns]))
-        return self._replace(slopes=self.slopes[:, columns], noise=of_free)
+        free_noise = noise and (lambda: (noise()[0], noise()[1][:, columns]))
+        return self._replace(slopes=self.slopes[:, columns], noise=free_noise)
 
 
 class System(NamedTuple):
@@ -79,21 +79,23 @@ class System(NamedTuple):
     noise: Callable[[], tuple[FloatArray, FloatArray]]
 
     @classmethod
-    def of(cls, records: Sequence[Equations]) -> System:
+    def of(cls, equations: Sequence[Equations]) -> System:
         """Stack the equations of several recordings."""
         measured, predicted, slopes, group, sample = (
-            np.concatenate([getattr(each, name) for each in records]) for name in Equations._fields[:5]
+            np.concatenate([getattr(each, name) for each in equations]) for name in Equations._fields[:5]
         )
-        names, index = np.unique(group, return_inverse=True)
-        rows = [len(each.measured) for each in records]
+        names, group_index = np.unique(group, return_inverse=True)
+        row_counts = [len(each.measured) for each in equations]
         errors = [
-            np.zeros((len(each.measured), 0)) if each.errors is None else each.errors for each in records
+            np.zeros((len(each.measured), 0)) if each.errors is None else each.errors for each in equations
         ]
 
         @cache
         def noise() -> tuple[FloatArray, FloatArray]:
-            known = [each.noise() if each.noise else (0 * each.measured, 0 * each.slopes) for each in records]
-            of_residual, of_slopes = map(np.concatenate, zip(*known, strict=True))
+            noise_changes = [
+                each.noise() if each.noise else (0 * each.measured, 0 * each.slopes) for each in equations
+            ]
+            of_residual, of_slopes = map(np.concatenate, zip(*noise_changes, strict=True))
             return of_residual, of_slopes
 
         return cls(
@@ -101,19 +103,19 @@ class System(NamedTuple):
             residual=measured - predicted,
             slopes=slopes,
             groups=tuple(map(str, names)),
-            group=index,
-            record=np.repeat(np.arange(len(records)), rows),
+            group=group_index,
+            record=np.repeat(np.arange(len(equations)), row_counts),
             sample=sample,
             errors=np.concatenate(errors),
             noise=noise,
         )
 
-    def by_group(self, of_rows: FloatArray) -> FloatArray:
+    def by_group(self, row_values: FloatArray) -> FloatArray:
         """Return the sums of row values over each group, (groups,)."""
-        return np.bincount(self.group, of_rows, len(self.groups)).astype(np.float64)
+        return np.bincount(self.group, row_values, len(self.groups)).astype(np.float64)
 
 
-LEAST_FREEDOM = 0.01
+MIN_FREEDOM = 0.01
 """Lower bound of 1 minus the leverage of a row; below it, the fit interpolates the row, whose residual is
 then meaningless."""
 
@@ -128,13 +130,15 @@ def score_covariance(system: System, q: FloatArray, residual: FloatArray) -> Flo
         q: orthonormal columns, (rows, columns).
         residual: residual of each row in units of its noise, (rows,).
     """
-    freedom = np.maximum(1.0 - np.einsum("rc,rc->r", q, q), LEAST_FREEDOM)
+    freedom = np.maximum(1.0 - np.einsum("rc,rc->r", q, q), MIN_FREEDOM)
     scores = q * (residual / np.sqrt(freedom))[:, None]
-    parts = [
-        covariance_of_sum(_by_sample(scores[here], system.group[here], system.sample[here]))[0]
-        for here in (system.record == record for record in np.unique(system.record))
+    record_covariances = [
+        covariance_of_sum(
+            _scores_by_sample(scores[record_mask], system.group[record_mask], system.sample[record_mask])
+        )[0]
+        for record_mask in (system.record == record for record in np.unique(system.record))
     ]
-    return np.asarray(wider(freedom_of(system)) * sum(parts))
+    return np.asarray(student_t_variance(freedom_of(system)) * sum(record_covariances))
 
 
 def freedom_of(system: System) -> int:
@@ -143,19 +147,19 @@ def freedom_of(system: System) -> int:
     return sum(count_of_cosines(int(np.ptp(each)) + 1) for each in samples)
 
 
-def wider(freedom: int) -> float:
+def student_t_variance(freedom: int) -> float:
     """Return the variance of Student's t: few cosines determine the covariance only roughly."""
     return freedom / max(freedom - 2, 1)
 
 
-def _by_sample(scores: FloatArray, group: IndexArray, sample: IndexArray) -> FloatArray:
+def _scores_by_sample(scores: FloatArray, group: IndexArray, sample: IndexArray) -> FloatArray:
     """Return the sums of scores over the rows of each sample, (samples, columns); zero without rows."""
-    first = sample.min()
-    summed = np.zeros((int(sample.max() - first) + 1, scores.shape[1]))
+    first_sample = sample.min()
+    sample_scores = np.zeros((int(sample.max() - first_sample) + 1, scores.shape[1]))
     for each in np.unique(group):
-        rows = group == each
-        summed[sample[rows] - first] += scores[rows]
-    return summed
+        row_mask = group == each
+        sample_scores[sample[row_mask] - first_sample] += scores[row_mask]
+    return sample_scores
 
 
 SEPARABLE = 1 / 300
@@ -165,13 +169,13 @@ At constant stiffness, this distance is about 1e-3 for k and k_c of the paper's 
 noise changes these columns, and the error of k_c was as large as k_c; with a stiffness of two sines it is 0.1
 or more."""
 
-QUIET = 1e-9
+MIN_NOISE_RATIO = 1e-9
 """Ratio of a group's noise to its measured values below which it is rounding of the filters."""
 
-PASSES = 20
+MAX_NOISE_ESTIMATES = 20
 """Limit on estimates of the groups' noise; three or four suffice unless a group has hardly any rows."""
 
-SETTLED = 0.01
+NOISE_TOLERANCE = 0.01
 """Relative change of the noise of every group below which the estimates have converged."""
 
 
@@ -239,7 +243,7 @@ class LinearSolution(NamedTuple):
 
 
 def least_squares(
-    records: Sequence[Equations],
+    equations: Sequence[Equations],
     present: FloatArray,
     tolerance: float = SEPARABLE,
 ) -> LeastSquaresFit:
@@ -248,14 +252,14 @@ def least_squares(
     Standard errors hold for residuals of any color, also common to groups; see `score_covariance`.
 
     Args:
-        records: equations of each recording.
+        equations: equations of each recording.
         present: values of the unknowns at which the equations predict, (unknowns,).
         tolerance: relative distance of an identifiable unknown's column from the span of the others.
 
     Raises:
         InputError: there are not more equations than unknowns.
     """
-    system = System.of(records)
+    system = System.of(equations)
     return fit_of(system, present, solve_system(system, tolerance), present)
 
 
@@ -268,16 +272,16 @@ def solve_system(system: System, tolerance: float = SEPARABLE) -> LinearSolution
     rows, unknowns = system.slopes.shape
     if rows <= unknowns:
         raise InputError.one(f"{rows} equations do not tell {unknowns} unknowns; record for longer")
-    floor = QUIET * _group_noises(system, system.measured, np.zeros(rows))
+    floor = MIN_NOISE_RATIO * _group_noises(system, system.measured, np.zeros(rows))
     noise = np.maximum(_group_noises(system, system.residual, np.zeros(rows)), floor)
-    for _ in range(PASSES):
-        step = _solve_weighted(system, np.where(noise > 0, noise, 1.0), tolerance)
-        left = system.residual - system.slopes @ step.change
-        leverage = np.einsum("rc,rc->r", step.split.q, step.split.q)
-        before, noise = noise, np.maximum(_group_noises(system, left, leverage), floor)
-        if np.all(np.abs(noise - before) <= SETTLED * before):
+    for _ in range(MAX_NOISE_ESTIMATES):
+        linear_solution = _solve_weighted(system, np.where(noise > 0, noise, 1.0), tolerance)
+        remaining = system.residual - system.slopes @ linear_solution.change
+        leverage = np.einsum("rc,rc->r", linear_solution.split.q, linear_solution.split.q)
+        previous_noise, noise = noise, np.maximum(_group_noises(system, remaining, leverage), floor)
+        if np.all(np.abs(noise - previous_noise) <= NOISE_TOLERANCE * previous_noise):
             break
-    return step._replace(noise=noise)
+    return linear_solution._replace(noise=noise)
 
 
 def _solve_weighted(system: System, noise: FloatArray, tolerance: float) -> LinearSolution:
@@ -290,88 +294,94 @@ def _solve_weighted(system: System, noise: FloatArray, tolerance: float) -> Line
     return LinearSolution(change, split, weight, noise, float(np.linalg.norm(target)))
 
 
-def _group_noises(system: System, left: FloatArray, leverage: FloatArray) -> FloatArray:
+def _group_noises(system: System, residual: FloatArray, leverage: FloatArray) -> FloatArray:
     """Return the rms residual of each group, (groups,), per row minus fitted unknowns."""
     freedom = np.maximum(system.by_group(1 - leverage), 1.0)
-    return np.sqrt(system.by_group(left**2) / freedom)
+    return np.sqrt(system.by_group(residual**2) / freedom)
 
 
 def fit_of(
     system: System,
-    present: FloatArray,
-    step: LinearSolution,
-    before: FloatArray,
+    values_before_step: FloatArray,
+    linear_solution: LinearSolution,
+    kept_values: FloatArray,
 ) -> LeastSquaresFit:
     """Return the fit of a solution, with standard errors.
 
     Args:
         system: equations at the present values.
-        present: present values of the unknowns, (unknowns,).
-        step: solution of the equations.
-        before: values that unidentifiable unknowns keep, (unknowns,).
+        values_before_step: present values of the unknowns, (unknowns,).
+        linear_solution: solution of the equations.
+        kept_values: values that unidentifiable unknowns keep, (unknowns,).
     """
-    split, left = step.split, system.residual - system.slopes @ step.change
-    solution = present + step.change
-    covariance = _solution_covariance(system, step, left)
+    split, remaining = linear_solution.split, system.residual - system.slopes @ linear_solution.change
+    solution = values_before_step + linear_solution.change
+    covariance = _solution_covariance(system, linear_solution, remaining)
     errors = np.sqrt(np.diagonal(covariance))
-    combinations = tuple(_combinations(split, solution, errors))
-    identifiable = np.zeros(len(present), dtype=bool)
+    combinations = tuple(_identifiable_sums(split, solution, errors))
+    identifiable = np.zeros(len(values_before_step), dtype=bool)
     identifiable[split.kept] = True
     identifiable[[at for each in combinations for at, _ in each.terms]] = False
     return LeastSquaresFit(
-        values=np.where(identifiable, solution, before),
+        values=np.where(identifiable, solution, kept_values),
         standard_errors=np.where(identifiable, errors, np.nan),
         solution=solution,
         covariance=covariance,
         condition=split.condition,
         inseparable=combinations,
         unexcited=split.nothing,
-        residual_rms=dict(zip(system.groups, map(float, step.noise), strict=True)),
+        residual_rms=dict(zip(system.groups, map(float, linear_solution.noise), strict=True)),
     )
 
 
-def _solution_covariance(system: System, step: LinearSolution, left: FloatArray) -> FloatArray:
+def _solution_covariance(system: System, linear_solution: LinearSolution, residual: FloatArray) -> FloatArray:
     """Return the covariance of the solution due to noise, errors of earlier parameters, and bias.
 
     Noise in the columns makes unknowns too small (W. A. Fuller, Measurement Error Models, 1987, section 1.1).
     This bias is known roughly, and is counted as an error.
     """
-    split, weight = step.split, step.weight[:, None]
-    of_scores = score_covariance(system, split.q, left * step.weight)
-    of_errors = split.q.T @ (system.errors * weight)
-    of_residual, of_slopes = system.noise()
-    of_residual = of_residual - of_slopes @ step.change
-    of_slopes = of_slopes[:, split.kept] / split.scale[split.kept] * weight
-    bias = scipy.linalg.solve_triangular(split.r, of_slopes.T @ (of_residual * step.weight), trans="T")
-    of_scores = of_scores + of_errors @ of_errors.T + np.outer(bias, bias)
-    half = scipy.linalg.solve_triangular(split.r, of_scores)
+    split, weight = linear_solution.split, linear_solution.weight[:, None]
+    score_covariances = score_covariance(system, split.q, residual * linear_solution.weight)
+    error_scores = split.q.T @ (system.errors * weight)
+    residual_noise, slope_noise = system.noise()
+    residual_noise = residual_noise - slope_noise @ linear_solution.change
+    slope_noise = slope_noise[:, split.kept] / split.scale[split.kept] * weight
+    bias = scipy.linalg.solve_triangular(
+        split.r, slope_noise.T @ (residual_noise * linear_solution.weight), trans="T"
+    )
+    score_covariances = score_covariances + error_scores @ error_scores.T + np.outer(bias, bias)
+    half_solved = scipy.linalg.solve_triangular(split.r, score_covariances)
     scale = split.scale[split.kept]
-    inner = scipy.linalg.solve_triangular(split.r, half.T) / np.outer(scale, scale)
+    kept_covariance = scipy.linalg.solve_triangular(split.r, half_solved.T) / np.outer(scale, scale)
     covariance = np.zeros((system.slopes.shape[1],) * 2)
-    covariance[np.ix_(split.kept, split.kept)] = inner
+    covariance[np.ix_(split.kept, split.kept)] = kept_covariance
     return covariance
 
 
-def _combinations(split: Independence, solution: FloatArray, errors: FloatArray) -> list[IdentifiableSum]:
+def _identifiable_sums(
+    split: Independence, solution: FloatArray, errors: FloatArray
+) -> list[IdentifiableSum]:
     """Return the combination of each kept column on which dropped columns depend."""
-    found = []
-    for place, kept in enumerate(split.kept):
-        shares = split.shares[place]
-        others = [(int(split.dropped[at]), float(shares[at])) for at in np.flatnonzero(shares)]
-        if others:
-            terms = ((int(kept), 1.0), *others)
-            value = sum(factor * solution[at] for at, factor in terms)
-            found.append(IdentifiableSum(terms, float(value), float(errors[kept])))
-    return found
+    sums = []
+    for kept_index, unknown in enumerate(split.kept):
+        shares = split.shares[kept_index]
+        dependent_terms = [
+            (int(split.dropped[index]), float(shares[index])) for index in np.flatnonzero(shares)
+        ]
+        if dependent_terms:
+            terms = ((int(unknown), 1.0), *dependent_terms)
+            value = sum(factor * solution[index] for index, factor in terms)
+            sums.append(IdentifiableSum(terms, float(value), float(errors[unknown])))
+    return sums
 
 
-STEPS = 50
+MAX_STEPS = 50
 """Limit on steps. Springs with exponents wrong by a third required 6 to 10."""
 
-HALVINGS = 20
+MAX_HALVINGS = 20
 """Limit on halvings of a step, to a millionth: if that reduces nothing, no step will."""
 
-ARRIVED = 0.1
+STEP_TOLERANCE = 0.1
 """Step length, in standard errors, at which the iteration has converged: a hundredth of their square. With
 0.01, poorly identifiable widths of friction required twice the steps."""
 
@@ -397,37 +407,37 @@ def gauss_newton(
     Raises:
         InputError: there are not more equations than unknowns.
     """
-    present, system = start, System.of(equations(start))
-    for _ in range(STEPS):
+    values, system = start, System.of(equations(start))
+    for _ in range(MAX_STEPS):
         step = solve_system(system, tolerance)
-        if step.length <= ARRIVED * np.sqrt(len(step.split.kept)):
-            return fit_of(system, present, step, start)
-        found = _shorter(equations, present, system, step)
-        if found is None:
+        if step.length <= STEP_TOLERANCE * np.sqrt(len(step.split.kept)):
+            return fit_of(system, values, step, start)
+        shorter_step = _halved_step(equations, values, system, step)
+        if shorter_step is None:
             break
-        present, system = found
-    stopped = step._replace(change=np.zeros_like(start))
-    return fit_of(system, present, stopped, start)._replace(converged=False)
+        values, system = shorter_step
+    zero_step = step._replace(change=np.zeros_like(start))
+    return fit_of(system, values, zero_step, start)._replace(converged=False)
 
 
-def _shorter(
+def _halved_step(
     equations: Callable[[FloatArray], Sequence[Equations]],
-    present: FloatArray,
+    values: FloatArray,
     system: System,
     step: LinearSolution,
 ) -> tuple[FloatArray, System] | None:
     """Return unknowns and equations after the longest halved step that reduces the residuals, or None."""
-    before = _squared_residuals(system, step)
-    for halving in range(HALVINGS):
-        there = present + step.change / 2**halving
-        moved = System.of(equations(there))
-        if _squared_residuals(moved, step) < before:
-            return there, moved
+    previous_cost = _squared_residuals(system, step)
+    for halving in range(MAX_HALVINGS):
+        next_values = values + step.change / 2**halving
+        next_system = System.of(equations(next_values))
+        if _squared_residuals(next_system, step) < previous_cost:
+            return next_values, next_system
     return None
 
 
 def _squared_residuals(system: System, step: LinearSolution) -> float:
     """Return the sum of squared residuals in units of the noise; infinite if a prediction is not finite."""
     with np.errstate(over="ignore", invalid="ignore"):
-        left = float(np.sum((system.residual * step.weight) ** 2))
-    return left if np.isfinite(left) else np.inf
+        cost = float(np.sum((system.residual * step.weight) ** 2))
+    return cost if np.isfinite(cost) else np.inf

@@ -23,7 +23,7 @@ from vsacli.studies.identification.estimation import (
     System,
     freedom_of,
     least_squares,
-    wider,
+    student_t_variance,
 )
 from vsacli.studies.identification.fitted_system import Solution
 from vsacli.studies.identification.identification_text import CHANGED, rounded_by_error
@@ -60,62 +60,73 @@ def addition(
     """
     system = System.of([each._replace(noise=None) for each in equations])
     weight = np.array([1 / noise[name] for name in system.groups])[system.group]
-    known = independence(system.slopes * weight[:, None], SEPARABLE).q
-    further = np.concatenate(columns) * weight[:, None]
-    new, to_columns = _beyond(known, further)
-    count, freedom = new.shape[1], freedom_of(system)
-    if not count or freedom <= count or len(weight) < FEWEST_ROWS * (known.shape[1] + count):
+    basis = independence(system.slopes * weight[:, None], SEPARABLE).q
+    weighted_columns = np.concatenate(columns) * weight[:, None]
+    new_basis, to_columns = _independent_basis(basis, weighted_columns)
+    column_count, freedom = new_basis.shape[1], freedom_of(system)
+    if (
+        not column_count
+        or freedom <= column_count
+        or len(weight) < FEWEST_ROWS * (basis.shape[1] + column_count)
+    ):
         return None
-    together = np.hstack((known, new)) / weight[:, None]
-    ends = np.cumsum([len(each.measured) for each in equations])[:-1]
-    parts = np.split(together, ends)
+    extended_slopes = np.hstack((basis, new_basis)) / weight[:, None]
+    row_offsets = np.cumsum([len(each.measured) for each in equations])[:-1]
+    slopes_by_recording = np.split(extended_slopes, row_offsets)
     fit = least_squares(
-        [each._replace(slopes=part, noise=None) for each, part in zip(equations, parts, strict=True)],
-        np.zeros(together.shape[1]),
+        [
+            each._replace(slopes=part, noise=None)
+            for each, part in zip(equations, slopes_by_recording, strict=True)
+        ],
+        np.zeros(extended_slopes.shape[1]),
     )
-    sizes, covariance = fit.solution[-count:], fit.covariance[-count:, -count:]
+    coefficients, covariance = fit.solution[-column_count:], fit.covariance[-column_count:, -column_count:]
     if not np.all(np.diagonal(covariance) > 0):
         return None
-    left = system.residual - together @ fit.solution
+    remaining = system.residual - extended_slopes @ fit.solution
     return Addition(
-        chance=_chance(sizes, covariance / wider(freedom), freedom),
-        left=float(np.sum((left * weight) ** 2) / np.sum((system.residual * weight) ** 2)),
-        sizes=to_columns @ sizes,
+        chance=_chance_probability(coefficients, covariance / student_t_variance(freedom), freedom),
+        left=float(np.sum((remaining * weight) ** 2) / np.sum((system.residual * weight) ** 2)),
+        sizes=to_columns @ coefficients,
     )
 
 
-def _beyond(known: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _independent_basis(known: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return an orthonormal basis of columns beyond known ones, and the map of its coefficients to theirs."""
     norms = np.linalg.norm(columns, axis=0)
     scale = 1 / np.where(norms > 0, norms, 1.0)
-    left = columns * scale
+    remainder = columns * scale
     for _ in range(2):  # twice, since rounding of the first pass leaves a share of the known columns
-        left = left - known @ (known.T @ left)
-    basis, sizes, turned = np.linalg.svd(left, full_matrices=False)
-    there = sizes > SEPARABLE
-    return basis[:, there], scale[:, None] * turned[there].T / sizes[there]
+        remainder = remainder - known @ (known.T @ remainder)
+    new_basis, singular_values, right_vectors = np.linalg.svd(remainder, full_matrices=False)
+    is_independent = singular_values > SEPARABLE
+    return new_basis[:, is_independent], scale[:, None] * right_vectors[is_independent].T / singular_values[
+        is_independent
+    ]
 
 
-def _chance(sizes: FloatArray, covariance: FloatArray, freedom: int) -> float:
+def _chance_probability(coefficients: FloatArray, covariance: FloatArray, freedom: int) -> float:
     """Return the probability that Hotelling's statistic is as large if the true sizes are zero."""
-    count = len(sizes)
-    statistic = float(sizes @ np.linalg.solve(covariance, sizes))
-    second = freedom - count + 1
-    return float(scipy.special.fdtrc(count, second, statistic * second / (freedom * count)))
+    count = len(coefficients)
+    statistic = float(coefficients @ np.linalg.solve(covariance, coefficients))
+    denominator_freedom = freedom - count + 1
+    return float(
+        scipy.special.fdtrc(count, denominator_freedom, statistic * denominator_freedom / (freedom * count))
+    )
 
 
-CHANCE = 1e-4
+MAX_CHANCE = 1e-4
 """Probability of accepting a cause by chance. About a hundred are tested for an arm with seven joints, so
 that one identification in a hundred names a cause by accident."""
 
-NEARLY = 1.25
+SIMILAR_RATIO = 1.25
 """Ratio of the remaining sums of squares of two causes below which the cause with fewer columns is preferred,
 and above which a further cause is reported. Meaningless columns reduce the sum by a few percent."""
 
-MOST = 0.75
+MAIN_SHARE = 0.75
 """Explained share of the sum of squares that counts as most: half of the rms remains."""
 
-SEVERAL = 3
+MAX_CAUSES = 3
 """Largest number of causes for one system; a cause common to both motors of a joint counts once."""
 
 
@@ -131,105 +142,123 @@ class Explanation(NamedTuple):
     matters: bool
 
 
-NOTHING = Explanation((), matters=False)
+NO_EXPLANATION = Explanation((), matters=False)
 
 
 def explanation(
-    robot: Robot, found: Solution, records: Sequence[ConditionedRecording], *, fails: bool
+    robot: Robot, solution: Solution, recordings: Sequence[ConditionedRecording], *, fails: bool
 ) -> Explanation:
     """Explain the residuals of a joint's motors, or of all links.
 
     Args:
         robot: robot as in its file.
-        found: solution of the equations.
-        records: fitted recordings.
+        solution: solution of the equations.
+        recordings: fitted recordings.
         fails: whether the residuals are too large; then causes are reported even if they change no parameter.
     """
-    exact = [each._replace(noise=None) for each in records]
-    equations = [found.equations(each)._replace(noise=None) for each in exact]
-    of_free = [each._replace(slopes=each.slopes[:, found.free]) for each in equations]
-    if sum(len(each.measured) for each in equations) < FEWEST_ROWS * (len(found.free) + 1):
-        return NOTHING
-    chosen = _explaining_causes(
-        residual_causes(robot, found, exact, equations), of_free, found.fit.residual_rms
+    recordings_without_noise = [each._replace(noise=None) for each in recordings]
+    equations = [solution.equations(each)._replace(noise=None) for each in recordings_without_noise]
+    free_equations = [each._replace(slopes=each.slopes[:, solution.free]) for each in equations]
+    if sum(len(each.measured) for each in equations) < FEWEST_ROWS * (len(solution.free) + 1):
+        return NO_EXPLANATION
+    causes = _explaining_causes(
+        residual_causes(robot, solution, recordings_without_noise, equations),
+        free_equations,
+        solution.fit.residual_rms,
     )
-    if not chosen:
-        return NOTHING
-    longer = _longer(of_free, chosen)
-    fit = least_squares(longer, np.zeros(longer[0].slopes.shape[1]))
-    count = len(found.free)
-    moved = tuple(_changed_value_clauses(found, fit.values[:count], fit.standard_errors[:count]))
-    left = [_share_left(cause, longer, fit.solution) for cause in chosen]
-    matters = bool(moved) or min(left) <= 1 - MOST
+    if not causes:
+        return NO_EXPLANATION
+    extended_equations = _extended_equations(free_equations, causes)
+    fit = least_squares(extended_equations, np.zeros(extended_equations[0].slopes.shape[1]))
+    free_count = len(solution.free)
+    changed_values = tuple(
+        _changed_value_clauses(solution, fit.values[:free_count], fit.standard_errors[:free_count])
+    )
+    remaining_shares = [_remaining_share(cause, extended_equations, fit.solution) for cause in causes]
+    matters = bool(changed_values) or min(remaining_shares) <= 1 - MAIN_SHARE
     if not (matters or fails):
-        return NOTHING
-    sentences, at = [], count
-    for cause, share in zip(chosen, left, strict=True):
-        size, error = float(fit.values[at]), float(fit.standard_errors[at])
-        sentences.append(_cause_sentence(cause, size, error, share))
-        at += cause.width
-    if moved:
-        sentences.append(f"{found.system.title}: with that, {'; '.join(moved)}")
+        return NO_EXPLANATION
+    sentences, column_index = [], free_count
+    for cause, share in zip(causes, remaining_shares, strict=True):
+        coefficient, error = float(fit.values[column_index]), float(fit.standard_errors[column_index])
+        sentences.append(_cause_sentence(cause, coefficient, error, share))
+        column_index += cause.width
+    if changed_values:
+        sentences.append(f"{solution.system.title}: with that, {'; '.join(changed_values)}")
     return Explanation(tuple(dict.fromkeys(sentences)), matters)
 
 
-def _changed_value_clauses(found: Solution, changes: FloatArray, errors: FloatArray) -> Iterator[str]:
+def _changed_value_clauses(solution: Solution, changes: FloatArray, errors: FloatArray) -> Iterator[str]:
     """Yield clauses on identified values that would change with the causes in the equations."""
-    for at, number in enumerate(found.free):
-        value, before = float(found.fit.values[at]), float(found.fit.standard_errors[at])
-        name, unit, error = found.system.names[number], found.system.units[number], float(errors[at])
-        there = f"{rounded_by_error(value, before)} +- {before:.2g} {unit}"
-        if np.isfinite(before) and not np.isfinite(error):
-            yield f"{name} would be unidentifiable, not {there}"
-        elif abs(changes[at]) > CHANGED * before:
-            now = f"{rounded_by_error(value + float(changes[at]), error)} +- {error:.2g}"
-            yield f"{name} would be {now}, not {there}"
+    for free_index, index in enumerate(solution.free):
+        value, standard_error = (
+            float(solution.fit.values[free_index]),
+            float(solution.fit.standard_errors[free_index]),
+        )
+        name, unit, error = (
+            solution.system.names[index],
+            solution.system.units[index],
+            float(errors[free_index]),
+        )
+        value_text = f"{rounded_by_error(value, standard_error)} +- {standard_error:.2g} {unit}"
+        if np.isfinite(standard_error) and not np.isfinite(error):
+            yield f"{name} would be unidentifiable, not {value_text}"
+        elif abs(changes[free_index]) > CHANGED * standard_error:
+            new_value_text = f"{rounded_by_error(value + float(changes[free_index]), error)} +- {error:.2g}"
+            yield f"{name} would be {new_value_text}, not {value_text}"
 
 
 def _explaining_causes(
-    possible: Sequence[Cause], equations: Sequence[Equations], noise: dict[str, float]
+    possible_causes: Sequence[Cause], equations: Sequence[Equations], noise: dict[str, float]
 ) -> list[Cause]:
     """Return the causes that explain something beyond chance, the one that explains most first."""
-    chosen: list[tuple[Cause, Addition]] = []
-    while len(chosen) < SEVERAL:
-        present = _longer(equations, [cause for cause, _ in chosen])
-        tested = ((cause, addition(present, cause.columns, noise)) for cause in possible)
+    chosen_effects: list[tuple[Cause, Addition]] = []
+    while len(chosen_effects) < MAX_CAUSES:
+        extended_equations = _extended_equations(equations, [cause for cause, _ in chosen_effects])
+        cause_effects = (
+            (cause, addition(extended_equations, cause.columns, noise)) for cause in possible_causes
+        )
         effects = [
             (cause, effect)
-            for cause, effect in tested
-            if effect and effect.chance < CHANCE and np.all(np.abs(effect.sizes) <= cause.largest)
+            for cause, effect in cause_effects
+            if effect and effect.chance < MAX_CHANCE and np.all(np.abs(effect.sizes) <= cause.largest)
         ]
-        least = min((effect.left for _, effect in effects), default=np.inf)
-        if not effects or (chosen and least > chosen[-1][1].left / NEARLY):
+        min_remaining = min((effect.left for _, effect in effects), default=np.inf)
+        if not effects or (chosen_effects and min_remaining > chosen_effects[-1][1].left / SIMILAR_RATIO):
             break
-        near = [each for each in effects if each[1].left <= NEARLY * least]
-        chosen.append(min(near, key=lambda each: (each[0].width, each[1].left)))
-    return [cause for cause, _ in chosen]
+        close_effects = [each for each in effects if each[1].left <= SIMILAR_RATIO * min_remaining]
+        chosen_effects.append(min(close_effects, key=lambda each: (each[0].width, each[1].left)))
+    return [cause for cause, _ in chosen_effects]
 
 
-def _longer(equations: Sequence[Equations], chosen: Sequence[Cause]) -> list[Equations]:
+def _extended_equations(equations: Sequence[Equations], causes: Sequence[Cause]) -> list[Equations]:
     return [
-        each._replace(slopes=np.hstack((each.slopes, *(cause.columns[record] for cause in chosen))))
-        for record, each in enumerate(equations)
+        each._replace(slopes=np.hstack((each.slopes, *(cause.columns[recording_index] for cause in causes))))
+        for recording_index, each in enumerate(equations)
     ]
 
 
-def _share_left(cause: Cause, longer: Sequence[Equations], solution: FloatArray) -> float:
+def _remaining_share(cause: Cause, extended_equations: Sequence[Equations], solution: FloatArray) -> float:
     """Return the remaining share of squared residuals, over the rows that a cause changes."""
-    rows = [np.any(columns != 0, axis=1) for columns in cause.columns]
-    before = [(each.measured - each.predicted)[there] for each, there in zip(longer, rows, strict=True)]
-    explained = [each.slopes[there] @ solution for each, there in zip(longer, rows, strict=True)]
-    residual = np.concatenate(before)
+    row_masks = [np.any(columns != 0, axis=1) for columns in cause.columns]
+    residuals = [
+        (each.measured - each.predicted)[there]
+        for each, there in zip(extended_equations, row_masks, strict=True)
+    ]
+    explained = [
+        each.slopes[there] @ solution for each, there in zip(extended_equations, row_masks, strict=True)
+    ]
+    residual = np.concatenate(residuals)
     return float(np.sum((residual - np.concatenate(explained)) ** 2) / np.sum(residual**2))
 
 
-def _cause_sentence(cause: Cause, size: float, error: float, left: float) -> str:
-    total = cause.neutral + size
-    rounded = rounded_by_error(total, error)
-    signed = rounded if cause.neutral or total < 0 else f"+{rounded}"
-    share = "most" if 1 - left >= MOST else "a part"
+def _cause_sentence(cause: Cause, coefficient: float, error: float, remaining_share: float) -> str:
+    value = cause.neutral + coefficient
+    rounded = rounded_by_error(value, error)
+    signed_value = rounded if cause.neutral or value < 0 else f"+{rounded}"
+    share = "most" if 1 - remaining_share >= MAIN_SHARE else "a part"
     return cause.words.format(
         name=cause.name,
-        size=f"{signed} +- {error:.2g} {cause.unit}".rstrip(),
+        size=f"{signed_value} +- {error:.2g} {cause.unit}".rstrip(),
         would=f"would explain {share} of what is left",
     )

@@ -18,7 +18,7 @@ FEWEST_ROWS = 5
 """Equations per unknown below which a recording is too short to hold out a part of it."""
 
 
-CERTAIN = 2.0
+CONTRADICTING_ERRORS = 2.0
 """Difference from the value of the file, in standard errors, that contradicts the file."""
 
 
@@ -39,26 +39,26 @@ class SystemOfEquations(ABC):
     before: FloatArray
 
     @abstractmethod
-    def of_record(self, values: FloatArray, signals: ConditionedRecording) -> Equations:
+    def of_record(self, values: FloatArray, recording: ConditionedRecording) -> Equations:
         """Return the equations of a recording at given values of the parameters, (parameters,)."""
 
     @abstractmethod
     def admissible(self, number: int, value: float) -> float | None:
         """Return the nearest admissible value of a parameter, by index; None if it must keep its value."""
 
-    def equations(self, values: FloatArray, signals: ConditionedRecording) -> Equations:
+    def equations(self, values: FloatArray, recording: ConditionedRecording) -> Equations:
         """Return the equations of a recording, with the effect of its noise if that is known."""
-        found = self.of_record(values, signals)
-        if signals.noise is None:
-            return found
+        equations = self.of_record(values, recording)
+        if recording.noise is None:
+            return equations
 
         @cache
         def noise() -> tuple[FloatArray, FloatArray]:
-            again = self.of_record(values, disturbed(signals))
-            residuals = (each.measured - each.predicted for each in (again, found))
-            return next(residuals) - next(residuals), again.slopes - found.slopes
+            disturbed_equations = self.of_record(values, disturbed(recording))
+            residuals = (each.measured - each.predicted for each in (disturbed_equations, equations))
+            return next(residuals) - next(residuals), disturbed_equations.slopes - equations.slopes
 
-        return found._replace(noise=noise)
+        return equations._replace(noise=noise)
 
 
 class Bound(NamedTuple):
@@ -96,82 +96,88 @@ class Solution(NamedTuple):
         values[list(self.free)] = self.fit.solution
         return values
 
-    def equations(self, signals: ConditionedRecording) -> Equations:
+    def equations(self, recording: ConditionedRecording) -> Equations:
         """Return the equations of a recording at the values that predict best."""
-        return self.system.equations(self.predicting, signals)
+        return self.system.equations(self.predicting, recording)
 
 
-def solution(system: SystemOfEquations, records: Sequence[ConditionedRecording]) -> Solution:
+def fit_system(system: SystemOfEquations, recordings: Sequence[ConditionedRecording]) -> Solution:
     """Fit a system repeatedly, holding parameters with inadmissible results, until all are admissible."""
-    bound: dict[int, Bound] = {}
+    held_parameters: dict[int, Bound] = {}
     while True:
-        free = tuple(number for number in range(len(system.names)) if number not in bound)
+        free = tuple(index for index in range(len(system.names)) if index not in held_parameters)
         values = system.before.copy()
-        values[list(bound)] = [each.value for each in bound.values()]
-        fit = gauss_newton(partial(_equations, system, records, free, values), values[list(free)])
-        further = {
-            number: found
-            for at, number in enumerate(free)
-            if (found := _bound(system, number, float(fit.solution[at]), float(fit.standard_errors[at])))
+        values[list(held_parameters)] = [each.value for each in held_parameters.values()]
+        fit = gauss_newton(partial(_free_equations, system, recordings, free, values), values[list(free)])
+        newly_held = {
+            index: found
+            for free_index, index in enumerate(free)
+            if (
+                found := _inadmissible_bound(
+                    system, index, float(fit.solution[free_index]), float(fit.standard_errors[free_index])
+                )
+            )
         }
-        if not further:
-            return Solution(system, free, fit, bound)
-        bound |= further
+        if not newly_held:
+            return Solution(system, free, fit, held_parameters)
+        held_parameters |= newly_held
 
 
-def _equations(
+def _free_equations(
     system: SystemOfEquations,
-    records: Sequence[ConditionedRecording],
+    recordings: Sequence[ConditionedRecording],
     free: Sequence[int],
-    held: FloatArray,
+    held_values: FloatArray,
     values: FloatArray,
 ) -> list[Equations]:
     """Return the equations of all recordings with slopes by the free parameters.
 
     Args:
         system: system of equations.
-        records: conditioned recordings.
+        recordings: conditioned recordings.
         free: indices of the free parameters.
-        held: values of all parameters, of which those of free ones do not count, (parameters,).
+        held_values: values of all parameters, of which those of free ones do not count, (parameters,).
         values: values of the free parameters, (free,).
     """
-    together = held.copy()
-    together[list(free)] = values
-    return [system.equations(together, each).restricted(free) for each in records]
+    all_values = held_values.copy()
+    all_values[list(free)] = values
+    return [system.equations(all_values, each).restricted(free) for each in recordings]
 
 
-def _bound(system: SystemOfEquations, number: int, value: float, error: float) -> Bound | None:
+def _inadmissible_bound(system: SystemOfEquations, index: int, value: float, error: float) -> Bound | None:
     """Return the value to hold a parameter at; None if its result is admissible or it is unidentifiable.
 
     The value of the file is preferred if the recording agrees with it.
     """
-    nearest, before = system.admissible(number, value), float(system.before[number])
-    if nearest == value or math.isnan(error):
+    admissible_value, file_value = system.admissible(index, value), float(system.before[index])
+    if admissible_value == value or math.isnan(error):
         return None
-    if abs(value - before) <= CERTAIN * error:
-        return Bound(before, error)
-    return Bound(before, math.nan) if nearest is None else Bound(nearest, error)
+    if abs(value - file_value) <= CONTRADICTING_ERRORS * error:
+        return Bound(file_value, error)
+    return Bound(file_value, math.nan) if admissible_value is None else Bound(admissible_value, error)
 
 
-def held_out(found: Solution, records: list[ConditionedRecording]) -> dict[str, float]:
+def held_out(solution: Solution, recordings: list[ConditionedRecording]) -> dict[str, float]:
     """Return the rms residual of each group on held-out samples.
 
     Each of several recordings is predicted by a fit to the others, the last fifth of a single recording by a
     fit to the rest. Groups are missing if too little is left for the fit.
     """
-    parts = [(records[:at] + records[at + 1 :], record) for at, record in enumerate(records)]
-    if len(records) == 1:
-        at = len(records[0].time) * 4 // 5
-        parts = [([records[0].during(slice(at))], records[0].during(slice(at, None)))]
+    splits = [
+        (recordings[:index] + recordings[index + 1 :], record) for index, record in enumerate(recordings)
+    ]
+    if len(recordings) == 1:
+        index = len(recordings[0].time) * 4 // 5
+        splits = [([recordings[0].during(slice(index))], recordings[0].during(slice(index, None)))]
     residuals: dict[str, list[FloatArray]] = {}
-    for fitted, left in parts:
-        rows = sum(len(found.equations(each).measured) for each in fitted)
-        if rows < FEWEST_ROWS * len(found.system.names):
+    for fitted_recordings, held_out_recording in splits:
+        row_count = sum(len(solution.equations(each).measured) for each in fitted_recordings)
+        if row_count < FEWEST_ROWS * len(solution.system.names):
             continue
-        equations = solution(found.system, fitted).equations(left)
+        equations = fit_system(solution.system, fitted_recordings).equations(held_out_recording)
         for group in np.unique(equations.group):
-            rows_of = equations.group == group
-            error = (equations.measured - equations.predicted)[rows_of]
+            row_mask = equations.group == group
+            error = (equations.measured - equations.predicted)[row_mask]
             residuals.setdefault(str(group), []).append(error)
     return {group: rms(np.concatenate(errors)) for group, errors in residuals.items()}
 

@@ -32,7 +32,7 @@ from vsacli.studies.identification.conditioning import (
 )
 from vsacli.studies.identification.consistent_links import ConsistentLinks, doubts_of, found_links
 from vsacli.studies.identification.explanations import Explanation, explanation
-from vsacli.studies.identification.fitted_system import Solution, solution
+from vsacli.studies.identification.fitted_system import Solution, fit_system
 from vsacli.studies.identification.identification_report import (
     OK,
     POOR_FIT,
@@ -116,54 +116,81 @@ def identify(
     check_robot(robot)
     check_fit(robot, fit, WORDS)
     records = _read_all_recordings(robot, recordings, columns)
-    complete = {joint for record in records for joint in complete_joints(robot, record)}
-    joints = [joint for joint in sorted(complete) if not robot.joints[joint].damper_at("transmission")]
-    signals = [_condition_record(record, bandwidth) for record in records]
-    pushed = {each.path: tools for each in records if (tools := _pushed_tools(robot, each))}
+    complete_indices = {joint for record in records for joint in complete_joints(robot, record)}
+    joints = [
+        joint for joint in sorted(complete_indices) if not robot.joints[joint].damper_at("transmission")
+    ]
+    conditioned_recordings = [_condition_record(record, bandwidth) for record in records]
+    tools_by_path = {each.path: tools for each in records if (tools := _pushed_tools(robot, each))}
     if LINKS not in fit and all(robot.joints[index].actuator.sprung for index in joints):
-        pushed = {}
-    sought = with_friction(robot, joints) if FRICTION in fit else robot
-    first = solutions(sought, joints, fit, signals, pushed=bool(pushed))
-    notes = list(_identification_notes(robot, joints, fit, signals, records, pushed))
-    if not first:
-        wanted = any(unknowns(sought, index, fit) for index in joints)
-        nothing = "nothing can be identified" if wanted else describe_lack(robot, joints, fit)
-        raise InputError.one(f"{nothing} ({'; '.join(notes)})" if notes else nothing)
-    delays = [delay(first, each) for each in signals]
-    signals, moved = _without_delays(signals, delays)
-    found = solutions(sought, joints, fit, signals, pushed=bool(pushed)) if moved else first
-    with progress(2 * len(found)) as bar:
-        systems = Countdown(bar.update, 2 * len(found))
-        reports = tuple(_count_results(systems, (system_report(robot, each, signals) for each in found)))
-        doubts = [tuple(model_doubts(robot, joints, *each)) for each in zip(records, signals, strict=True)]
-        of_gains, explained = [], []
-        if not any(doubts):
-            of_gains = gain_findings(
-                sought, joints, [each for each in found if each.system.title != LINKS], signals
+        tools_by_path = {}
+    robot_with_friction = with_friction(robot, joints) if FRICTION in fit else robot
+    first_solutions = solutions(
+        robot_with_friction, joints, fit, conditioned_recordings, pushed=bool(tools_by_path)
+    )
+    notes = list(_identification_notes(robot, joints, fit, conditioned_recordings, records, tools_by_path))
+    if not first_solutions:
+        has_unknowns = any(unknowns(robot_with_friction, index, fit) for index in joints)
+        failure = "nothing can be identified" if has_unknowns else describe_lack(robot, joints, fit)
+        raise InputError.one(f"{failure} ({'; '.join(notes)})" if notes else failure)
+    delays = [delay(first_solutions, each) for each in conditioned_recordings]
+    conditioned_recordings, are_delays_removed = _without_delays(conditioned_recordings, delays)
+    final_solutions = (
+        solutions(robot_with_friction, joints, fit, conditioned_recordings, pushed=bool(tools_by_path))
+        if are_delays_removed
+        else first_solutions
+    )
+    with progress(2 * len(final_solutions)) as bar:
+        systems = Countdown(bar.update, 2 * len(final_solutions))
+        reports = tuple(
+            _count_results(
+                systems, (system_report(robot, each, conditioned_recordings) for each in final_solutions)
             )
-            explained = list(_count_results(systems, _explanations(robot, found, reports, signals, of_gains)))
+        )
+        doubts = [
+            tuple(model_doubts(robot, joints, *each))
+            for each in zip(records, conditioned_recordings, strict=True)
+        ]
+        gains, explanations = [], []
+        if not any(doubts):
+            gains = gain_findings(
+                robot_with_friction,
+                joints,
+                [each for each in final_solutions if each.system.title != LINKS],
+                conditioned_recordings,
+            )
+            explanations = list(
+                _count_results(
+                    systems, _explanations(robot, final_solutions, reports, conditioned_recordings, gains)
+                )
+            )
         systems.finish()
-    links = next((found_links(sought, each) for each in found if each.system.title == LINKS), None)
-    of_motors = (each for each in found if each.system.title != LINKS)
-    of_sums = {path: value for each in of_motors for path, value in values_of_sums(each).items()}
-    fitted = _identified_robot(robot, sought, reports, links, of_sums)
-    used = tuple(map(_record_report, records, signals, delays, doubts))
-    far = far_from_file(number for report in reports for number in report.numbers)
+    links = next(
+        (found_links(robot_with_friction, each) for each in final_solutions if each.system.title == LINKS),
+        None,
+    )
+    motor_solutions = (each for each in final_solutions if each.system.title != LINKS)
+    sum_values = {path: value for each in motor_solutions for path, value in values_of_sums(each).items()}
+    fitted = _identified_robot(robot, robot_with_friction, reports, links, sum_values)
+    record_reports = tuple(map(_record_report, records, conditioned_recordings, delays, doubts))
+    implausible_values = far_from_file(number for report in reports for number in report.numbers)
     return Identification(
         robot=robot.name,
-        verdict=UNRELIABLE if far else _verdict(reports, used, links, explained, of_gains),
-        records=used,
+        verdict=UNRELIABLE
+        if implausible_values
+        else _verdict(reports, record_reports, links, explanations, gains),
+        records=record_reports,
         systems=reports,
         notes=(
-            *far,
+            *implausible_values,
             *notes,
             *(() if links is None else doubts_of(links)),
-            *(sentence for each in explained for sentence in each.sentences),
-            *(each.sentence for each in of_gains),
+            *(sentence for each in explanations for sentence in each.sentences),
+            *(each.sentence for each in gains),
         ),
         fitted=fitted,
-        deviations=torque_deviations(fitted, found, signals),
-        torques=tuple(torque_comparisons(robot, found, records, signals)),
+        deviations=torque_deviations(fitted, final_solutions, conditioned_recordings),
+        torques=tuple(torque_comparisons(robot, final_solutions, records, conditioned_recordings)),
         sources=(*robot.sources, *(each.source for each in records)),
     )
 
@@ -187,12 +214,14 @@ def _count_results(systems: Countdown, results: Iterable[_Result]) -> Iterator[_
 
 
 def _without_delays(
-    signals: Sequence[ConditionedRecording], delays: Sequence[Delay]
+    recordings: Sequence[ConditionedRecording], delays: Sequence[Delay]
 ) -> tuple[list[ConditionedRecording], bool]:
     """Return signals without their significant delays, and whether any delay was removed."""
-    late = [by.matters(each.rate) for each, by in zip(signals, delays, strict=True)]
-    moved = zip(signals, delays, late, strict=True)
-    return [without_delay(each, by.seconds) if matters else each for each, by, matters in moved], any(late)
+    has_delay = [by.matters(each.rate) for each, by in zip(recordings, delays, strict=True)]
+    recordings_with_delays = zip(recordings, delays, has_delay, strict=True)
+    return [
+        without_delay(each, by.seconds) if matters else each for each, by, matters in recordings_with_delays
+    ], any(has_delay)
 
 
 def _read_all_recordings(
@@ -218,21 +247,21 @@ def _condition_record(record: Record, bandwidth: float | None) -> ConditionedRec
     Raises:
         InputError: the requested bandwidth does not fit the recording.
     """
-    chosen = bandwidth_of(record.time, record.q, record.theta) if bandwidth is None else bandwidth
-    low, high = bandwidth_bounds(record.time)
-    if not low <= chosen <= high:
+    chosen_bandwidth = bandwidth_of(record.time, record.q, record.theta) if bandwidth is None else bandwidth
+    min_bandwidth, max_bandwidth = bandwidth_bounds(record.time)
+    if not min_bandwidth <= chosen_bandwidth <= max_bandwidth:
         raise InputError.one(
-            f"the bandwidth must be between {low:.3g} and {high:.4g} Hz for {record.path} "
-            f"({1 / (record.time[1] - record.time[0]):.4g} Hz), not {chosen:g}"
+            f"the bandwidth must be between {min_bandwidth:.3g} and {max_bandwidth:.4g} Hz for {record.path} "
+            f"({1 / (record.time[1] - record.time[0]):.4g} Hz), not {chosen_bandwidth:g}"
         )
-    return conditioned(record.time, record.q, record.theta, record.tau_motor, chosen)
+    return conditioned(record.time, record.q, record.theta, record.tau_motor, chosen_bandwidth)
 
 
 def solutions(
     robot: Robot,
     joints: Sequence[int],
     fit: Sequence[str],
-    signals: Sequence[ConditionedRecording],
+    recordings: Sequence[ConditionedRecording],
     *,
     pushed: bool = False,
 ) -> list[Solution]:
@@ -242,50 +271,50 @@ def solutions(
         robot: robot with initial values.
         joints: indices of the recorded joints.
         fit: see `identify`.
-        signals: conditioned recordings.
+        recordings: conditioned recordings.
         pushed: whether a wrench acts on the end effector, so that links have no equations.
     """
-    motors = [solution(system, signals) for system in motor_systems(robot, joints, fit, signals)]
+    motors = [fit_system(system, recordings) for system in motor_systems(robot, joints, fit, recordings)]
     links = link_system(robot, fit, motors, links=LINKS in fit, joints=joints)
-    if pushed or not links.names or without_links(robot, joints, links, signals):
+    if pushed or not links.names or without_links(robot, joints, links, recordings):
         return motors
-    return [*motors, solution(links, signals)]
+    return [*motors, fit_system(links, recordings)]
 
 
 def _verdict(
     systems: Sequence[SystemReport],
     records: Sequence[RecordReport],
     links: ConsistentLinks | None,
-    explained: Sequence[Explanation],
-    of_gains: Sequence[Gain],
+    explanations: Sequence[Explanation],
+    gains: Sequence[Gain],
 ) -> str:
     residuals = [each for system in systems for each in system.residuals]
-    if any(record.doubts for record in records) or any(each.unreliable for each in of_gains):
+    if any(record.doubts for record in records) or any(each.unreliable for each in gains):
         return UNRELIABLE
-    held = all(system.converged for system in systems) and (links is None or links.within)
-    if any(map(_fails, residuals)) or not held or any(each.matters for each in explained):
+    is_consistent = all(system.converged for system in systems) and (links is None or links.within)
+    if any(map(_is_poor_fit, residuals)) or not is_consistent or any(each.matters for each in explanations):
         return POOR_FIT
     numbers = (number for system in systems for number in system.numbers)
     return OK if all(number.identifiable for number in numbers) else UNIDENTIFIABLE
 
 
-def _fails(residual: Residual) -> bool:
-    worst = max(residual.residual, residual.held_out if np.isfinite(residual.held_out) else 0.0)
+def _is_poor_fit(residual: Residual) -> bool:
+    max_residual = max(residual.residual, residual.held_out if np.isfinite(residual.held_out) else 0.0)
     noise = residual.noise if np.isfinite(residual.noise) else 0.0
-    return worst > max(ABOVE_NOISE * noise, ABOVE_TORQUE * residual.torque)
+    return max_residual > max(ABOVE_NOISE * noise, ABOVE_TORQUE * residual.torque)
 
 
 def _record_report(
-    record: Record, signals: ConditionedRecording, late: Delay, doubts: tuple[str, ...]
+    record: Record, recording: ConditionedRecording, delay: Delay, doubts: tuple[str, ...]
 ) -> RecordReport:
     return RecordReport(
         path=record.path,
-        duration=float(signals.time[-1] - signals.time[0]),
-        rate=signals.rate,
-        bandwidth=signals.filter.bandwidth,
-        delay=late.seconds,
-        delay_error=late.standard_error,
-        corrected=late.matters(signals.rate),
+        duration=float(recording.time[-1] - recording.time[0]),
+        rate=recording.rate,
+        bandwidth=recording.filter.bandwidth,
+        delay=delay.seconds,
+        delay_error=delay.standard_error,
+        corrected=delay.matters(recording.rate),
         doubts=(*record.doubts, *doubts),
         unused=record.unused,
     )
@@ -295,27 +324,27 @@ def _identification_notes(
     robot: Robot,
     joints: Sequence[int],
     fit: Sequence[str],
-    signals: Sequence[ConditionedRecording],
+    recordings: Sequence[ConditionedRecording],
     records: Sequence[Record],
-    pushed: Mapping[str, str],
+    tools_by_path: Mapping[str, str],
 ) -> Iterator[str]:
-    left = [joint.name for index, joint in enumerate(robot.joints) if index not in joints]
-    damped = [joint.name for joint in robot.joints if joint.damper_at("transmission")]
-    if left := [name for name in left if name not in damped]:
-        whose = "its" if len(left) == 1 else "their"
-        missing = f"no columns of {', '.join(left)}: {whose} parameters are not identified"
-        yield f"{missing}{_ignored(records)}"
-    if damped:
-        names = ", ".join(damped)
+    unrecorded_names = [joint.name for index, joint in enumerate(robot.joints) if index not in joints]
+    damped_names = [joint.name for joint in robot.joints if joint.damper_at("transmission")]
+    if unrecorded_names := [name for name in unrecorded_names if name not in damped_names]:
+        whose = "its" if len(unrecorded_names) == 1 else "their"
+        sentence = f"no columns of {', '.join(unrecorded_names)}: {whose} parameters are not identified"
+        yield f"{sentence}{_ignored_columns_clause(records)}"
+    if damped_names:
+        names = ", ".join(damped_names)
         yield (
             f"the parameters of {names} are not identified: the torque of the damper parallel to the springs "
             "is unknown"
         )
-    yield from (f"{path}: {PUSHED.format(tools)}" for path, tools in pushed.items())
+    yield from (f"{path}: {PUSHED.format(tools)}" for path, tools in tools_by_path.items())
     system = link_system(robot, fit, links=LINKS in fit, joints=joints)
-    if pushed or not system.names:
+    if tools_by_path or not system.names:
         return
-    if reason := without_links(robot, joints, system, signals):
+    if reason := without_links(robot, joints, system, recordings):
         yield reason
     elif not system.bodies:
         yield "parameters of joints are identified with the links of the file, which are assumed to be exact"
@@ -323,69 +352,71 @@ def _identification_notes(
         yield "links are identified with the springs of the file, which are assumed to be exact"
 
 
-MOST_IGNORED = 5
+MAX_IGNORED_COLUMNS = 5
 """Largest number of ignored columns that a note names."""
 
 
-def _ignored(records: Sequence[Record]) -> str:
+def _ignored_columns_clause(records: Sequence[Record]) -> str:
     """Return a clause with the columns that were not used, which may be misnamed ones; "" without any."""
     unused = list(dict.fromkeys(column for record in records for column in record.unused))
     if not unused:
         return ""
-    return f"; ignored columns: {listed(unused, MOST_IGNORED)}"
+    return f"; ignored columns: {listed(unused, MAX_IGNORED_COLUMNS)}"
 
 
 def _explanations(
     robot: Robot,
-    found: Sequence[Solution],
+    solutions: Sequence[Solution],
     reports: Sequence[SystemReport],
-    signals: Sequence[ConditionedRecording],
-    of_gains: Sequence[Gain],
+    recordings: Sequence[ConditionedRecording],
+    gains: Sequence[Gain],
 ) -> Iterator[Explanation]:
     """Yield explanations of the residuals."""
     # links are identified from the torque of springs, so a fault of the springs would be explained twice
-    explained: list[Explanation] = []
-    for system, report in zip(found, reports, strict=True):
-        wrong = any(each.matters for each in explained) or any(each.unreliable for each in of_gains)
-        if system.system.title != LINKS or not wrong:
-            fails = any(map(_fails, report.residuals))
-            explained.append(explanation(robot, system, signals, fails=fails))
-            yield explained[-1]
+    explanations: list[Explanation] = []
+    for solution, report in zip(solutions, reports, strict=True):
+        are_springs_wrong = any(each.matters for each in explanations) or any(
+            each.unreliable for each in gains
+        )
+        if solution.system.title != LINKS or not are_springs_wrong:
+            fails = any(map(_is_poor_fit, report.residuals))
+            explanations.append(explanation(robot, solution, recordings, fails=fails))
+            yield explanations[-1]
 
 
 def _identified_robot(
     robot: Robot,
-    sought: Robot,
+    robot_with_friction: Robot,
     systems: Sequence[SystemReport],
     links: ConsistentLinks | None,
-    of_sums: Mapping[str, float],
+    sum_values: Mapping[str, float],
 ) -> Robot:
-    values = {each.path: each.value for each in to_write(robot, systems)} | dict(of_sums)
-    fitted = sought.replace(values | ({} if links is None else dict(links.parts)))
+    values = {each.path: each.value for each in to_write(robot, systems)} | dict(sum_values)
+    fitted = robot_with_friction.replace(values | ({} if links is None else dict(links.parts)))
     if links is None or not links.links:
         return fitted
     joints = map(lambda joint, link: dataclasses.replace(joint, link=link), fitted.joints, links.links)
     return dataclasses.replace(fitted, joints=tuple(joints))
 
 
-NOTHING = 1e-9
+ZERO_PARAMETER = 1e-9
 """Size of link parameters, SI units, below which they are rounding errors."""
 
 
 def to_write(robot: Robot, systems: Iterable[SystemReport]) -> Iterator[Number]:
     """Yield the identified parameters of the robot file, and changed friction that the file lacks."""
-    known = set(map(str, parameters(robot)))
+    file_paths = set(map(str, parameters(robot)))
     for number in (number for system in systems for number in system.numbers):
-        if number.identifiable and not number.sum and (number.path in known or number.changed):
+        if number.identifiable and not number.sum and (number.path in file_paths or number.changed):
             yield number
 
 
-FINER = 100.0
+ERROR_DIGITS_RATIO = 100.0
 """Ratio of standard errors to those of which two digits are written: errors of parameters go together, and
 torques are determined better than each parameter alone."""
 
 
-def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
+def fitted_text(robot: Robot, identification: Identification, folder: str | Path) -> str:
     """Return the text of the robot's file with the identified parameters and their standard errors.
 
     Everything else, comments included, remains as the user wrote it; paths still refer to the same files.
@@ -393,37 +424,37 @@ def fitted_text(robot: Robot, found: Identification, folder: str | Path) -> str:
 
     Args:
         robot: robot as read from its file.
-        found: result of the identification.
+        identification: result of the identification.
         folder: folder of the new file.
 
     Raises:
         InputError: the robot was not read from a file.
     """
-    own, home = text_to_change(robot)
-    known = set(map(str, parameters(robot)))
-    written = {str(each): each.value for each in parameters(found.fitted)}
+    source_text, source_folder = text_to_change(robot)
+    file_paths = set(map(str, parameters(robot)))
+    fitted_values = {str(each): each.value for each in parameters(identification.fitted)}
     values: dict[str, Any] = {}
     errors: dict[str, str] = {}
-    for number in to_write(robot, found.systems):
-        path = _in_text(robot, number.path)
-        value = written.get(number.path, number.value)
-        value = float(rounded_by_error(value, number.standard_error / FINER, math.inf))
+    for number in to_write(robot, identification.systems):
+        path = _path_in_text(robot, number.path)
+        value = fitted_values.get(number.path, number.value)
+        value = float(rounded_by_error(value, number.standard_error / ERROR_DIGITS_RATIO, math.inf))
         errors[path] = f"{number.standard_error:.2g}"
-        if written.get(number.path, number.value) == number.before:
+        if fitted_values.get(number.path, number.value) == number.before:
             continue
-        if number.path in known:
+        if number.path in file_paths:
             values[path] = value
         else:
             parent, _, key = path.rpartition(".")
             values.setdefault(parent, {"coulomb": 0.0})[key] = value
-    values |= dict(_changed_parts(robot, found.fitted, {*values, *errors}))
-    values |= _changed_links(robot, found.fitted, own)
-    files = dict(moved_files(own, home, Path(folder)))
-    text = edited(unaliased(own, values), {**values, **files})
+    values |= dict(_changed_parts(robot, identification.fitted, {*values, *errors}))
+    values |= _changed_links(robot, identification.fitted, source_text)
+    files = dict(moved_files(source_text, source_folder, Path(folder)))
+    text = edited(unaliased(source_text, values), {**values, **files})
     return with_errors(text, errors)
 
 
-def _in_text(robot: Robot, path: str) -> str:
+def _path_in_text(robot: Robot, path: str) -> str:
     """Return the path of a parameter of a joint as the text of the robot has it, with the joint's index."""
     _, joint, *rest = path.split(".")
     return ".".join((JOINTS, str(robot.joint_names.index(joint)), *rest))
@@ -435,26 +466,26 @@ def _changed_parts(robot: Robot, fitted: Robot, identified: set[str]) -> Iterato
     for each in parameters(robot):
         path = str(each)
         changed = each.part != "link" and values.get(path, each.value) != each.value
-        if changed and (place := _in_text(robot, path)) not in identified:
-            yield place, _rounded_parameter(values[path])
+        if changed and (text_path := _path_in_text(robot, path)) not in identified:
+            yield text_path, _rounded_parameter(values[path])
 
 
 def _changed_links(robot: Robot, fitted: Robot, text: str) -> dict[str, Any]:
     """Return parameters of changed links by path, in the frames of the file's convention."""
     modified = dict(texts_at(text, "convention")).get("convention") == "modified"
-    found: dict[str, Any] = {}
-    for index, (joint, before) in enumerate(zip(fitted.joints, robot.joints, strict=True)):
-        if joint.link != before.link:
+    changes: dict[str, Any] = {}
+    for index, (joint, file_joint) in enumerate(zip(fitted.joints, robot.joints, strict=True)):
+        if joint.link != file_joint.link:
             link = modified_link(joint) if modified else joint.link
-            place = f"{JOINTS}.{index}.link"
-            found[f"{place}.mass"] = _rounded_parameter(link.mass)
-            found[f"{place}.com"] = [_rounded_parameter(each) for each in link.com]
-            found[f"{place}.inertia"] = {
+            link_path = f"{JOINTS}.{index}.link"
+            changes[f"{link_path}.mass"] = _rounded_parameter(link.mass)
+            changes[f"{link_path}.com"] = [_rounded_parameter(each) for each in link.com]
+            changes[f"{link_path}.inertia"] = {
                 key: _rounded_parameter(value) for key, value in vars(link.inertia).items()
             }
-    return found
+    return changes
 
 
 def _rounded_parameter(value: float) -> float:
     """Return a value with 7 digits, more than recordings determine, and 0 for a rounding error."""
-    return 0.0 if abs(value) < NOTHING else float(f"{value:.7g}")
+    return 0.0 if abs(value) < ZERO_PARAMETER else float(f"{value:.7g}")

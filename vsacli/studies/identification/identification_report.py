@@ -151,11 +151,11 @@ SMOOTH_CURVES = 8
 """Rows of a figure per row of the equations, whose coarse curves would have corners."""
 
 
-def system_report(robot: Robot, found: Solution, signals: list[ConditionedRecording]) -> SystemReport:
+def system_report(robot: Robot, solution: Solution, recordings: list[ConditionedRecording]) -> SystemReport:
     """Return the results and residuals of a system."""
-    system, fit = found.system, found.fit
-    of_joint = f"{JOINTS}.{system.title}.actuator."
-    names = [system.names[number].removeprefix(of_joint) for number in found.free]
+    system, fit = solution.system, solution.fit
+    path_prefix = f"{JOINTS}.{system.title}.actuator."
+    names = [system.names[number].removeprefix(path_prefix) for number in solution.free]
     combinations = [
         f"only {each.words(names)} is identifiable: {rounded_by_error(each.value, each.standard_error)} "
         f"+- {each.standard_error:.2g}"
@@ -163,35 +163,37 @@ def system_report(robot: Robot, found: Solution, signals: list[ConditionedRecord
     ]
     return SystemReport(
         title=system.title,
-        numbers=tuple(numbers_of(found)),
+        numbers=tuple(numbers_of(solution)),
         condition=fit.condition,
         combinations=tuple(combinations),
-        residuals=tuple(_residuals(robot, found, signals)),
+        residuals=tuple(_residuals(robot, solution, recordings)),
         converged=fit.converged,
     )
 
 
-def numbers_of(found: Solution) -> Iterator[Number]:
+def numbers_of(solution: Solution) -> Iterator[Number]:
     """Yield the result of each parameter of a system."""
-    system, fit = found.system, found.fit
-    inseparable = {at for each in fit.inseparable for at, _ in each.terms}
-    said = zip(system.names, system.units, system.sums, strict=True)
-    for number, (name, unit, total) in enumerate(said):
-        before = float(system.before[number])
-        if number in found.bound:
-            value, error = found.bound[number]
-            note = NOT_PHYSICAL if np.isnan(error) else "" if value == before else AT_BOUND
+    system, fit = solution.system, solution.fit
+    inseparable = {free_index for each in fit.inseparable for free_index, _ in each.terms}
+    descriptions = zip(system.names, system.units, system.sums, strict=True)
+    for index, (name, unit, sum_text) in enumerate(descriptions):
+        file_value = float(system.before[index])
+        if index in solution.bound:
+            value, error = solution.bound[index]
+            note = NOT_PHYSICAL if np.isnan(error) else "" if value == file_value else AT_BOUND
         else:
-            at = found.free.index(number)
-            value, error = float(fit.values[at]), float(fit.standard_errors[at])
-            note = INDISTINCT if at in inseparable else ""
-            note = NO_EFFECT if at in fit.unexcited else note
-        yield Number(name, unit, before, value, error, note, total)
+            free_index = solution.free.index(index)
+            value, error = float(fit.values[free_index]), float(fit.standard_errors[free_index])
+            note = INDISTINCT if free_index in inseparable else ""
+            note = NO_EFFECT if free_index in fit.unexcited else note
+        yield Number(name, unit, file_value, value, error, note, sum_text)
 
 
-def _residuals(robot: Robot, found: Solution, signals: list[ConditionedRecording]) -> Iterator[Residual]:
-    equations = [found.equations(each) for each in signals]
-    beyond = held_out(found, signals)
+def _residuals(
+    robot: Robot, solution: Solution, recordings: list[ConditionedRecording]
+) -> Iterator[Residual]:
+    equations = [solution.equations(each) for each in recordings]
+    held_out_rms = held_out(solution, recordings)
     measured, residual, group = (
         np.concatenate(parts)
         for parts in (
@@ -201,14 +203,14 @@ def _residuals(robot: Robot, found: Solution, signals: list[ConditionedRecording
         )
     )
     for name in dict.fromkeys(map(str, group)):
-        rows = group == name
+        row_mask = group == name
         yield Residual(
             group=name,
             unit=_unit(robot, name),
-            torque=rms(measured[rows]),
-            residual=rms(residual[rows]),
-            noise=_group_noise(robot, name, signals, equations),
-            held_out=beyond.get(name, float("nan")),
+            torque=rms(measured[row_mask]),
+            residual=rms(residual[row_mask]),
+            noise=_group_noise(robot, name, recordings, equations),
+            held_out=held_out_rms.get(name, float("nan")),
         )
 
 
@@ -222,54 +224,54 @@ def _unit(robot: Robot, group: str) -> str:
 
 
 def _group_noise(
-    robot: Robot, group: str, signals: Sequence[ConditionedRecording], equations: Sequence[Equations]
+    robot: Robot, group: str, recordings: Sequence[ConditionedRecording], equations: Sequence[Equations]
 ) -> float:
     """Return the noise of a group's residual from that of torques and positions; NaN if either is unknown."""
     index = _joint_of_group(robot, group)
     motors, sprung = motor_names(robot, index), robot.joints[index].actuator.sprung
-    of_positions = [each.noise()[0][each.group == group] for each in equations if each.noise is not None]
-    noise = rms(np.concatenate(of_positions)) if of_positions else math.nan
+    position_noise = [each.noise()[0][each.group == group] for each in equations if each.noise is not None]
+    noise = rms(np.concatenate(position_noise)) if position_noise else math.nan
     if sprung and group not in motors:  # the torque of springs follows from positions alone
         return noise
     motor = motors.index(group) if sprung else 0
-    of_torque = np.array([torque_noise(each)[index, motor] for each in signals])
-    return math.hypot(noise, rms(of_torque[~np.isnan(of_torque)]))
+    torque_noises = np.array([torque_noise(each)[index, motor] for each in recordings])
+    return math.hypot(noise, rms(torque_noises[~np.isnan(torque_noises)]))
 
 
 def torque_comparisons(
     robot: Robot,
-    found: Sequence[Solution],
+    solutions: Sequence[Solution],
     records: Sequence[Record],
-    signals: Sequence[ConditionedRecording],
+    recordings: Sequence[ConditionedRecording],
 ) -> Iterator[Torques]:
     """Yield measured and predicted torques of all recordings and systems."""
-    for record, coarse in zip(records, signals, strict=True):
-        stride = max(1, coarse.filter.stride // SMOOTH_CURVES)
-        of_record = coarse._replace(filter=coarse.filter._replace(stride=stride))
-        time: FloatArray = of_record.time[::stride]
-        for each in found:
-            equations = each.equations(of_record)
+    for record, recording in zip(records, recordings, strict=True):
+        stride = max(1, recording.filter.stride // SMOOTH_CURVES)
+        fine_recording = recording._replace(filter=recording.filter._replace(stride=stride))
+        time: FloatArray = fine_recording.time[::stride]
+        for each in solutions:
+            equations = each.equations(fine_recording)
             for name in dict.fromkeys(map(str, equations.group)):
-                rows = equations.group == name
+                row_mask = equations.group == name
                 yield Torques(
                     record=record.path,
                     group=name,
                     unit=_unit(robot, name),
                     time=time,
-                    measured=equations.measured[rows],
-                    predicted=equations.predicted[rows],
+                    measured=equations.measured[row_mask],
+                    predicted=equations.predicted[row_mask],
                 )
 
 
-SAMPLES = 200
+DEVIATION_SAMPLES = 200
 """Samples of each recording at which torques are compared: ten per period of its fastest motion, or more."""
 
-OF_LINK = ("mass", *(f"com.{axis}" for axis in range(3)), *(f"inertia.{entry}" for entry in TENSOR))
+LINK_PATH_ENDS = ("mass", *(f"com.{axis}" for axis in range(3)), *(f"inertia.{entry}" for entry in TENSOR))
 """Ends of the paths of a link's parameters, in the order of `derivatives_by_file`."""
 
 
 def torque_deviations(
-    robot: Robot, found: Sequence[Solution], records: Sequence[ConditionedRecording]
+    robot: Robot, solutions: Sequence[Solution], recordings: Sequence[ConditionedRecording]
 ) -> tuple[TorqueDeviation, ...]:
     """Return the largest standard deviations of each motor's torque, along the recordings and elsewhere.
 
@@ -277,37 +279,49 @@ def torque_deviations(
 
     Args:
         robot: fitted robot.
-        found: solutions of the equations, which have the covariances.
-        records: conditioned recordings.
+        solutions: solutions of the equations, which have the covariances.
+        recordings: conditioned recordings.
     """
-    settable = [STIFFNESS.key in actuator.commanded for actuator in robot.actuators]
-    positions = [part for each in records for part in (each.q, each.theta[:, settable])]
-    massless = any(joint.link.mass == 0 for joint in robot.joints)
-    if massless or any(joint.damper for joint in robot.joints) or any(np.isnan(e).any() for e in positions):
+    has_stiffness = [STIFFNESS.key in actuator.commanded for actuator in robot.actuators]
+    positions = [part for each in recordings for part in (each.q, each.theta[:, has_stiffness])]
+    has_massless_link = any(joint.link.mass == 0 for joint in robot.joints)
+    if (
+        has_massless_link
+        or any(joint.damper for joint in robot.joints)
+        or any(np.isnan(e).any() for e in positions)
+    ):
         return ()
-    motions = [_recorded_motion(robot, each) for each in records]
-    torque, deviation = _largest_deviations(robot, found, motions)
-    _, elsewhere = _largest_deviations(robot, found, map(_recombined, motions))
+    motions = [_recorded_motion(robot, each) for each in recordings]
+    torque, deviation = _largest_torque_deviations(robot, solutions, motions)
+    _, recombined_deviation = _largest_torque_deviations(robot, solutions, map(_recombined, motions))
     return tuple(
-        TorqueDeviation(name, VARIABLES[TORQUE].quantity.unit(joint.type), *map(float, of_motor))
-        for joint, *of_joint in zip(robot.joints, torque, deviation, elsewhere, strict=True)
-        for name, *of_motor in zip(motor_names(robot, robot.joints.index(joint)), *of_joint, strict=False)
+        TorqueDeviation(name, VARIABLES[TORQUE].quantity.unit(joint.type), *map(float, motor_values))
+        for joint, *joint_values in zip(robot.joints, torque, deviation, recombined_deviation, strict=True)
+        for name, *motor_values in zip(
+            motor_names(robot, robot.joints.index(joint)), *joint_values, strict=False
+        )
     )
 
 
-def _recorded_motion(robot: Robot, signals: ConditionedRecording) -> Motion:
+def _recorded_motion(robot: Robot, recording: ConditionedRecording) -> Motion:
     """Return the motion of a recording with its stiffness."""
-    stiffness = np.full_like(signals.q, np.nan)
+    stiffness = np.full_like(recording.q, np.nan)
     for index, actuator in enumerate(robot.actuators):
         if STIFFNESS.key in actuator.commanded:
-            stiffness[:, index] = value_of(actuator.springs_of(joint_motion(signals, index)).stiffness)
-    of_time = (
-        *(signals.time, signals.q, signals.dq, signals.ddq, *spline_derivatives(signals.time, signals.ddq)),
-        *(stiffness, *spline_derivatives(signals.time, stiffness)),
+            stiffness[:, index] = value_of(actuator.springs_of(joint_motion(recording, index)).stiffness)
+    motion_arrays = (
+        *(
+            recording.time,
+            recording.q,
+            recording.dq,
+            recording.ddq,
+            *spline_derivatives(recording.time, recording.ddq),
+        ),
+        *(stiffness, *spline_derivatives(recording.time, stiffness)),
     )
-    every = max(1, len(signals.time) // SAMPLES)
-    time, q, dq, ddq, d3q, d4q, *of_stiffness = (each[::every] for each in of_time)
-    return Motion(time, q, dq, ddq, d3q, d4q, dict(zip(STIFFNESS.names, of_stiffness, strict=True)))
+    stride = max(1, len(recording.time) // DEVIATION_SAMPLES)
+    time, q, dq, ddq, d3q, d4q, *stiffness_arrays = (each[::stride] for each in motion_arrays)
+    return Motion(time, q, dq, ddq, d3q, d4q, dict(zip(STIFFNESS.names, stiffness_arrays, strict=True)))
 
 
 def _recombined(motion: Motion) -> Motion:
@@ -317,28 +331,34 @@ def _recombined(motion: Motion) -> Motion:
     return Motion.of(motion.time, shuffled)
 
 
-def _largest_deviations(
-    robot: Robot, found: Sequence[Solution], motions: Iterable[Motion]
+def _largest_torque_deviations(
+    robot: Robot, solutions: Sequence[Solution], motions: Iterable[Motion]
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest motor torques and their largest standard deviations, (joints, 2)."""
-    weights = [[_by_file(robot, each.system, number) for number in each.free] for each in found]
-    chosen = parameters(robot, list({path: None for each in weights for one in each for path in one}))
-    place = {str(each): at for at, each in enumerate(chosen)}
-    sizes, deviations = [], []
+    weights = [
+        [_derivatives_of_file(robot, each.system, number) for number in each.free] for each in solutions
+    ]
+    run_parameters = parameters(robot, list({path: None for each in weights for one in each for path in one}))
+    index_of_path = {str(each): at for at, each in enumerate(run_parameters)}
+    magnitudes, deviations = [], []
     for motion in motions:
-        part = derivatives_of(robot, motion, chosen)
+        part = derivatives_of(robot, motion, run_parameters)
         slopes = np.moveaxis(part.over_time(TORQUE), 1, 0)  # (parameters, samples, joints, 2)
         variance = np.zeros(slopes.shape[1:])
-        for solution, of_system in zip(found, weights, strict=True):
-            own = np.array([sum(w * slopes[place[path]] for path, w in one.items()) for one in of_system])
-            variance += np.einsum("f...,fg,g...->...", own, solution.fit.covariance, own)
-        sizes.append(np.abs(part.block.tau_motor))
+        for solution, system_weights in zip(solutions, weights, strict=True):
+            unknown_slopes = np.array(
+                [sum(w * slopes[index_of_path[path]] for path, w in one.items()) for one in system_weights]
+            )
+            variance += np.einsum(
+                "f...,fg,g...->...", unknown_slopes, solution.fit.covariance, unknown_slopes
+            )
+        magnitudes.append(np.abs(part.block.tau_motor))
         deviations.append(np.sqrt(variance))
-    torque, deviation = (np.fmax.reduce(np.concatenate(each)) for each in (sizes, deviations))
+    torque, deviation = (np.fmax.reduce(np.concatenate(each)) for each in (magnitudes, deviations))
     return torque, deviation
 
 
-def _by_file(robot: Robot, system: SystemOfEquations, number: int) -> dict[str, float]:
+def _derivatives_of_file(robot: Robot, system: SystemOfEquations, number: int) -> dict[str, float]:
     """Return the derivatives of parameters of the file, by path, by an unknown of a system."""
     if isinstance(system, MotorSystem):
         return {str(system.sought[number]): 1.0}
@@ -348,5 +368,5 @@ def _by_file(robot: Robot, system: SystemOfEquations, number: int) -> dict[str, 
     index, symbol = divmod(int(system.base.kept[number]), len(SYMBOLS))
     joint = robot.joints[index]
     weights = np.linalg.inv(derivatives_by_file(joint.link))[:, symbol]
-    paths = (f"{JOINTS}.{joint.name}.link.{end}" for end in OF_LINK)
+    paths = (f"{JOINTS}.{joint.name}.link.{end}" for end in LINK_PATH_ENDS)
     return {path: float(weight) for path, weight in zip(paths, weights, strict=True) if weight}

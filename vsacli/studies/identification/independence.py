@@ -15,14 +15,14 @@ import scipy
 
 from vsacli.base.arrays import FloatArray, IndexArray
 
-NOTHING = 1e-13
+ZERO_NORM_RATIO = 1e-13
 """Ratio of a column's norm to the largest norm up to which the column is rounding."""
 
-ABOVE_NOISE = 4.0
+MIN_NOISE_RATIO = 4.0
 """Ratio of a column's independent part to its noise above which it is independent: below, more than a
 sixteenth of its square is noise, and its unknown comes out too small by that share."""
 
-CERTAIN = 10.0
+MIN_SHARE_RATIO = 10.0
 """Multiple of the tolerance below which the share of a column in another is set to zero: a share is as
 uncertain as the dependence itself, amplified by the condition number of the independent columns."""
 
@@ -61,29 +61,29 @@ def independence(columns: FloatArray, tolerance: float, noise: FloatArray | None
         noise: noise of the columns, which the remainder of an independent column must exceed.
     """
     scale = np.linalg.norm(columns, axis=0)
-    there = np.flatnonzero(scale > NOTHING * scale.max(initial=0.0))
-    scaled = columns[:, there] / scale[there]
-    of_noise = np.zeros_like(scaled) if noise is None else noise[:, there] / scale[there]
-    triangle, of_noise = (np.asarray(np.linalg.qr(each, mode="r")) for each in (scaled, of_noise))
-    order = _pivoted(triangle, of_noise, tolerance)
-    kept, dropped = there[order], np.setdiff1d(there, there[order])
-    q, r = np.linalg.qr(scaled[:, order])
-    others = np.setdiff1d(np.arange(len(there)), order)
-    shares = scipy.linalg.solve_triangular(r, q.T @ scaled[:, others])
-    shares[np.abs(shares) < CERTAIN * tolerance] = 0.0
+    nonzero = np.flatnonzero(scale > ZERO_NORM_RATIO * scale.max(initial=0.0))
+    scaled = columns[:, nonzero] / scale[nonzero]
+    scaled_noise = np.zeros_like(scaled) if noise is None else noise[:, nonzero] / scale[nonzero]
+    triangle, scaled_noise = (np.asarray(np.linalg.qr(each, mode="r")) for each in (scaled, scaled_noise))
+    pivot_order = _pivot_order(triangle, scaled_noise, tolerance)
+    kept, dropped = nonzero[pivot_order], np.setdiff1d(nonzero, nonzero[pivot_order])
+    q, r = np.linalg.qr(scaled[:, pivot_order])
+    dependent = np.setdiff1d(np.arange(len(nonzero)), pivot_order)
+    shares = scipy.linalg.solve_triangular(r, q.T @ scaled[:, dependent])
+    shares[np.abs(shares) < MIN_SHARE_RATIO * tolerance] = 0.0
     return Independence(
         kept=kept,
         dropped=dropped,
-        nothing=np.setdiff1d(np.arange(len(scale)), there),
+        nothing=np.setdiff1d(np.arange(len(scale)), nonzero),
         shares=shares * scale[dropped] / scale[kept][:, None],
         scale=scale,
         q=q,
         r=r,
-        condition=float(np.linalg.cond(triangle)) if there.size else 1.0,
+        condition=float(np.linalg.cond(triangle)) if nonzero.size else 1.0,
     )
 
 
-def _pivoted(triangle: FloatArray, noise: FloatArray, tolerance: float) -> list[int]:
+def _pivot_order(triangle: FloatArray, noise: FloatArray, tolerance: float) -> list[int]:
     """Return indices of the independent columns, in the order of pivoting.
 
     Args:
@@ -91,35 +91,35 @@ def _pivoted(triangle: FloatArray, noise: FloatArray, tolerance: float) -> list[
         noise: noise of the columns, reduced by QR; each elimination is applied to it as well.
         tolerance: see `independence`.
     """
-    left, noise = triangle.copy(), noise.copy()
-    waiting, kept = list(range(left.shape[1])), []
-    while waiting:
-        size = np.linalg.norm(left[:, waiting], axis=0)
-        first_of_largest = int(np.argmax(np.round(size, 9)))
-        best = waiting.pop(first_of_largest)
-        size_of_best = float(np.max(size))
-        if size_of_best > max(tolerance, ABOVE_NOISE * float(np.linalg.norm(noise[:, best]))):
-            share = left[:, best] @ left[:, waiting] / size_of_best**2
-            left[:, waiting] -= np.outer(left[:, best], share)
-            noise[:, waiting] -= np.outer(noise[:, best], share)
-            kept.append(best)
+    remainder, noise = triangle.copy(), noise.copy()
+    candidates, kept = list(range(remainder.shape[1])), []
+    while candidates:
+        norms = np.linalg.norm(remainder[:, candidates], axis=0)
+        largest_index = int(np.argmax(np.round(norms, 9)))
+        pivot = candidates.pop(largest_index)
+        pivot_norm = float(np.max(norms))
+        if pivot_norm > max(tolerance, MIN_NOISE_RATIO * float(np.linalg.norm(noise[:, pivot]))):
+            share = remainder[:, pivot] @ remainder[:, candidates] / pivot_norm**2
+            remainder[:, candidates] -= np.outer(remainder[:, pivot], share)
+            noise[:, candidates] -= np.outer(noise[:, pivot], share)
+            kept.append(pivot)
     return kept
 
 
 def first_independent(columns: FloatArray, tolerance: float) -> IndexArray:
     """Return indices of the columns that are not combinations of previous columns; see `independence`."""
     scale = np.linalg.norm(columns, axis=0)
-    there = np.flatnonzero(scale > NOTHING * scale.max(initial=0.0))
-    r = np.linalg.qr(columns[:, there] / scale[there], mode="r")
-    return np.asarray(there[np.abs(np.diagonal(r)) > tolerance])
+    nonzero = np.flatnonzero(scale > ZERO_NORM_RATIO * scale.max(initial=0.0))
+    r = np.linalg.qr(columns[:, nonzero] / scale[nonzero], mode="r")
+    return np.asarray(nonzero[np.abs(np.diagonal(r)) > tolerance])
 
 
 def shares_of(kept: FloatArray, columns: FloatArray, tolerance: float) -> FloatArray:
     """Return the shares of independent columns, (rows, kept), in other columns, (kept, columns)."""
-    scale, of_others = np.linalg.norm(kept, axis=0), np.linalg.norm(columns, axis=0)
+    scale, column_norms = np.linalg.norm(kept, axis=0), np.linalg.norm(columns, axis=0)
     shares, *_ = np.linalg.lstsq(kept / scale, columns, rcond=None)
-    shares[:, of_others <= NOTHING * of_others.max(initial=0.0)] = 0.0
-    shares[np.abs(shares) < CERTAIN * tolerance * of_others] = 0.0
+    shares[:, column_norms <= ZERO_NORM_RATIO * column_norms.max(initial=0.0)] = 0.0
+    shares[np.abs(shares) < MIN_SHARE_RATIO * tolerance * column_norms] = 0.0
     return np.asarray(shares / scale[:, None])
 
 
@@ -130,11 +130,12 @@ def in_words(terms: Iterable[tuple[int, float]], names: Sequence[str]) -> str:
         terms: index and factor of each unknown; the first factor is 1.
         names: names of all unknowns.
     """
-    (first, _), *others = terms
-    signed = (
-        f" {'-' if factor < 0 else '+'} {_factor_text(abs(factor))}{names[at]}" for at, factor in others
+    (first, _), *other_terms = terms
+    signed_terms = (
+        f" {'-' if factor < 0 else '+'} {_factor_text(abs(factor))}{names[index]}"
+        for index, factor in other_terms
     )
-    return "".join((names[first], *signed))
+    return "".join((names[first], *signed_terms))
 
 
 def _factor_text(factor: float) -> str:

@@ -25,7 +25,7 @@ from vsacli.studies.identification.recording_faults import (
     TORQUE,
     RecordedColumn,
     Where,
-    recorded_columns,
+    read_recorded_columns,
     stopping_faults,
     unreliable_fit_sentences,
 )
@@ -34,7 +34,7 @@ from vsacli.studies.measured.measured_columns import nearest_turn
 INTERPOLATION = 3
 """Degree of the spline that resamples a column."""
 
-EVEN = 1e-6
+GRID_TOLERANCE = 1e-6
 """Deviation of time stamps from the grid, in sampling intervals, below which no interpolation is needed."""
 
 
@@ -77,14 +77,14 @@ def read_motor_recording(robot: Robot, path: str | Path, mapping: ColumnMapping 
         InputError: no column is required, a unit does not fit its variable, times do not ascend, or faults
             prevent a fit.
     """
-    recorded, unused, recording = recorded_columns(robot, path, mapping)
-    needed = {place for index in range(len(robot.joints)) for place in _needed(robot, index)}
-    columns = [column for column in recorded if column.place in needed] or recorded
-    unused = (*(column.name for column in recorded if column.place not in needed), *unused)
+    recorded, unused, recording = read_recorded_columns(robot, path, mapping)
+    required = {place for index in range(len(robot.joints)) for place in _required_columns(robot, index)}
+    columns = [column for column in recorded if column.place in required] or recorded
+    unused = (*(column.name for column in recorded if column.place not in required), *unused)
     faults = list(stopping_faults(columns, robot, recording.table))
     if faults:
         raise InputError(Problem(str(path), 0, sentence) for sentence in faults)
-    time = _grid(columns)
+    time = _uniform_times(columns)
     arrays = {
         variable: np.full((len(time), len(robot.joints), count), np.nan)
         for variable, count in ((POSITION, 1), (MOTOR, SIDES), (TORQUE, SIDES))
@@ -118,7 +118,7 @@ def _turn_motors(theta: FloatArray, q: FloatArray, joint: Joint) -> None:
         theta[:, motor] = nearest_turn(theta[:, motor], q)
 
 
-SAME = 1e-7
+COPY_TOLERANCE = 1e-7
 """Difference of the values of two recordings, relative to their range, below which they are the same one:
 written with fewer digits, but below the noise of any sensor."""
 
@@ -130,11 +130,11 @@ def check_distinct(records: Sequence[Record]) -> None:
         InputError: two recordings have the same values.
     """
     problems = []
-    for before, record in combinations(records, 2):
-        if before.path == record.path:
+    for other, record in combinations(records, 2):
+        if other.path == record.path:
             problems.append(Problem(record.path, 0, "is given twice; give each recording once"))
-        elif all(map(_equal_arrays, _signal_values(before), _signal_values(record))):
-            problems.append(Problem(record.path, 0, f"equals {before.path}; give each recording once"))
+        elif all(map(_equal_arrays, _signal_values(other), _signal_values(record))):
+            problems.append(Problem(record.path, 0, f"equals {other.path}; give each recording once"))
     if problems:
         raise InputError(problems)
 
@@ -143,32 +143,37 @@ def _signal_values(record: Record) -> tuple[FloatArray, ...]:
     return record.q, record.theta, record.tau_motor
 
 
-def _equal_arrays(before: FloatArray, after: FloatArray) -> bool:
+def _equal_arrays(first: FloatArray, second: FloatArray) -> bool:
     """Return whether arrays, with NaN for missing columns, are equal up to rounding."""
-    if before.shape != after.shape or not np.array_equal(np.isnan(before), np.isnan(after)):
+    if first.shape != second.shape or not np.array_equal(np.isnan(first), np.isnan(second)):
         return False
-    known = np.isfinite(before)
-    return not known.any() or bool(
-        np.max(np.abs(before[known] - after[known])) <= SAME * np.ptp(before[known])
+    is_finite = np.isfinite(first)
+    return not is_finite.any() or bool(
+        np.max(np.abs(first[is_finite] - second[is_finite])) <= COPY_TOLERANCE * np.ptp(first[is_finite])
     )
 
 
-def _grid(columns: Sequence[RecordedColumn]) -> FloatArray:
+def _uniform_times(columns: Sequence[RecordedColumn]) -> FloatArray:
     """Return uniform times at the rate of the fastest column, over the time span common to all columns."""
-    fastest = max(columns, key=lambda column: (len(column.time) - 1) / np.ptp(column.time))
-    step = float(np.ptp(fastest.time)) / (len(fastest.time) - 1)
+    fastest_column = max(columns, key=lambda column: (len(column.time) - 1) / np.ptp(column.time))
+    sampling_interval = float(np.ptp(fastest_column.time)) / (len(fastest_column.time) - 1)
     start = max(float(column.time[0]) for column in columns)
     stop = min(float(column.time[-1]) for column in columns)
-    return np.asarray(start + step * np.arange(int((stop - start) / step + EVEN) + 1))
+    return np.asarray(
+        start + sampling_interval * np.arange(int((stop - start) / sampling_interval + GRID_TOLERANCE) + 1)
+    )
 
 
 def _resample_column(column: RecordedColumn, time: FloatArray) -> FloatArray:
     """Return values at the times of the grid: samples if they lie on it, otherwise a spline through them."""
-    step = float(time[1] - time[0])
-    first = int(np.argmin(np.abs(column.time - time[0])))
-    own = column.time[first : first + len(time)]
-    if len(own) == len(time) and np.max(np.abs(own - time)) <= EVEN * step:
-        return column.values[first : first + len(time)]
+    sampling_interval = float(time[1] - time[0])
+    start_index = int(np.argmin(np.abs(column.time - time[0])))
+    times_on_grid = column.time[start_index : start_index + len(time)]
+    if (
+        len(times_on_grid) == len(time)
+        and np.max(np.abs(times_on_grid - time)) <= GRID_TOLERANCE * sampling_interval
+    ):
+        return column.values[start_index : start_index + len(time)]
     return np.asarray(scipy.interpolate.make_interp_spline(column.time, column.values, k=INTERPOLATION)(time))
 
 
@@ -185,24 +190,24 @@ def complete_joints(robot: Robot, record: Record) -> tuple[int, ...]:
     Raises:
         InputError: a joint with motor columns lacks others, or no joint is complete.
     """
-    found: list[int] = []
-    lacking: list[Where] = []
+    complete: list[int] = []
+    missing_columns: list[Where] = []
     for index in range(len(robot.joints)):
-        needed = _needed(robot, index)
-        missing = [place for place in needed if place not in record.columns]
+        required = _required_columns(robot, index)
+        missing = [place for place in required if place not in record.columns]
         if not missing:
-            found.append(index)
-        elif any(name != POSITION for name, _, _ in set(needed) - set(missing)):
-            lacking += missing
-    if not (found or lacking):  # positions alone, or columns of no joint
-        needed = [place for index in range(len(robot.joints)) for place in _needed(robot, index)]
-        lacking = [place for place in needed if place not in record.columns]
-    if lacking:
-        raise InputError.one(_missing_columns_text(robot, lacking), record.path)
-    return tuple(found)
+            complete.append(index)
+        elif any(name != POSITION for name, _, _ in set(required) - set(missing)):
+            missing_columns += missing
+    if not (complete or missing_columns):  # positions alone, or columns of no joint
+        required = [place for index in range(len(robot.joints)) for place in _required_columns(robot, index)]
+        missing_columns = [place for place in required if place not in record.columns]
+    if missing_columns:
+        raise InputError.one(_missing_columns_text(robot, missing_columns), record.path)
+    return tuple(complete)
 
 
-def _needed(robot: Robot, index: int) -> list[Where]:
+def _required_columns(robot: Robot, index: int) -> list[Where]:
     """Return the columns that identification requires for a joint."""
     actuator = robot.joints[index].actuator
     motors = MOTORS[: len(actuator.motors)]
@@ -221,8 +226,14 @@ def _missing_columns_text(robot: Robot, places: Sequence[Where]) -> str:
         ]
         if names:
             clauses.append(f"{listed(names, MOST_LISTED)} ({words})")
-    one = len(places) == 1
-    missing = f"the {'column' if one else 'columns'} {' and '.join(clauses)} {'is' if one else 'are'} missing"
-    torque = any(name == TORQUE for name, *_ in places)
-    advice = "record torques or motor currents; " if torque else ""
-    return f"{missing}; {advice}if {'it has another name' if one else 'they have other names'}, use --columns"
+    is_single = len(places) == 1
+    sentence = (
+        f"the {'column' if is_single else 'columns'} {' and '.join(clauses)} "
+        f"{'is' if is_single else 'are'} missing"
+    )
+    lacks_torque = any(name == TORQUE for name, *_ in places)
+    advice = "record torques or motor currents; " if lacks_torque else ""
+    return (
+        f"{sentence}; {advice}if {'it has another name' if is_single else 'they have other names'}, "
+        "use --columns"
+    )

@@ -44,17 +44,17 @@ def parameters_of(link: Link) -> FloatArray:
     return about_origin(np.array([link.mass, *link.com, *tensor_entries(link.inertia.tensor)]))
 
 
-def about_origin(of_file: FloatArray) -> FloatArray:
+def about_origin(file_values: FloatArray) -> FloatArray:
     """Return the standard parameters, (10,), from mass, center of mass and inertia about it, (10,)."""
-    mass, com = of_file[0], of_file[1:4]
-    return np.concatenate(([mass], mass * com, of_file[4:] + tensor_entries(mass * steiner(com))))
+    mass, com = file_values[0], file_values[1:4]
+    return np.concatenate(([mass], mass * com, file_values[4:] + tensor_entries(mass * steiner(com))))
 
 
 def derivatives_by_file(link: Link) -> FloatArray:
     """Return derivatives of the standard parameters by mass, center of mass and inertia, (10, 10)."""
-    of_file = np.array([link.mass, *link.com, *tensor_entries(link.inertia.tensor)])
+    file_values = np.array([link.mass, *link.com, *tensor_entries(link.inertia.tensor)])
     changes = np.eye(len(SYMBOLS))  # central differences of polynomials of second degree are exact
-    columns = [(about_origin(of_file + each) - about_origin(of_file - each)) / 2 for each in changes]
+    columns = [(about_origin(file_values + each) - about_origin(file_values - each)) / 2 for each in changes]
     return np.stack(columns, axis=1)
 
 
@@ -135,23 +135,23 @@ class Regressor(RowKernel):
 
     def __call__(self, rows: Sequence[Scalar]) -> list[Scalar]:
         """Run the recursion for each parameter."""
-        given = self.arguments.unpack(rows)
+        motion = self.arguments.unpack(rows)
         columns = [
-            column for index in range(len(self.robot.joints)) for column in self._of_link(index, given)
+            column for index in range(len(self.robot.joints)) for column in self._link_columns(index, motion)
         ]
-        return [torque for of_joint in zip(*columns, strict=True) for torque in of_joint]
+        return [torque for joint_torques in zip(*columns, strict=True) for torque in joint_torques]
 
-    def _of_link(self, moving: int, given: Motion) -> Iterator[list[Scalar]]:
+    def _link_columns(self, link_index: int, motion: Motion) -> Iterator[list[Scalar]]:
         """Yield the torques of the joints per unit of each parameter of a link."""
-        alone = self._torques(moving, given, 1, ZERO, _NO_INERTIA)
-        yield alone
+        mass_torques = self._torques(link_index, motion, 1, ZERO, _NO_INERTIA)
+        yield mass_torques
         for axis, inertia in zip(_AXES, _POINT_INERTIAS, strict=True):
             # torque per unit of m c: a unit mass at c = axis, minus its shares of m and of the inertia
             central = SymmetricTensor(*(-entry for entry in inertia))
-            yield list(map(sub, self._torques(moving, given, 1, axis, central), alone))
+            yield list(map(sub, self._torques(link_index, motion, 1, axis, central), mass_torques))
         for place in range(len(_NO_INERTIA)):
             entries = [int(place == entry) for entry in range(len(_NO_INERTIA))]
-            yield self._torques(moving, given, 0, ZERO, SymmetricTensor(*entries))
+            yield self._torques(link_index, motion, 0, ZERO, SymmetricTensor(*entries))
 
     def _torques(
         self, moving: int, given: Motion, mass: int, com: Vector, inertia: SymmetricTensor
@@ -202,11 +202,11 @@ row per joint."""
 SEED = 0
 """Seed of the random motions, so that the same robot has the same base parameters each time."""
 
-STRUCTURAL = 1e-9
+DEPENDENCE_TOLERANCE = 1e-9
 """Relative distance of a column from the span of others below which it is dependent. For the bundled robots,
 dependent columns are below 1e-15, the others above 0.3."""
 
-PREFERRED = ("Ixx", "Ixy", "Ixz", "Iyz", "Izz", "mx", "my", "Iyy", "mz", "m")
+KEPT_SYMBOLS = ("Ixx", "Ixy", "Ixz", "Iyz", "Izz", "mx", "my", "Iyy", "mz", "m")
 """Parameters of a link in the order in which they are kept: with revolute joints, the last three are
 regrouped into the previous link."""
 
@@ -230,8 +230,8 @@ class BaseParameters(NamedTuple):
             columns: derivatives of the torques by the parameters, (rows, parameters).
             order: indices of the parameters in the order in which they are kept.
         """
-        kept: IndexArray = np.sort(order[first_independent(columns[:, order], STRUCTURAL)])
-        shares = shares_of(columns[:, kept], columns, STRUCTURAL)
+        kept: IndexArray = np.sort(order[first_independent(columns[:, order], DEPENDENCE_TOLERANCE)])
+        shares = shares_of(columns[:, kept], columns, DEPENDENCE_TOLERANCE)
         shares[:, kept] = np.eye(len(kept))  # without rounding
         return cls(kept, shares)
 
@@ -241,14 +241,17 @@ class BaseParameters(NamedTuple):
 
     def names(self, names: Sequence[str]) -> list[str]:
         """Return the name of each combination's first parameter, with a star if it has others."""
-        alone = np.count_nonzero(self.shares, axis=1) == 1
-        return [f"{names[at]}{'' if one else '*'}" for at, one in zip(self.kept, alone, strict=True)]
+        is_single = np.count_nonzero(self.shares, axis=1) == 1
+        return [
+            f"{names[index]}{'' if single else '*'}"
+            for index, single in zip(self.kept, is_single, strict=True)
+        ]
 
-    def words(self, place: int, names: Sequence[str]) -> str:
+    def words(self, combination: int, names: Sequence[str]) -> str:
         """Return a combination as a sum in words, e.g. `shoulder.Izz + 0.09 elbow.m`."""
-        first, factors = int(self.kept[place]), self.shares[place]
-        others = ((int(at), float(factors[at])) for at in np.flatnonzero(factors) if at != first)
-        return in_words([(first, 1.0), *others], names)
+        first_index, factors = int(self.kept[combination]), self.shares[combination]
+        other_terms = ((int(at), float(factors[at])) for at in np.flatnonzero(factors) if at != first_index)
+        return in_words([(first_index, 1.0), *other_terms], names)
 
 
 def random_motion(joints: int) -> FloatArray:
@@ -259,4 +262,4 @@ def random_motion(joints: int) -> FloatArray:
 def preferred_order(joints: int) -> IndexArray:
     """Return the indices of the parameters of all links in the order in which they are kept."""
     links = len(SYMBOLS) * np.arange(joints)[:, None]
-    return np.asarray((links + [SYMBOLS.index(symbol) for symbol in PREFERRED]).ravel())
+    return np.asarray((links + [SYMBOLS.index(symbol) for symbol in KEPT_SYMBOLS]).ravel())

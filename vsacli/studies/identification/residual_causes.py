@@ -21,20 +21,20 @@ from vsacli.studies.identification.fitted_system import Solution
 from vsacli.studies.identification.motor_equations import LINKS, motor_names
 from vsacli.studies.identification.recording_faults import MOTOR, TORQUE
 
-STEP = 1e-4
+INITIAL_POSITION_ERROR = 1e-4
 """Initial error of a position, rad (m), in the search for it."""
 
-FARTHEST = 0.1
+MAX_POSITION_ERROR = 0.1
 """Largest plausible error of a position, rad (m): six degrees are noticed when an arm is set up."""
 
-SMALL = 0.1
+MAX_TORQUE_ERROR = 0.1
 """Largest plausible bias of a torque relative to the largest measured torque, and half of the largest
 plausible gain error. Other checks find larger ones; here a large one would mask a spring with another law."""
 
 PASSES = 3
 """Number of estimates of the error; the second differs from the third by less than its standard error."""
 
-SLOW = 0.1
+STRIBECK_SPEED_SHARE = 0.1
 """Share of the largest speed at which Stribeck friction has fallen by a factor e: in bearings and gears it
 falls within the slowest tenth of their speed (B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica
 30 (1994))."""
@@ -86,100 +86,116 @@ PLACE = "{name}: what is left depends on its position: a cable, a stop or a weig
 
 
 def residual_causes(
-    robot: Robot, found: Solution, records: Sequence[ConditionedRecording], equations: Sequence[Equations]
+    robot: Robot,
+    solution: Solution,
+    recordings: Sequence[ConditionedRecording],
+    equations: Sequence[Equations],
 ) -> list[Cause]:
     """Return possible causes of residuals of a joint's motors, or of all links.
 
     Args:
         robot: robot as in its file.
-        found: solution of the equations.
-        records: fitted recordings.
+        solution: solution of the equations.
+        recordings: fitted recordings.
         equations: equations of the recordings at the solution.
     """
-    if found.system.title == LINKS:
-        return list(_of_links(robot, records, equations))
-    return list(_motor_causes(robot, found, records, equations))
+    if solution.system.title == LINKS:
+        return list(_link_causes(robot, recordings, equations))
+    return list(_motor_causes(robot, solution, recordings, equations))
 
 
 def _motor_causes(
-    robot: Robot, found: Solution, records: Sequence[ConditionedRecording], equations: Sequence[Equations]
+    robot: Robot,
+    solution: Solution,
+    recordings: Sequence[ConditionedRecording],
+    equations: Sequence[Equations],
 ) -> Iterator[Cause]:
-    index = robot.joint_names.index(found.system.title)
+    index = robot.joint_names.index(solution.system.title)
     joint = robot.joints[index]
     position, torque = (VARIABLES[each].quantity.unit(joint.type) for each in (MOTOR, TORQUE))
     names = motor_names(robot, index)
-    recorded = {name: motor for motor, name in enumerate(names) if name in found.fit.residual_rms}
-    behind = joint.actuator.has_columns(VARIABLES["phi"])[: len(names)]
-    deflections = [_deflections(behind, each, index) for each in records]
-    pulls = np.where(np.mean(np.hstack(deflections), axis=1) < 0, -1.0, 1.0)  # opposite signs in a pair
-    pulled = [pulls[:, None] * each for each in deflections]
-    alike: dict[int, list[Cause]] = {}
-    for name, motor in recorded.items():
-        own = [each.group == name for each in equations]
-        zero = _by_zero(found, records, equations, index, motor)
-        yield Cause(name, OFF, zero, position, FARTHEST)
-        yield _bias(name, own, equations, torque)
-        of_both = [
-            _gain_cause(name, own, equations),
-            *_frictions(
+    motor_of_name = {name: motor for motor, name in enumerate(names) if name in solution.fit.residual_rms}
+    has_spring = joint.actuator.has_columns(VARIABLES["phi"])[: len(names)]
+    deflections = [_deflections(has_spring, each, index) for each in recordings]
+    signs = np.where(np.mean(np.hstack(deflections), axis=1) < 0, -1.0, 1.0)  # opposite signs in a pair
+    signed_deflections = [signs[:, None] * each for each in deflections]
+    causes_by_kind: dict[int, list[Cause]] = {}
+    for name, motor in motor_of_name.items():
+        row_masks = [each.group == name for each in equations]
+        position_columns = _position_error_columns(solution, recordings, equations, index, motor)
+        yield Cause(name, OFF, position_columns, position, MAX_POSITION_ERROR)
+        yield _bias_cause(name, row_masks, equations, torque)
+        motor_causes = [
+            _gain_cause(name, row_masks, equations),
+            *_friction_causes(
                 name,
-                own,
-                records,
-                [each.dtheta[:, index, motor] for each in records],
+                row_masks,
+                recordings,
+                [each.dtheta[:, index, motor] for each in recordings],
                 DAMPING.format(
                     damping=joint.actuator.motors[motor].damping,
                     path=f"joints.{joint.name}.actuator.motor*.damping",
                 ),
             ),
-            _law(SPRING, name, own, records, _polynomial_terms(pulled, motor, float(pulls[motor]))),
+            _filtered_cause(
+                SPRING,
+                name,
+                row_masks,
+                recordings,
+                _polynomial_terms(signed_deflections, motor, float(signs[motor])),
+            ),
         ]
-        yield from of_both
-        for kind, each in enumerate(of_both):
-            alike.setdefault(kind, []).append(each)
-    if len(recorded) > 1:
-        for first, second in alike.values():
+        yield from motor_causes
+        for kind, each in enumerate(motor_causes):
+            causes_by_kind.setdefault(kind, []).append(each)
+    if len(motor_of_name) > 1:
+        for first, second in causes_by_kind.values():
             columns = [one + other for one, other in zip(first.columns, second.columns, strict=True)]
             yield first._replace(name=f"both motors of {joint.name}", columns=columns)
 
 
-def _deflections(behind: Sequence[bool], signals: ConditionedRecording, index: int) -> FloatArray:
+def _deflections(has_spring: Sequence[bool], recording: ConditionedRecording, index: int) -> FloatArray:
     """Return the deflections of motors behind a spring and the positions of others, (motors, samples)."""
-    theta, q = signals.theta[:, index, : len(behind)].T, signals.q[:, index]
-    return np.where(np.array(behind)[:, None], theta - q, theta)
+    theta, q = recording.theta[:, index, : len(has_spring)].T, recording.q[:, index]
+    return np.where(np.array(has_spring)[:, None], theta - q, theta)
 
 
-def _of_links(
-    robot: Robot, records: Sequence[ConditionedRecording], equations: Sequence[Equations]
+def _link_causes(
+    robot: Robot, recordings: Sequence[ConditionedRecording], equations: Sequence[Equations]
 ) -> Iterator[Cause]:
     for index, joint in enumerate(robot.joints):
         name = f"link of {joint.name}"
-        own = [each.group == name for each in equations]
-        if any(each.any() for each in own):
-            yield _gain_cause(name, own, equations)
+        row_masks = [each.group == name for each in equations]
+        if any(each.any() for each in row_masks):
+            yield _gain_cause(name, row_masks, equations)
             words = DAMPING.format(damping=joint.damping, path=f"joints.{joint.name}.damping")
-            yield from _frictions(name, own, records, [each.dq[:, index] for each in records], words)
-            positions = [each.q[:, index][None] for each in records]
-            yield _law(PLACE, name, own, records, _polynomial_terms(positions, 0, 1.0))
+            yield from _friction_causes(
+                name, row_masks, recordings, [each.dq[:, index] for each in recordings], words
+            )
+            positions = [each.q[:, index][None] for each in recordings]
+            yield _filtered_cause(PLACE, name, row_masks, recordings, _polynomial_terms(positions, 0, 1.0))
 
 
-def _bias(name: str, own: Sequence[BoolArray], equations: Sequence[Equations], unit: str) -> Cause:
+def _bias_cause(
+    name: str, row_masks: Sequence[BoolArray], equations: Sequence[Equations], unit: str
+) -> Cause:
     largest = max(
-        float(np.max(np.abs(each.measured[there]))) for each, there in zip(equations, own, strict=True)
+        float(np.max(np.abs(each.measured[there]))) for each, there in zip(equations, row_masks, strict=True)
     )
-    columns = [each[:, None].astype(float) for each in own]
-    return Cause(name, BIASED, columns, unit, SMALL * largest)
+    columns = [each[:, None].astype(float) for each in row_masks]
+    return Cause(name, BIASED, columns, unit, MAX_TORQUE_ERROR * largest)
 
 
-def _gain_cause(name: str, own: Sequence[BoolArray], equations: Sequence[Equations]) -> Cause:
-    columns = [(each.predicted * there)[:, None] for each, there in zip(equations, own, strict=True)]
-    return Cause(name, GAIN, columns, largest=2 * SMALL, neutral=1.0)
+def _gain_cause(name: str, row_masks: Sequence[BoolArray], equations: Sequence[Equations]) -> Cause:
+    columns = [(each.predicted * there)[:, None] for each, there in zip(equations, row_masks, strict=True)]
+    return Cause(name, GAIN, columns, largest=2 * MAX_TORQUE_ERROR, neutral=1.0)
 
 
-def _frictions(
+def _friction_causes(
     name: str,
-    own: Sequence[BoolArray],
-    records: Sequence[ConditionedRecording],
-    speeds: Sequence[FloatArray],
+    row_masks: Sequence[BoolArray],
+    recordings: Sequence[ConditionedRecording],
+    velocities: Sequence[FloatArray],
     undamped: str,
 ) -> Iterator[Cause]:
     """Yield damping, then quadratic friction, then dry and Stribeck friction.
@@ -187,49 +203,58 @@ def _frictions(
     Damping that is identified leaves nothing to explain; `undamped` words the other case.
     """
     # separate causes, since a test with fewer columns detects smaller effects
-    largest = max(float(np.max(np.abs(each), initial=0.0)) for each in speeds) or 1.0
-    scaled = [each / largest for each in speeds]
-    yield _law(undamped, name, own, records, [v[None] for v in scaled])
-    yield _law(FRICTION, name, own, records, [(v * np.abs(v))[None] for v in scaled])
-    dry = [np.sign(v) for v in scaled]  # the law of the file, so that it adds nothing where that is fitted
-    falling = [sign * np.exp(-np.abs(v) / SLOW) for sign, v in zip(dry, scaled, strict=True)]
-    yield _law(FRICTION, name, own, records, [np.stack(each) for each in zip(dry, falling, strict=True)])
+    max_speed = max(float(np.max(np.abs(each), initial=0.0)) for each in velocities) or 1.0
+    scaled_velocities = [each / max_speed for each in velocities]
+    yield _filtered_cause(undamped, name, row_masks, recordings, [v[None] for v in scaled_velocities])
+    yield _filtered_cause(
+        FRICTION, name, row_masks, recordings, [(v * np.abs(v))[None] for v in scaled_velocities]
+    )
+    dry = [
+        np.sign(v) for v in scaled_velocities
+    ]  # the law of the file, so that it adds nothing where that is fitted
+    stribeck = [
+        sign * np.exp(-np.abs(v) / STRIBECK_SPEED_SHARE)
+        for sign, v in zip(dry, scaled_velocities, strict=True)
+    ]
+    yield _filtered_cause(
+        FRICTION, name, row_masks, recordings, [np.stack(each) for each in zip(dry, stribeck, strict=True)]
+    )
 
 
-def _law(
+def _filtered_cause(
     words: str,
     name: str,
-    own: Sequence[BoolArray],
-    records: Sequence[ConditionedRecording],
+    row_masks: Sequence[BoolArray],
+    recordings: Sequence[ConditionedRecording],
     terms: Sequence[FloatArray],
 ) -> Cause:
     """Return a cause from functions of the motion, (terms, samples) for each recording, filtered."""
     columns = []
-    for there, signals, of_record in zip(own, records, terms, strict=True):
-        rows = np.zeros((len(there), len(of_record)))
-        if there.any():
-            rows[there] = signals.filter.applied(of_record.T)
-        columns.append(rows)
+    for row_mask, recording, recording_terms in zip(row_masks, recordings, terms, strict=True):
+        column_block = np.zeros((len(row_mask), len(recording_terms)))
+        if row_mask.any():
+            column_block[row_mask] = recording.filter.applied(recording_terms.T)
+        columns.append(column_block)
     return Cause(name, words, columns)
 
 
-def _polynomial_terms(positions: Sequence[FloatArray], place: int, sign: float) -> list[FloatArray]:
+def _polynomial_terms(positions: Sequence[FloatArray], position_index: int, sign: float) -> list[FloatArray]:
     """Return Legendre polynomials of one position over the range of all, (terms, samples) per recording.
 
     Args:
         positions: positions in each recording, (positions, samples).
-        place: index of the position.
+        position_index: index of the position.
         sign: sign with which the torque acts.
     """
     low, high = min(float(each.min()) for each in positions), max(float(each.max()) for each in positions)
-    half = (high - low) / 2 or 1.0
-    scaled = [(each[place] - low) / half - 1 for each in positions]
+    half_range = (high - low) / 2 or 1.0
+    scaled = [(each[position_index] - low) / half_range - 1 for each in positions]
     return [sign * legendre.legvander(each, DEGREE)[:, 1:].T for each in scaled]
 
 
-def _by_zero(
-    found: Solution,
-    records: Sequence[ConditionedRecording],
+def _position_error_columns(
+    solution: Solution,
+    recordings: Sequence[ConditionedRecording],
     equations: Sequence[Equations],
     index: int,
     motor: int,
@@ -239,29 +264,37 @@ def _by_zero(
     Springs are nonlinear in the error, and it makes identified parameters wrong. So the slope is a secant
     over the best-fitting error, at the parameters that belong to it.
     """
-    values, error = found.predicting, STEP
+    parameter_values, position_error = solution.predicting, INITIAL_POSITION_ERROR
     columns: list[FloatArray] = []
     for _ in range(PASSES):
-        columns = [_secant(found, values, each, (index, motor), error) for each in records]
-        longer = [
-            each._replace(slopes=np.hstack((each.slopes[:, found.free], column)))
+        columns = [
+            _prediction_slope(solution, parameter_values, each, (index, motor), position_error)
+            for each in recordings
+        ]
+        extended_equations = [
+            each._replace(slopes=np.hstack((each.slopes[:, solution.free], column)))
             for each, column in zip(equations, columns, strict=True)
         ]
-        fit = least_squares(longer, np.zeros(len(found.free) + 1))
-        if not np.isfinite(fit.standard_errors[-1]) or abs(fit.values[-1]) > FARTHEST:
+        fit = least_squares(extended_equations, np.zeros(len(solution.free) + 1))
+        if not np.isfinite(fit.standard_errors[-1]) or abs(fit.values[-1]) > MAX_POSITION_ERROR:
             break
-        values = found.predicting
-        values[list(found.free)] += fit.solution[:-1]
-        error = float(fit.values[-1]) or STEP
+        parameter_values = solution.predicting
+        parameter_values[list(solution.free)] += fit.solution[:-1]
+        position_error = float(fit.values[-1]) or INITIAL_POSITION_ERROR
     return columns
 
 
-def _secant(
-    found: Solution, values: FloatArray, signals: ConditionedRecording, place: tuple[int, int], error: float
+def _prediction_slope(
+    solution: Solution,
+    parameter_values: FloatArray,
+    recording: ConditionedRecording,
+    theta_index: tuple[int, int],
+    position_error: float,
 ) -> FloatArray:
-    theta = signals.theta.copy()
-    theta[:, *place] -= error
-    there, here = (
-        found.system.equations(values, each).predicted for each in (signals._replace(theta=theta), signals)
+    theta = recording.theta.copy()
+    theta[:, *theta_index] -= position_error
+    shifted_prediction, prediction = (
+        solution.system.equations(parameter_values, each).predicted
+        for each in (recording._replace(theta=theta), recording)
     )
-    return np.asarray((there - here) / error)[:, None]
+    return np.asarray((shifted_prediction - prediction) / position_error)[:, None]

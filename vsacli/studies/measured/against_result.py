@@ -36,7 +36,7 @@ from vsacli.studies.measured.likely_causes import (
 )
 from vsacli.studies.measured.line_fit import LineFit, fit_line, root_mean_square, still_signal
 from vsacli.studies.measured.measured_columns import (
-    MOST_NAMED,
+    MAX_LISTED_JOINTS,
     MeasuredSignal,
     Recording,
     nearest_turn,
@@ -83,31 +83,33 @@ def compare(
     if not isinstance(result, StoredResult):
         with open_stored(result) as stored:
             return compare(stored, recording, time_offset, columns)
-    wanted = list(stand_ins(_variables(result)))
+    column_names = list(stand_ins(_variables(result)))
     mapping = load_columns(columns)
-    read = read_recording(recording, result, wanted, result.robot_name, mapping)
-    recorded, behind = _most_direct(read)
-    computed = _interpolate_signals(result, recorded.signals)
+    full_recording = read_recording(recording, result, column_names, result.robot_name, mapping)
+    direct_recording, replaced_columns = _most_direct_signals(full_recording)
+    computed = _interpolate_signals(result, direct_recording.signals)
     duration = float(result.time[-1] - result.time[0])
     pairings = [
-        Pairing(function, duration, *_signal_samples(recorded, signal))
-        for function, signal in zip(computed, recorded.signals, strict=True)
+        Pairing(function, duration, *_signal_samples(direct_recording, signal))
+        for function, signal in zip(computed, direct_recording.signals, strict=True)
     ]
     alignment = (
-        _align_recording(recorded, pairings, recording) if time_offset is None else Alignment(time_offset)
+        _align_recording(direct_recording, pairings, recording)
+        if time_offset is None
+        else Alignment(time_offset)
     )
-    overlap = _overlap(recorded.time, alignment.time_offset, duration, recording)
+    overlap = _overlap(direct_recording.time, alignment.time_offset, duration, recording)
     if mapping.unwrap:
-        pairings = _nearest_turns(recorded, pairings, alignment.time_offset)
-    signals = _agreements(result, recorded, pairings, alignment)
-    ratios = _gear_ratios(recorded, result)
+        pairings = _nearest_turns(direct_recording, pairings, alignment.time_offset)
+    signals = _agreements(result, direct_recording, pairings, alignment)
+    ratios = _gear_ratios(direct_recording, result)
     notes = (
-        *_without_torques(recorded, wanted),
+        *_without_torques(direct_recording, column_names),
         *_alignment_notes(alignment),
-        *_common_lag(signals, alignment.time_offset),
+        *_common_lag_notes(signals, alignment.time_offset),
         *likely_causes(signals, ratios),
         *wrong_model(signals, ratios),
-        *_columns_left_out(recorded, behind),
+        *_columns_left_out(direct_recording, replaced_columns),
     )
     return Comparison(
         result=str(result.path),
@@ -118,69 +120,73 @@ def compare(
         duration=duration,
         compared=overlap.duration,
         signals=signals,
-        warnings=tuple(comparison_warnings(result, read.stranger, signals, ratios, overlap)),
+        warnings=tuple(comparison_warnings(result, full_recording.stranger, signals, ratios, overlap)),
         notes=notes,
-        sources=(recorded.table.source,),
+        sources=(direct_recording.table.source,),
     )
 
 
 def _variables(result: StoredResult) -> dict[str, Variable]:
     """Return the variables by plain name; for a simulation the simulated ones instead of the commands."""
-    found: dict[str, Variable] = {}
+    variables: dict[str, Variable] = {}
     for name in result.variables:
-        plain = name.removesuffix(measured(""))
+        plain_name = name.removesuffix(measured(""))
         if name not in COMMANDS.values():
-            found[plain] = result.declared[plain if plain in result.variables else name]
-    return found
+            variables[plain_name] = result.declared[plain_name if plain_name in result.variables else name]
+    return variables
 
 
-def _most_direct(recorded: Recording) -> tuple[Recording, list[str]]:
+def _most_direct_signals(recorded: Recording) -> tuple[Recording, list[str]]:
     """Return the recording with the most direct column of each signal, and the names of the others."""
-    best = {signal.column for signal in preferred(recorded.signals).values()}
-    kept = tuple(signal for signal in recorded.signals if signal.column in best)
-    behind = [signal.column for signal in recorded.signals if signal.column not in best]
-    return recorded._replace(signals=kept), behind
+    preferred_columns = {signal.column for signal in preferred(recorded.signals).values()}
+    direct_signals = tuple(signal for signal in recorded.signals if signal.column in preferred_columns)
+    replaced_columns = [
+        signal.column for signal in recorded.signals if signal.column not in preferred_columns
+    ]
+    return recorded._replace(signals=direct_signals), replaced_columns
 
 
 def _signal_samples(recorded: Recording, signal: MeasuredSignal) -> tuple[FloatArray, FloatArray]:
     """Return times and values of a signal, without rows in which it has none."""
-    there = np.isfinite(signal.values)
-    if np.count_nonzero(there) < FEWEST_SAMPLES and not there.all():
-        found = counted(int(np.count_nonzero(there)), "number")
-        message = f"column {signal.column!r} has {found} of at least {FEWEST_SAMPLES}; leave it out"
+    is_finite = np.isfinite(signal.values)
+    if np.count_nonzero(is_finite) < FEWEST_SAMPLES and not is_finite.all():
+        number_count = counted(int(np.count_nonzero(is_finite)), "number")
+        message = f"column {signal.column!r} has {number_count} of at least {FEWEST_SAMPLES}; leave it out"
         raise InputError.one(message, recorded.table.source.path)
-    return recorded.time[there], signal.values[there]
+    return recorded.time[is_finite], signal.values[is_finite]
 
 
 def _interpolate_signals(result: StoredResult, signals: Sequence[MeasuredSignal]) -> list[Computed]:
     """Return each computed signal as a function of the time since the start of the result."""
-    found, time = [], result.time - result.time[0]
+    computed_signals, time = [], result.time - result.time[0]
     names = {signal.place.variable for signal in signals}
     stored = {name: np.asarray(result.read(name), dtype=float) for name in names}
-    largest = {
+    max_magnitudes = {
         name: float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
         for name, values in stored.items()
     }
     for variable, joint, motor in (signal.place.target for signal in signals):
         values = stored[variable][:, joint]
-        found.append(interpolated(time, values if motor is None else values[:, motor - 1], largest[variable]))
-    return found
+        computed_signals.append(
+            interpolated(time, values if motor is None else values[:, motor - 1], max_magnitudes[variable])
+        )
+    return computed_signals
 
 
 def _align_recording(recorded: Recording, pairings: Sequence[Pairing], path: str | Path) -> Alignment:
     groups = [_exchange_group(signal) for signal in recorded.signals]
     variables = [signal.place.variable for signal in recorded.signals]
-    of_positions = [variable.startswith(POSITIONS) for variable in variables]
+    is_position = [variable.startswith(POSITIONS) for variable in variables]
     commanded = [variable.startswith(POSITIONS[0]) for variable in variables]
     positions = align(
-        *(list(compress(pairings, of_positions)), list(compress(groups, of_positions))),
-        list(compress(commanded, of_positions)),
+        *(list(compress(pairings, is_position)), list(compress(groups, is_position))),
+        list(compress(commanded, is_position)),
     )
     alignment = positions or align(pairings, groups, commanded)
     if alignment is None:
         raise InputError.one(
             "matches the result at no time offset; is it the recording of this motion, and does anything "
-            f"move? {_other_unit(pairings[0])}If the offset is known, give --time-offset",
+            f"move? {_time_unit_hint(pairings[0])}If the offset is known, give --time-offset",
             path,
         )
     return alignment
@@ -191,13 +197,13 @@ def _exchange_group(signal: MeasuredSignal) -> tuple[str, str]:
     return signal.place.variable, signal.place.unit
 
 
-def _other_unit(pairing: Pairing) -> str:
+def _time_unit_hint(pairing: Pairing) -> str:
     """Return a hint that times may not be in seconds, if the durations differ much; otherwise ""."""
-    lasts = float(pairing.time[-1])
-    if 1 / OTHER_UNIT < lasts / pairing.duration < OTHER_UNIT:
+    recording_duration = float(pairing.time[-1])
+    if 1 / OTHER_UNIT < recording_duration / pairing.duration < OTHER_UNIT:
         return ""
-    lengths = f"It lasts {lasts:.4g} s and the result {pairing.duration:.4g} s"
-    return f"{lengths}: if times are in another unit, write it in the header, e.g. time[ms]. "
+    sentence = f"It lasts {recording_duration:.4g} s and the result {pairing.duration:.4g} s"
+    return f"{sentence}: if times are in another unit, write it in the header, e.g. time[ms]. "
 
 
 def _nearest_turns(recorded: Recording, pairings: Sequence[Pairing], time_offset: float) -> list[Pairing]:
@@ -210,22 +216,23 @@ def _nearest_turns(recorded: Recording, pairings: Sequence[Pairing], time_offset
     ]
 
 
-def _overlap(stamps: FloatArray, time_offset: float, duration: float, path: str | Path) -> Overlap:
+def _overlap(times: FloatArray, time_offset: float, duration: float, path: str | Path) -> Overlap:
     """Return the part of the result that the recording covers.
 
     Raises:
         InputError: too few rows overlap.
     """
-    time = stamps - time_offset
-    rows = int(np.count_nonzero((time >= 0) & (time <= duration)))
-    if rows < FEWEST_SAMPLES:
-        few = f"{rows or 'no'} {'row overlaps' if rows < 2 else 'rows overlap'}"
+    time = times - time_offset
+    row_count = int(np.count_nonzero((time >= 0) & (time <= duration)))
+    if row_count < FEWEST_SAMPLES:
+        row_text = f"{row_count or 'no'} {'row overlaps' if row_count < 2 else 'row_count overlap'}"
         raise InputError.one(
-            f"with a time offset of {time_offset:.4g} s, {few} the result ({duration:.4g} s): the recording "
+            f"with a time offset of {time_offset:.4g} s, {row_text} the result ({duration:.4g} s): "
+            "the recording "
             f"spans {time[0]:.4g} to {time[-1]:.4g} s of it; at least {FEWEST_SAMPLES} rows must overlap",
             path,
         )
-    return Overlap(min(float(time[-1]), duration) - max(float(time[0]), 0.0), rows, duration)
+    return Overlap(min(float(time[-1]), duration) - max(float(time[0]), 0.0), row_count, duration)
 
 
 def _agreements(
@@ -233,31 +240,32 @@ def _agreements(
 ) -> tuple[Agreement, ...]:
     """Return the agreement of every column with the result."""
     groups = [_exchange_group(signal) for signal in recorded.signals]
-    places = exchanged_places(pairings, groups, alignment.time_offset)
-    followed = [
-        None if place == index else recorded.signals[place].column for index, place in enumerate(places)
+    followed_indices = exchanged_places(pairings, groups, alignment.time_offset)
+    followed_columns = [
+        None if followed_index == index else recorded.signals[followed_index].column
+        for index, followed_index in enumerate(followed_indices)
     ]
     return tuple(
         _signal_agreement(result, signal, pairing, alignment, follows)
-        for signal, pairing, follows in zip(recorded.signals, pairings, followed, strict=True)
+        for signal, pairing, follows in zip(recorded.signals, pairings, followed_columns, strict=True)
     )
 
 
 def _signal_agreement(
     result: StoredResult, signal: MeasuredSignal, pairing: Pairing, alignment: Alignment, follows: str | None
 ) -> Agreement:
-    computed, there = pairing.overlap(alignment.time_offset)
-    time, computed = (pairing.time - alignment.time_offset)[there], computed[there]
-    values = pairing.measured[there]
+    computed, in_overlap = pairing.overlap(alignment.time_offset)
+    time, computed = (pairing.time - alignment.time_offset)[in_overlap], computed[in_overlap]
+    values = pairing.measured[in_overlap]
     error, place = values - computed, signal.place
-    worst = int(np.argmax(np.abs(error))) if error.size else None
+    worst_index = int(np.argmax(np.abs(error))) if error.size else None
     rms, scale = root_mean_square(error), root_mean_square(computed)
     fit = LineFit() if follows else fit_line(pairing, alignment.time_offset)
-    still = still_signal(pairing, alignment.time_offset, fit) if error.size and not follows else None
-    line = LineFit() if still else fit
-    left_out = int(np.count_nonzero(there) - np.count_nonzero(fit.used)) if fit.used.size else 0
-    usual = root_mean_square(error[fit.used[there]]) if left_out else 0.0
-    wild = max(WILD * usual, NOTABLE * float(np.ptp(computed))) if left_out else 0.0
+    still_kind = still_signal(pairing, alignment.time_offset, fit) if error.size and not follows else None
+    line = LineFit() if still_kind else fit
+    left_out = int(np.count_nonzero(in_overlap) - np.count_nonzero(fit.used)) if fit.used.size else 0
+    usual_rms = root_mean_square(error[fit.used[in_overlap]]) if left_out else 0.0
+    outlier_threshold = max(WILD * usual_rms, NOTABLE * float(np.ptp(computed))) if left_out else 0.0
     return Agreement(
         column=signal.column,
         variable=place.variable,
@@ -267,8 +275,8 @@ def _signal_agreement(
         samples=int(error.size),
         rms=rms,
         share=rms / scale if scale > 0 else math.nan,
-        worst=math.nan if worst is None else float(error[worst]),
-        worst_time=math.nan if worst is None else float(time[worst]),
+        worst=math.nan if worst_index is None else float(error[worst_index]),
+        worst_time=math.nan if worst_index is None else float(time[worst_index]),
         offset=line.offset,
         gain=line.gain,
         correlation=line.correlation,
@@ -280,14 +288,14 @@ def _signal_agreement(
         gain_error=line.gain_error,
         lag_error=math.hypot(line.lag_error, np.nan_to_num(alignment.error)),
         follows=follows,
-        still=still,
-        left_out=left_out if left_out and np.abs(error).max() > wild else 0,
+        still=still_kind,
+        left_out=left_out if left_out and np.abs(error).max() > outlier_threshold else 0,
     )
 
 
 def _without_torques(recorded: Recording, wanted: Sequence[tuple[str, int, Variable]]) -> Iterator[str]:
     """Yield a note if columns were left out, torques among them perhaps, and no torque is compared."""
-    left = listed((*recorded.table.ignored, *recorded.table.unknown_columns), MOST_NAMED)
+    left = listed((*recorded.table.ignored, *recorded.table.unknown_columns), MAX_LISTED_JOINTS)
     variables = [name for name, *_ in wanted], [signal.place.variable for signal in recorded.signals]
     computed, compared = (any(each.startswith(TORQUES) for each in names) for names in variables)
     if left and computed and not compared:
@@ -296,12 +304,15 @@ def _without_torques(recorded: Recording, wanted: Sequence[tuple[str, int, Varia
 
 def _alignment_notes(alignment: Alignment) -> Iterator[str]:
     if alignment.others:
-        listed = " and ".join(f"{other:.4g} s" for other in alignment.others[:3])
+        other_offsets = " and ".join(f"{other:.4g} s" for other in alignment.others[:3])
         fit = "fits" if len(alignment.others) == 1 else "fit"
-        yield f"a time offset of {listed} {fit} as well, as in periodic motions; choose with --time-offset"
+        yield (
+            f"a time offset of {other_offsets} {fit} as well, as in periodic motions; choose with "
+            "--time-offset"
+        )
 
 
-def _common_lag(signals: Sequence[Agreement], time_offset: float) -> Iterator[str]:
+def _common_lag_notes(signals: Sequence[Agreement], time_offset: float) -> Iterator[str]:
     """Yield a note if torques agree on a lag behind the positions on which the time offset rests."""
     late = [each for each in signals if each.variable.startswith(TORQUES) and math.isfinite(each.lag)]
     if len(late) < FEWEST_OFF:
@@ -326,11 +337,11 @@ def _gear_ratios(recorded: Recording, result: StoredResult) -> list[float]:
     ]
 
 
-def _columns_left_out(recorded: Recording, behind: Sequence[str]) -> Iterator[str]:
+def _columns_left_out(recorded: Recording, replaced_columns: Sequence[str]) -> Iterator[str]:
     commanded = [column for column in recorded.table.unknown_columns if role_of(column)[0] == COMMANDED]
     unknown = [column for column in recorded.table.unknown_columns if column not in commanded]
-    if behind:
-        yield f"not compared, as other columns say what the robot did: {', '.join(behind)}"
+    if replaced_columns:
+        yield f"not compared, as other columns say what the robot did: {', '.join(replaced_columns)}"
     if commanded:
         yield f"not compared, as these are commands, not what the robot did: {', '.join(commanded)}"
     if unknown:
@@ -383,36 +394,46 @@ def comparison_warnings(
     """
     if stranger:
         yield stranger
-    yield from _poor_fit(signals, gear_ratios)
+    yield from _poor_fit_warnings(signals, gear_ratios)
     if overlap.duration < SHORT_OVERLAP * overlap.whole:
         rows = counted(overlap.rows, "row")
         yield f"only {overlap.duration:.3g} s ({rows}) of {overlap.whole:.4g} s overlap"
     if result.verdict in WITHOUT_TORQUES:
-        yield f"{result.path} is {result.verdict}{_lost_torques(result)}; its motors are not compared there"
+        yield (
+            f"{result.path} is {result.verdict}{_missing_torques_text(result)}; its motors are not "
+            "compared there"
+        )
 
 
-def _poor_fit(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
+def _poor_fit_warnings(signals: Sequence[Agreement], gear_ratios: Sequence[float]) -> Iterator[str]:
     """Yield a warning if most signals differ much from the result, without a likely mistake as the cause."""
-    known = [
+    finite_signals = [
         (signal, ratio)
         for signal, ratio in zip(signals, gear_ratios, strict=True)
         if math.isfinite(signal.share) and signal.still != "computed"
     ]
-    off = [signal for signal, ratio in known if signal.share > LARGE_ERROR and not mistaken(signal, ratio)]
-    if 2 * len(off) <= len(known):
+    differing = [
+        signal
+        for signal, ratio in finite_signals
+        if signal.share > LARGE_ERROR and not mistaken(signal, ratio)
+    ]
+    if 2 * len(differing) <= len(finite_signals):
         return
-    worst = max(off, key=lambda signal: signal.share)
-    columns = f"{len(off)} of {counted(len(known), 'column')} {'differs' if len(off) == 1 else 'differ'}"
+    worst = max(differing, key=lambda signal: signal.share)
+    columns = (
+        f"{len(differing)} of {counted(len(finite_signals), 'column')} "
+        f"{'differs' if len(differing) == 1 else 'differ'}"
+    )
     yield (
         f"the recording does not fit the result: {columns} by more than {100 * LARGE_ERROR:g} % "
         f"({worst.column} by {100 * worst.share:.4g} %); is it the recording of another robot or motion?"
     )
 
 
-def _lost_torques(result: StoredResult) -> str:
+def _missing_torques_text(result: StoredResult) -> str:
     """Return at how many samples motor torques are missing, if the result has flags; otherwise ""."""
     if "flags" not in result.variables:
         return ""
     flags = np.asarray(result.read("flags"), dtype=FLAG_TYPE)
-    missing = np.any(has_flag(flags, INVALID), axis=1)
-    return f" at {np.count_nonzero(missing)} of {counted(len(missing), 'sample')}"
+    is_missing = np.any(has_flag(flags, INVALID), axis=1)
+    return f" at {np.count_nonzero(is_missing)} of {counted(len(is_missing), 'sample')}"

@@ -132,7 +132,7 @@ class Comparison(Published, TextReport):
     def title(self) -> str:
         """Names, the largest relative error, and the time offset."""
         offset = with_error(self.time_offset, self.time_offset_error, "s", "+.4f")
-        return f"{self.result}, {self.recording}: {self._worst()}; time offset {offset}"
+        return f"{self.result}, {self.recording}: {self._worst_agreement()}; time offset {offset}"
 
     def as_text(self) -> ReportText:
         """Return the report in parts."""
@@ -141,7 +141,7 @@ class Comparison(Published, TextReport):
         found = [*(f"warning: {warning}" for warning in self.warnings), *self.notes]
         return ReportText(self.title, found, [self._rows()], [covered])
 
-    def _worst(self) -> str:
+    def _worst_agreement(self) -> str:
         known = [each for each in self.signals if math.isfinite(each.share)]
         worst = max(known, key=lambda each: each.share, default=None)
         if worst is None:
@@ -161,21 +161,21 @@ class Comparison(Published, TextReport):
             "gain",
             "lag\nms",
         )
-        return [header, *map(_row, self.signals)]
+        return [header, *map(_agreement_row, self.signals)]
 
 
-def _row(signal: Agreement) -> tuple[str, ...]:
+def _agreement_row(agreement: Agreement) -> tuple[str, ...]:
     return (
-        signal.column,
-        signal.variable,
-        signal.unit,
-        cell(signal.rms, ".3g"),
-        cell(100 * signal.share, ".3g"),
-        cell(signal.worst, "+.3g"),
-        cell(signal.worst_time, ".3f"),
-        with_error(signal.offset, signal.offset_error, "", "+.2g"),
-        with_error(signal.gain, signal.gain_error, "", ".4g"),
-        with_error(1e3 * signal.lag, 1e3 * signal.lag_error, "", "+.1f"),
+        agreement.column,
+        agreement.variable,
+        agreement.unit,
+        cell(agreement.rms, ".3g"),
+        cell(100 * agreement.share, ".3g"),
+        cell(agreement.worst, "+.3g"),
+        cell(agreement.worst_time, ".3f"),
+        with_error(agreement.offset, agreement.offset_error, "", "+.2g"),
+        with_error(agreement.gain, agreement.gain_error, "", ".4g"),
+        with_error(1e3 * agreement.lag, 1e3 * agreement.lag_error, "", "+.1f"),
     )
 
 
@@ -318,16 +318,20 @@ def _signal_differences(
 ) -> Iterator[SignalDifference]:
     time = result.time[common]
     for name in result.variables:
-        dims = result.declared[name].dims
-        if name in other.variables and name not in FLAG_BITS and dims[0] == "joint":
-            first, second = (np.asarray(each.read(name), dtype=np.float64) for each in (result, other))
+        dimensions = result.declared[name].dims
+        if name in other.variables and name not in FLAG_BITS and dimensions[0] == "joint":
+            result_values, other_values = (
+                np.asarray(each.read(name), dtype=np.float64) for each in (result, other)
+            )
             for index, joint in enumerate(result.joint_names):
                 unit = result.declared[name].quantity.unit(result.joint_types[index])
-                for motor in MOTORS if "motor" in dims else (None,):
-                    column = (slice(None), index, *(() if motor is None else (motor - 1,)))
+                for motor in MOTORS if "motor" in dimensions else (None,):
+                    value_index = (slice(None), index, *(() if motor is None else (motor - 1,)))
                     with np.errstate(invalid="ignore"):  # infinite values, which are not compared
-                        moved = np.interp(time, other.time, second[column])
-                    yield _compare_signal(name, joint, motor, unit, time, first[column][common], moved)
+                        interpolated = np.interp(time, other.time, other_values[value_index])
+                    yield _compare_signal(
+                        name, joint, motor, unit, time, result_values[value_index][common], interpolated
+                    )
 
 
 def _compare_signal(
@@ -337,12 +341,12 @@ def _compare_signal(
     unit: str,
     time: FloatArray,
     values: FloatArray,
-    others: FloatArray,
+    other_values: FloatArray,
 ) -> SignalDifference:
-    there = np.isfinite(values) & np.isfinite(others)
-    values, others = values[there], others[there]
-    error = others - values
-    worst = int(np.argmax(np.abs(error))) if error.size else None
+    finite = np.isfinite(values) & np.isfinite(other_values)
+    values, other_values = values[finite], other_values[finite]
+    error = other_values - values
+    worst_index = int(np.argmax(np.abs(error))) if error.size else None
     rms, difference = root_mean_square(values), root_mean_square(error)
     return SignalDifference(
         variable,
@@ -350,12 +354,12 @@ def _compare_signal(
         motor,
         unit,
         int(error.size),
-        (rms, root_mean_square(others)),
-        (_peak_magnitude(values), _peak_magnitude(others)),
+        (rms, root_mean_square(other_values)),
+        (_peak_magnitude(values), _peak_magnitude(other_values)),
         difference,
         difference / rms if rms > 0 else math.nan,
-        math.nan if worst is None else float(error[worst]),
-        math.nan if worst is None else float(time[there][worst]),
+        math.nan if worst_index is None else float(error[worst_index]),
+        math.nan if worst_index is None else float(time[finite][worst_index]),
     )
 
 
@@ -365,9 +369,11 @@ def _peak_magnitude(values: FloatArray) -> float:
 
 def _flag_counts(result: StoredResult, other: StoredResult) -> Iterator[FlagCount]:
     if all("flags" in each.variables for each in (result, other)):
-        flags, others = (cast("FlagArray", each.read("flags")) for each in (result, other))
+        flags, other_flags = (cast("FlagArray", each.read("flags")) for each in (result, other))
         for index, joint in enumerate(result.joint_names):
             for flag in Flag:
-                counts = [int(np.count_nonzero(has_flag(each[:, index], flag))) for each in (flags, others)]
+                counts = [
+                    int(np.count_nonzero(has_flag(each[:, index], flag))) for each in (flags, other_flags)
+                ]
                 if any(counts):
                     yield FlagCount(joint, str(flag.name).lower(), (counts[0], counts[1]))

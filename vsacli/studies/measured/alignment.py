@@ -32,34 +32,34 @@ from vsacli.studies.measured.pairing import (
     unlikeness,
 )
 
-MOST_POINTS = 200_000
+MAX_GRID_POINTS = 200_000
 """Largest number of grid points of the first search; refinement evaluates the signal between them."""
 
-EXPLAINED = 0.5
+MIN_EXPLAINED_SHARE = 0.5
 """Share of the variance that the best shift must explain in half of the columns."""
 
 FEWEST_COVERED = 0.5
 """Smallest overlap, as a share of the result or of the recording, whichever is shorter."""
 
-AS_GOOD = 0.5
+SIMILAR_LOG_DIFFERENCE = 0.5
 """Difference in the log of the unexplained part up to which two shifts are equally good."""
 
-OWN_WIDTH = 0.05
+MINIMUM_WIDTH = 0.05
 """Distance between shifts, as a share of the duration, within which they belong to the same minimum."""
 
-MOST_CANDIDATES = 5
+MAX_CANDIDATES = 5
 """Number of minima of the search that are refined."""
 
-LONGEST_STEP = 3.0
+MAX_GAP_INTERVALS = 3.0
 """Gap between samples of a column, in median intervals, that is not interpolated."""
 
-ROUNDS = 3
+MAX_ROUNDS = 3
 """Number of rounds that estimate the common lag; the second hardly differs from the first."""
 
 AGREEING = 3.0
 """Largest difference of a lag from the mean of lags that agree, in standard errors."""
 
-APART = 3.5
+OUTLIER_DEVIATIONS = 3.5
 """Distance from the median, in standard deviations, from which on a column is ignored."""
 
 
@@ -88,93 +88,112 @@ def align(
         groups: group of each column; columns of a group may be exchanged with each other.
         commanded: whether each computed signal was commanded, so that no error of the model is in it.
     """
-    moving = [pairing.computed.moves and float(np.ptp(tame(pairing.measured))) > 0 for pairing in pairings]
-    pairings, groups = list(compress(pairings, moving)), list(compress(groups, moving))
-    commanded = list(compress(commanded, moving))
+    is_moving = [pairing.computed.moves and float(np.ptp(tame(pairing.measured))) > 0 for pairing in pairings]
+    pairings, groups = list(compress(pairings, is_moving)), list(compress(groups, is_moving))
+    commanded = list(compress(commanded, is_moving))
     if not pairings:
         return None
     candidates, others = _search_shifts(pairings)
-    refined = [_refined(pairings, groups, each, _grid_step(pairings)) for each in candidates]
+    refined = [_refine_shift(pairings, groups, each, _grid_step(pairings)) for each in candidates]
     if not refined:
         return None
-    _, shift, paired = min(refined, key=lambda each: each[0])
-    if np.median([_explained(pairing, shift) for pairing in paired]) < EXPLAINED:
+    _, shift, matched_pairings = min(refined, key=lambda each: each[0])
+    if np.median([_explained(pairing, shift) for pairing in matched_pairings]) < MIN_EXPLAINED_SHARE:
         return None
-    shift, error = _agreed(paired, commanded, shift)
+    shift, error = _common_shift(matched_pairings, commanded, shift)
     return Alignment(shift, error, others if len(candidates) > 1 else ())
 
 
 def _search_shifts(pairings: Sequence[Pairing]) -> tuple[list[float], tuple[float, ...]]:
     """Return the shifts of the lowest minima in order, and those that are as good as the first."""
     step = _grid_step(pairings)
-    shifts, left = _unexplained_on_grid(pairings, step)
-    minima = np.flatnonzero((left < np.roll(left, 1)) & (left <= np.roll(left, -1)) & (left < 0))
-    chosen: list[int] = []
-    for index in minima[np.argsort(left[minima])].tolist():
-        if all(abs(shifts[index] - shifts[each]) > OWN_WIDTH * pairings[0].duration for each in chosen):
-            chosen.append(index)
-        if len(chosen) == MOST_CANDIDATES:
+    shifts, unexplained = _unexplained_on_grid(pairings, step)
+    minima = np.flatnonzero(
+        (unexplained < np.roll(unexplained, 1))
+        & (unexplained <= np.roll(unexplained, -1))
+        & (unexplained < 0)
+    )
+    chosen_indices: list[int] = []
+    for index in minima[np.argsort(unexplained[minima])].tolist():
+        if all(
+            abs(shifts[index] - shifts[each]) > MINIMUM_WIDTH * pairings[0].duration
+            for each in chosen_indices
+        ):
+            chosen_indices.append(index)
+        if len(chosen_indices) == MAX_CANDIDATES:
             break
-    others = [float(shifts[each]) for each in chosen[1:] if left[each] <= left[chosen[0]] + AS_GOOD]
-    return [float(shifts[each]) for each in chosen], tuple(others)
+    other_shifts = [
+        float(shifts[each])
+        for each in chosen_indices[1:]
+        if unexplained[each] <= unexplained[chosen_indices[0]] + SIMILAR_LOG_DIFFERENCE
+    ]
+    return [float(shifts[each]) for each in chosen_indices], tuple(other_shifts)
 
 
 def _grid_step(pairings: Sequence[Pairing]) -> float:
     """Return the step of the grid: the shortest sampling interval, unless the grid would be too large."""
     span = pairings[0].duration + max(float(pairing.time[-1]) for pairing in pairings)
-    return max(min(float(np.median(np.diff(each.time))) for each in pairings), span / MOST_POINTS)
+    return max(min(float(np.median(np.diff(each.time))) for each in pairings), span / MAX_GRID_POINTS)
 
 
 def _unexplained_on_grid(pairings: Sequence[Pairing], step: float) -> tuple[FloatArray, FloatArray]:
     """Return the shifts of the grid, and the mean unexplained part of all columns at each."""
     grid = np.arange(0.0, pairings[0].duration + step / 2, step)
-    last = max(float(pairing.time[-1]) for pairing in pairings)
-    recorded = np.arange(0.0, last + step / 2, step)
-    shifts = step * np.arange(1 - len(grid), len(recorded), dtype=float)
-    left = np.mean([_by_shift(pairing, grid, recorded) for pairing in pairings], axis=0)
-    return shifts, np.asarray(left)
-
-
-def _by_shift(pairing: Pairing, grid: FloatArray, recorded: FloatArray) -> FloatArray:
-    """Return the unexplained part of one column at every shift, (len(grid) + len(recorded) - 1,)."""
-    tamed, computed = tame(pairing.measured), pairing.computed.at(grid)
-    there, known = np.isfinite(computed), _sampled_mask(pairing.time, recorded)
-    middle, center = float(np.nanmean(computed)), float(np.mean(tamed))
-    first = np.where(there, computed - middle, 0.0)
-    second = np.where(known, np.interp(recorded, pairing.time, tamed) - center, 0.0)
-    inside, ones = there.astype(float), known.astype(float)
-    count = np.round(_correlated(inside, ones))
-    moments = Moments(
-        np.maximum(count, 1.0),
-        _correlated(first, ones),
-        _correlated(inside, second),
-        _correlated(first**2, ones),
-        _correlated(inside, second**2),
-        _correlated(first, second),
-        apart=center - middle,
-        measured_variance=float(np.var(tamed)),
+    recording_duration = max(float(pairing.time[-1]) for pairing in pairings)
+    recorded_grid = np.arange(0.0, recording_duration + step / 2, step)
+    shifts = step * np.arange(1 - len(grid), len(recorded_grid), dtype=float)
+    unexplained = np.mean(
+        [_unexplained_by_shift(pairing, grid, recorded_grid) for pairing in pairings], axis=0
     )
-    needed = max(FEWEST_SAMPLES, FEWEST_COVERED * min(inside.sum(), ones.sum()))
-    covered = moments.spreads()[0] / float(np.sum(first**2))
-    return np.where(count >= needed, np.clip(covered, 0, 1) * unlikeness(moments, exactness(tamed)), 0.0)
+    return shifts, np.asarray(unexplained)
 
 
-def _sampled_mask(time: FloatArray, recorded: FloatArray) -> BoolArray:
+def _unexplained_by_shift(pairing: Pairing, grid: FloatArray, recorded_grid: FloatArray) -> FloatArray:
+    """Return the unexplained part of one column at every shift, (len(grid) + len(recorded) - 1,)."""
+    clipped, computed = tame(pairing.measured), pairing.computed.at(grid)
+    is_computed, is_sampled = np.isfinite(computed), _sampled_mask(pairing.time, recorded_grid)
+    computed_mean, measured_mean = float(np.nanmean(computed)), float(np.mean(clipped))
+    computed_deviation = np.where(is_computed, computed - computed_mean, 0.0)
+    measured_deviation = np.where(
+        is_sampled, np.interp(recorded_grid, pairing.time, clipped) - measured_mean, 0.0
+    )
+    computed_weight, measured_weight = is_computed.astype(float), is_sampled.astype(float)
+    common_count = np.round(_cross_correlation(computed_weight, measured_weight))
+    moments = Moments(
+        np.maximum(common_count, 1.0),
+        _cross_correlation(computed_deviation, measured_weight),
+        _cross_correlation(computed_weight, measured_deviation),
+        _cross_correlation(computed_deviation**2, measured_weight),
+        _cross_correlation(computed_weight, measured_deviation**2),
+        _cross_correlation(computed_deviation, measured_deviation),
+        apart=measured_mean - computed_mean,
+        measured_variance=float(np.var(clipped)),
+    )
+    min_count = max(FEWEST_SAMPLES, FEWEST_COVERED * min(computed_weight.sum(), measured_weight.sum()))
+    covered_share = moments.spreads()[0] / float(np.sum(computed_deviation**2))
+    return np.where(
+        common_count >= min_count, np.clip(covered_share, 0, 1) * unlikeness(moments, exactness(clipped)), 0.0
+    )
+
+
+def _sampled_mask(time: FloatArray, recorded_grid: FloatArray) -> BoolArray:
     """Return a mask of the grid points between consecutive samples without a gap."""
     steps = np.diff(time)
-    follows = np.append(steps <= LONGEST_STEP * np.median(steps), True)
-    before = np.clip(np.searchsorted(time, recorded, side="right") - 1, 0, len(time) - 1)
-    return np.asarray((recorded >= time[0]) & (recorded <= time[-1]) & follows[before])
+    has_successor = np.append(steps <= MAX_GAP_INTERVALS * np.median(steps), True)
+    previous_index = np.clip(np.searchsorted(time, recorded_grid, side="right") - 1, 0, len(time) - 1)
+    return np.asarray(
+        (recorded_grid >= time[0]) & (recorded_grid <= time[-1]) & has_successor[previous_index]
+    )
 
 
-def _correlated(first: FloatArray, second: FloatArray) -> FloatArray:
+def _cross_correlation(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the sums of first[i] second[i + shift] for shifts from 1 - len(first) to len(second) - 1."""
     size = scipy.fft.next_fast_len(len(first) + len(second) - 1, real=True)
     product = scipy.fft.irfft(np.conj(scipy.fft.rfft(first, size)) * scipy.fft.rfft(second, size), size)
     return np.concatenate([product[size - len(first) + 1 :], product[: len(second)]])
 
 
-def _refined(
+def _refine_shift(
     pairings: Sequence[Pairing], groups: Sequence[object], shift: float, step: float
 ) -> tuple[float, float, list[Pairing]]:
     """Refine a candidate between the points of the grid.
@@ -182,27 +201,37 @@ def _refined(
     Returns:
         Unexplained part, refined shift, and pairings with exchanged columns corrected.
     """
-    exact = [exactness(tame(each.measured)) for each in pairings]
-    thin = [each.thinned() for each in pairings]
-    tamed = [tame(each.measured) for each in thin]
+    exact_values = [exactness(tame(each.measured)) for each in pairings]
+    thinned_pairings = [each.thinned() for each in pairings]
+    clipped_values = [tame(each.measured) for each in thinned_pairings]
 
     def left(pairs: Sequence[Pairing], candidate: float) -> float:
         return float(
-            np.mean([_unexplained_part(*each, candidate) for each in zip(pairs, tamed, exact, strict=True)])
+            np.mean(
+                [
+                    _unexplained_part(*each, candidate)
+                    for each in zip(pairs, clipped_values, exact_values, strict=True)
+                ]
+            )
         )
 
-    found = scipy.optimize.minimize_scalar(
-        lambda at: left(thin, at),
+    minimum = scipy.optimize.minimize_scalar(
+        lambda at: left(thinned_pairings, at),
         bounds=(shift - 2 * step, shift + 2 * step),
         method="bounded",
         options={"xatol": 1e-3 * step},
     )
-    best = float(found.x)
-    places = exchanged_places(pairings, groups, best)
-    right = [pairings[place].computed for place in places]
-    unexplained = left([each._replace(computed=it) for each, it in zip(thin, right, strict=True)], best)
-    paired = [each._replace(computed=it) for each, it in zip(pairings, right, strict=True)]
-    return unexplained, best, paired
+    best_shift = float(minimum.x)
+    followed_indices = exchanged_places(pairings, groups, best_shift)
+    followed_signals = [pairings[place].computed for place in followed_indices]
+    unexplained = left(
+        [each._replace(computed=it) for each, it in zip(thinned_pairings, followed_signals, strict=True)],
+        best_shift,
+    )
+    matched_pairings = [
+        each._replace(computed=it) for each, it in zip(pairings, followed_signals, strict=True)
+    ]
+    return unexplained, best_shift, matched_pairings
 
 
 def _unexplained_part(pairing: Pairing, tamed: FloatArray, exact: float, shift: float) -> float:
@@ -210,8 +239,8 @@ def _unexplained_part(pairing: Pairing, tamed: FloatArray, exact: float, shift: 
     moments = moments_of(pairing.overlap(shift)[0], tamed)
     if moments.samples < FEWEST_SAMPLES:
         return 0.0
-    covered = float(moments.spreads()[0] / moments.samples) / pairing.computed.spread**2
-    return min(1.0, covered) * float(unlikeness(moments, exact))
+    covered_share = float(moments.spreads()[0] / moments.samples) / pairing.computed.spread**2
+    return min(1.0, covered_share) * float(unlikeness(moments, exact))
 
 
 def _explained(pairing: Pairing, shift: float) -> float:
@@ -224,18 +253,20 @@ def _explained(pairing: Pairing, shift: float) -> float:
     return float(1 - (1 - product**2 / (computed * measured)) * freedom)
 
 
-def _agreed(pairings: Sequence[Pairing], commanded: Sequence[bool], shift: float) -> tuple[float, float]:
+def _common_shift(
+    pairings: Sequence[Pairing], commanded: Sequence[bool], shift: float
+) -> tuple[float, float]:
     """Return the time shift on which the columns agree, and its standard error."""
     error = math.nan
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         fits = [fit_line(pairing, shift) for pairing in pairings]
-        usable = [math.isfinite(fit.lag) and fit.correlation**2 >= EXPLAINED for fit in fits]
+        usable = [math.isfinite(fit.lag) and fit.correlation**2 >= MIN_EXPLAINED_SHARE for fit in fits]
         if not any(usable):
             break
         of_commanded = list(compress(fits, np.logical_and(usable, commanded)))
         fits = list(compress(fits, usable))
         sure = 2 * np.count_nonzero(_agreeing(of_commanded)) > len(of_commanded)
-        late, error = _average(of_commanded if sure and not lags_agree(*_lags(fits)) else fits)
+        late, error = _average_lag(of_commanded if sure and not lags_agree(*_lags(fits)) else fits)
         shift += late
     return shift, error
 
@@ -249,16 +280,16 @@ def _lags(fits: Sequence[LineFit]) -> tuple[FloatArray, FloatArray]:
     return np.array([fit.lag for fit in fits]), np.array([fit.lag_error for fit in fits])
 
 
-def _average(fits: Sequence[LineFit]) -> tuple[float, float]:
+def _average_lag(fits: Sequence[LineFit]) -> tuple[float, float]:
     """Return the weighted mean lag of columns that agree, and its standard error.
 
     If lags scatter more than their errors explain, all errors are increased by that scatter.
     """
-    kept = _agreeing(fits)
-    if 2 * np.count_nonzero(kept) <= len(fits):
-        kept[:] = True  # without a majority, no column can be called wrong
+    is_kept = _agreeing(fits)
+    if 2 * np.count_nonzero(is_kept) <= len(fits):
+        is_kept[:] = True  # without a majority, no column can be called wrong
     lags, errors = _lags(fits)
-    return mean_of_effects(lags[kept], errors[kept])
+    return mean_of_effects(lags[is_kept], errors[is_kept])
 
 
 def _agreeing(fits: Sequence[LineFit]) -> BoolArray:
@@ -271,7 +302,7 @@ def _agreeing(fits: Sequence[LineFit]) -> BoolArray:
     scatter = 1.4826 * _weighted_median(np.abs(lags - middle), 1 / bounded)
     of_middle = 1.25 * float(np.sqrt(1 / np.sum(1 / bounded**2)))
     wide = np.sqrt(errors**2 + max(0.0, scatter**2 - float(np.median(errors)) ** 2) + of_middle**2)
-    return np.asarray(np.abs(lags - middle) <= APART * wide)
+    return np.asarray(np.abs(lags - middle) <= OUTLIER_DEVIATIONS * wide)
 
 
 def _weighted_median(values: FloatArray, weights: FloatArray) -> float:

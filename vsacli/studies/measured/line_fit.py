@@ -49,7 +49,7 @@ def count_of_cosines(samples: int) -> int:
 LAG_SHARE = 0.05
 """Largest lag, as a share of the duration."""
 
-MOST_STEPS = 20
+MAX_STEPS = 20
 """Limit on Gauss-Newton steps; 3 to 6 suffice from the shifts of the search."""
 
 SMALL_STEP = 0.01
@@ -58,29 +58,29 @@ SMALL_STEP = 0.01
 WILD = 5.0
 """Residual of an outlier in standard deviations; less than one in a million of normal noise exceeds it."""
 
-NINE_OF_TEN = 0.9, 1.645
+RESIDUAL_QUANTILE = 0.9, 1.645
 """Quantile of the absolute residuals that determines their standard deviation, and this quantile of a normal
 distribution in standard deviations."""
 
-FEW = 0.02
+MAX_OUTLIER_SHARE = 0.02
 """Largest share of outliers among the samples; motion that the line does not explain is not an outlier."""
 
 NEAR_LARGEST = 2.0
 """Ratio to the largest residual without these few up to which a residual is not an outlier."""
 
-TRIALS = 4
+MAX_OUTLIER_ROUNDS = 4
 """Number of rounds that alternate between the line and its outliers."""
 
 SIGNIFICANT = 5.0
 """Gain in standard errors above which it is significant."""
 
-VAGUE = 0.2
+MAX_GAIN_ERROR = 0.2
 """Standard error of a gain above which the gain is undetermined."""
 
-CONSTANT = 1e-6
+CONSTANT_RATIO = 1e-6
 """Ratio of standard deviations, recording to result, below which a recording is constant in any unit."""
 
-RESTS = 0.2
+REST_RATIO = 0.2
 """Ratio of the standard deviations below which a recording without a significant gain does not move."""
 
 
@@ -125,20 +125,20 @@ def fit_line(pairing: Pairing, shift: float) -> LineFit:
     at_shift = _line_step(pairing, shift)
     if at_shift is None:
         return LineFit()
-    return _line_with_errors(pairing, *(_lagging(pairing, shift, at_shift) or (at_shift, math.nan)))
+    return _line_with_errors(pairing, *(_fit_lag(pairing, shift, at_shift) or (at_shift, math.nan)))
 
 
-def _lagging(pairing: Pairing, shift: float, start: _LineStep) -> tuple[_LineStep, float] | None:
+def _fit_lag(pairing: Pairing, shift: float, start: _LineStep) -> tuple[_LineStep, float] | None:
     """Return the line and its lag; None if they are not determined."""
-    bound, lag, step = LAG_SHARE * pairing.duration, 0.0, start
+    max_lag, lag, step = LAG_SHARE * pairing.duration, 0.0, start
     change, error = math.inf, 0.0
-    for _ in range(MOST_STEPS):
-        found = _line_step(pairing, shift + lag, float(step.unknowns[1]))
-        if found is None or not math.isfinite(found.covariance[2, 2]):
+    for _ in range(MAX_STEPS):
+        next_step = _line_step(pairing, shift + lag, float(step.unknowns[1]))
+        if next_step is None or not math.isfinite(next_step.covariance[2, 2]):
             return None
-        change, error = float(found.unknowns[2]), _lag_error(pairing, found)
-        lag, step = lag + max(-bound / 2, min(change, bound / 2)), found
-        if abs(lag) > bound or error > bound:
+        change, error = float(next_step.unknowns[2]), _lag_error(pairing, next_step)
+        lag, step = lag + max(-max_lag / 2, min(change, max_lag / 2)), next_step
+        if abs(lag) > max_lag or error > max_lag:
             return None
         if abs(change) <= SMALL_STEP * error:
             return step, lag
@@ -159,69 +159,77 @@ def _line_step(pairing: Pairing, shift: float, gain: float | None = None) -> _Li
         shift: time in the recording at which the result begins, s.
         gain: gain at which to linearize in a change of the shift, the third unknown; None for two unknowns.
     """
-    computed, there = pairing.overlap(shift)
-    if np.count_nonzero(there) < FEWEST_SAMPLES:
+    computed, in_overlap = pairing.overlap(shift)
+    if np.count_nonzero(in_overlap) < FEWEST_SAMPLES:
         return None
-    columns = [np.ones(np.count_nonzero(there)), computed[there]]
+    columns = [np.ones(np.count_nonzero(in_overlap)), computed[in_overlap]]
     if gain is not None:
-        columns.append(-gain * pairing.computed.slope((pairing.time - shift)[there]))
-    design, measured = np.stack(columns, axis=1), np.clip(pairing.measured[there], -LARGEST, LARGEST)
-    kept = _usual_rows(design, tame(pairing.measured)[there], measured)
-    unknowns = None if kept is None else _solve_scaled(design[kept], measured[kept])
-    if kept is None or unknowns is None:
+        columns.append(-gain * pairing.computed.slope((pairing.time - shift)[in_overlap]))
+    design, measured = np.stack(columns, axis=1), np.clip(pairing.measured[in_overlap], -LARGEST, LARGEST)
+    is_used = _inlier_mask(design, tame(pairing.measured)[in_overlap], measured)
+    unknowns = None if is_used is None else _solve_scaled(design[is_used], measured[is_used])
+    if is_used is None or unknowns is None:
         return None
-    used = there.copy()
-    used[there] = kept
+    used_samples = in_overlap.copy()
+    used_samples[in_overlap] = is_used
     return _LineStep(
         unknowns,
-        _line_covariance(design[kept], measured[kept] - design[kept] @ unknowns),
-        float(np.corrcoef(design[kept, 1], measured[kept])[0, 1]),
-        used,
+        _line_covariance(design[is_used], measured[is_used] - design[is_used] @ unknowns),
+        float(np.corrcoef(design[is_used, 1], measured[is_used])[0, 1]),
+        used_samples,
     )
 
 
-def _usual_rows(design: FloatArray, tamed: FloatArray, measured: FloatArray) -> BoolArray | None:
+def _inlier_mask(design: FloatArray, clipped: FloatArray, measured: FloatArray) -> BoolArray | None:
     """Return a mask of the rows without outliers; None if rows do not determine a line."""
-    share, bound = NINE_OF_TEN
-    few = max(1, math.ceil(FEW * len(design)))
-    kept, values = np.ones(len(design), dtype=bool), tamed
-    for _ in range(TRIALS):
-        unknowns = _solve_scaled(design[kept], values[kept])
+    share, bound = RESIDUAL_QUANTILE
+    max_outliers = max(1, math.ceil(MAX_OUTLIER_SHARE * len(design)))
+    is_used, values = np.ones(len(design), dtype=bool), clipped
+    for _ in range(MAX_OUTLIER_ROUNDS):
+        unknowns = _solve_scaled(design[is_used], values[is_used])
         if unknowns is None:
             return None
-        size, values = np.abs(measured - design @ unknowns), measured
-        usual = WILD / bound * np.quantile(size, share), NEAR_LARGEST * np.partition(size, -few - 1)[-few - 1]
-        kept = size <= max(usual)
-    return kept
+        magnitudes, values = np.abs(measured - design @ unknowns), measured
+        thresholds = (
+            WILD / bound * np.quantile(magnitudes, share),
+            NEAR_LARGEST * np.partition(magnitudes, -max_outliers - 1)[-max_outliers - 1],
+        )
+        is_used = magnitudes <= max(thresholds)
+    return is_used
 
 
 def _solve_scaled(design: FloatArray, values: FloatArray) -> FloatArray | None:
     """Return the least-squares solution with scaled columns; None if the columns are dependent."""
-    sizes = np.linalg.norm(design, axis=0)
-    if len(design) <= design.shape[1] or not np.all(sizes > 0):
+    column_norms = np.linalg.norm(design, axis=0)
+    if len(design) <= design.shape[1] or not np.all(column_norms > 0):
         return None
-    solution, _, rank, _ = np.linalg.lstsq(design / sizes, values, rcond=1e-9)
-    return np.asarray(solution / sizes) if rank == design.shape[1] else None
+    solution, _, rank, _ = np.linalg.lstsq(design / column_norms, values, rcond=1e-9)
+    return np.asarray(solution / column_norms) if rank == design.shape[1] else None
 
 
 def _line_covariance(design: FloatArray, residual: FloatArray) -> FloatArray:
     """Return the covariance of the unknowns for white or for colored residuals, whichever is larger."""
-    sizes = np.linalg.norm(design, axis=0)
-    scaled = design / sizes
+    column_norms = np.linalg.norm(design, axis=0)
+    scaled = design / column_norms
     inverse = np.linalg.inv(scaled.T @ scaled)
     freedom = len(design) - design.shape[1]
-    squares = max(float(residual @ residual), float(np.finfo(float).tiny))
-    white = squares / freedom * inverse
-    meat, cosines = covariance_of_sum(scaled * residual[:, None])
-    colored = inverse @ meat @ inverse * (len(design) / freedom)
-    slow = float(covariance_of_sum(residual[:, None])[0][0, 0]) / squares
-    rough = cosines / max(cosines - 2, 1)  # variance of Student's t, for the few degrees of freedom
-    fitted = cosines / max(
+    squared_sum = max(float(residual @ residual), float(np.finfo(float).tiny))
+    white = squared_sum / freedom * inverse
+    score_covariance, cosines = covariance_of_sum(scaled * residual[:, None])
+    colored = inverse @ score_covariance @ inverse * (len(design) / freedom)
+    low_frequency_ratio = float(covariance_of_sum(residual[:, None])[0][0, 0]) / squared_sum
+    student_t_variance = cosines / max(
+        cosines - 2, 1
+    )  # variance of Student's t, for the few degrees of freedom
+    fit_correction = cosines / max(
         cosines - design.shape[1], 1
     )  # the fit removes the slowest part of the noise from the residual
-    ratio = np.maximum(np.diag(colored) / np.maximum(np.diag(white), np.finfo(float).tiny), slow * fitted)
-    larger = np.sqrt(np.maximum(1.0, rough * ratio))
-    return np.asarray(white * np.outer(larger, larger) / np.outer(sizes, sizes))
+    ratio = np.maximum(
+        np.diag(colored) / np.maximum(np.diag(white), np.finfo(float).tiny),
+        low_frequency_ratio * fit_correction,
+    )
+    error_ratios = np.sqrt(np.maximum(1.0, student_t_variance * ratio))
+    return np.asarray(white * np.outer(error_ratios, error_ratios) / np.outer(column_norms, column_norms))
 
 
 def _line_with_errors(pairing: Pairing, step: _LineStep, lag: float) -> LineFit:
@@ -250,15 +258,18 @@ def still_signal(pairing: Pairing, shift: float, fit: LineFit) -> Still | None:
     """
     if not pairing.computed.moves:
         return "computed"
-    computed, there = pairing.overlap(shift)
-    moved, follows = float(np.std(tame(pairing.measured[there]))), float(np.std(computed[there]))
-    if moved <= CONSTANT * follows:
+    computed, in_overlap = pairing.overlap(shift)
+    measured_deviation, computed_deviation = (
+        float(np.std(tame(pairing.measured[in_overlap]))),
+        float(np.std(computed[in_overlap])),
+    )
+    if measured_deviation <= CONSTANT_RATIO * computed_deviation:
         return "measured"
     if abs(fit.gain) > SIGNIFICANT * fit.gain_error:
         return None
-    if not fit.gain_error < VAGUE and follows**2 <= noise(tame(pairing.measured)):
+    if not fit.gain_error < MAX_GAIN_ERROR and computed_deviation**2 <= noise(tame(pairing.measured)):
         return "computed"  # its change is below the noise of the recording
-    return "measured" if moved < RESTS * follows else None
+    return "measured" if measured_deviation < REST_RATIO * computed_deviation else None
 
 
 def root_mean_square(values: FloatArray) -> float:

@@ -22,7 +22,7 @@ from vsacli.trajectory.recorded.columns import NAMINGS, ColumnNames, misspelling
 from vsacli.trajectory.recorded.header_words import COMMANDED, role_of
 from vsacli.trajectory.recorded.problems import replace_stamps, time_problems
 
-USUAL = ("q", "tau_motor")
+EXAMPLE_VARIABLES = ("q", "tau_motor")
 """Variables that a message names as examples of columns."""
 
 
@@ -105,7 +105,7 @@ class Recording(NamedTuple):
 def read_recording(
     path: str | Path,
     jointed: Jointed,
-    wanted: Iterable[tuple[str, int, Variable]],
+    variable_names: Iterable[tuple[str, int, Variable]],
     robot: str,
     mapping: ColumnMapping,
 ) -> Recording:
@@ -115,26 +115,33 @@ def read_recording(
         path: file with a column `time`, and columns named as by `vsacli export`, or by the number of the
             joint, `q1` for the first; a unit in brackets may follow any name.
         jointed: subject of the recording.
-        wanted: names of variables in columns, see `known_columns`.
+        variable_names: names of variables in columns, see `known_columns`.
         robot: name of the subject's robot.
         mapping: mapping of other column names.
 
     Raises:
         InputError: no column has a place, a unit does not fit its variable, or the times do not ascend.
     """
-    places = known_columns(jointed, wanted)
-    mapping = _of_signals(mapping, places, jointed)
+    places = known_columns(jointed, variable_names)
+    mapping = _mapping_of_signals(mapping, places, jointed)
     table = read_table(path, mapping, {TIME, *places}, empty_cells=True)
     table = table.without_empty_rows(stamped=True).with_joined_rows()
     headings = [split_heading(column) for column in table.columns]
     names = [name for name, _ in headings]
-    unknown = [name for name, _ in map(split_heading, table.unknown_columns) if role_of(name)[0] != COMMANDED]
+    unknown_names = [
+        name for name, _ in map(split_heading, table.unknown_columns) if role_of(name)[0] != COMMANDED
+    ]
     expected = (TIME,) if any(name in places for name in names) else (TIME, *places)
     header = ColumnNames(
-        (*names, *unknown), {TIME, *places}, expected, jointed.joint_names, table.source.path, "use --columns"
+        (*names, *unknown_names),
+        {TIME, *places},
+        expected,
+        jointed.joint_names,
+        table.source.path,
+        "use --columns",
     )
-    stranger = _other_joints(header, places, robot)
-    problems = list(_unusable(header, places, stranger))
+    stranger = _unknown_joints_sentence(header, places, robot)
+    problems = list(_header_problems(header, places, stranger))
     units = {TIME: "s", **{name: place.unit for name, place in places.items()}}
     factors = unit_factors(headings, units, problems)
     if problems:
@@ -148,14 +155,16 @@ def read_recording(
         if name in places
     ]
     signals.sort(key=lambda signal: order[signal.column])
-    times = _elapsed(table, names.index(TIME), factors, mapping.rate)
+    times = _elapsed_seconds(table, names.index(TIME), factors, mapping.rate)
     return Recording(times, tuple(signals), table, stranger)
 
 
-def _of_signals(mapping: ColumnMapping, places: Mapping[str, Place], jointed: Jointed) -> ColumnMapping:
+def _mapping_of_signals(
+    mapping: ColumnMapping, places: Mapping[str, Place], jointed: Jointed
+) -> ColumnMapping:
     """Return a mapping without the other variables of the robot, so that one file serves all commands."""
-    others = known_columns(jointed, stand_ins(VARIABLES)).keys() - places.keys()
-    columns = {name: source for name, source in mapping.columns.items() if name not in others}
+    other_columns = known_columns(jointed, stand_ins(VARIABLES)).keys() - places.keys()
+    columns = {name: source for name, source in mapping.columns.items() if name not in other_columns}
     return replace(mapping, columns=columns)
 
 
@@ -197,45 +206,50 @@ def _names_and_places(
     jointed: Jointed, name: str, rank: int, variable: Variable
 ) -> Iterator[tuple[str, Place]]:
     """Yield names and places of the columns of a variable, for the joints and motors that have it."""
-    of_motors = "motor" in variable.dims
-    for joint, there in enumerate(jointed.existing(variable)):
+    is_of_motors = "motor" in variable.dims
+    for joint, exists_by_motor in enumerate(jointed.existing(variable)):
         unit = variable.quantity.unit(jointed.joint_types[joint])
-        for number in (motor for motor, exists in zip(MOTORS, there, strict=False) if exists):
-            motor = number if of_motors else None
-            ending = f"_{number}" if of_motors else ""
+        for number in (motor for motor, exists in zip(MOTORS, exists_by_motor, strict=False) if exists):
+            motor = number if is_of_motors else None
+            ending = f"_{number}" if is_of_motors else ""
             place = Place(variable.name, joint, motor, unit, rank=rank)
-            named = {"joint": jointed.joint_names[joint], "number": joint + 1, "ending": ending}
-            yield from ((pattern.format(name=name, **named), place) for pattern in NAMINGS)
+            name_fields = {"joint": jointed.joint_names[joint], "number": joint + 1, "ending": ending}
+            yield from ((pattern.format(name=name, **name_fields), place) for pattern in NAMINGS)
             ratio = float(jointed.gear_ratio[joint, number - 1])
             if variable.geared and np.isfinite(ratio):  # a shaft turns, whatever the joint does
-                on_shaft = variable.quantity.unit("revolute")
-                shaft = place._replace(unit=on_shaft, gear=ratio**-variable.geared)
-                yield NAMINGS[0].format(name=f"{name}_shaft", **named), shaft
+                shaft_unit = variable.quantity.unit("revolute")
+                shaft_place = place._replace(unit=shaft_unit, gear=ratio**-variable.geared)
+                yield NAMINGS[0].format(name=f"{name}_shaft", **name_fields), shaft_place
 
 
-MOST_NAMED = 7
+MAX_LISTED_JOINTS = 7
 """Largest number of joints of a robot that a message lists."""
 
 
-def _other_joints(header: ColumnNames, places: Mapping[str, Place], robot: str) -> str:
+def _unknown_joints_sentence(header: ColumnNames, places: Mapping[str, Place], robot: str) -> str:
     """Return a sentence on columns of joints that the robot does not have; empty without any."""
     endings = {name.rpartition(".")[2] for name in places if "." in name}
-    own = tuple(f"{joint}." for joint in header.joint_names)
-    parts = [(name, *name.rpartition(".")) for name in header.names if not name.startswith(own)]
-    columns = {name: joint for name, joint, _, ending in parts if joint and ending in endings}
-    meant = header.find_intended_columns(columns, [name for name in places if name not in header.names])
-    if len(meant) == len(columns):
-        return "; ".join(misspellings(meant))
+    known_prefixes = tuple(f"{joint}." for joint in header.joint_names)
+    split_names = [
+        (name, *name.rpartition(".")) for name in header.names if not name.startswith(known_prefixes)
+    ]
+    columns = {name: joint for name, joint, _, ending in split_names if joint and ending in endings}
+    intended_columns = header.find_intended_columns(
+        columns, [name for name in places if name not in header.names]
+    )
+    if len(intended_columns) == len(columns):
+        return "; ".join(misspellings(intended_columns))
     joints = dict.fromkeys(columns.values())
-    noun, verb, them = ("joint", "is", "its") if len(joints) == 1 else ("joints", "are", "their")
-    where = f"not in {robot} ({listed(header.joint_names, MOST_NAMED)})"
+    joint_noun, verb, them = ("joint", "is", "its") if len(joints) == 1 else ("joints", "are", "their")
+    location = f"not in {robot} ({listed(header.joint_names, MAX_LISTED_JOINTS)})"
     return (
-        f"{noun} {', '.join(map(repr, joints))} {verb} {where}: is this the recording of another robot? If"
+        f"{joint_noun} {', '.join(map(repr, joints))} {verb} {location}: is this the recording of "
+        "another robot? If"
         f" not, map or ignore {them} columns with --columns"
     )
 
 
-def _unusable(header: ColumnNames, places: Mapping[str, Place], stranger: str) -> Iterator[str]:
+def _header_problems(header: ColumnNames, places: Mapping[str, Place], stranger: str) -> Iterator[str]:
     """Yield problems of the header of a recording.
 
     Args:
@@ -244,30 +258,32 @@ def _unusable(header: ColumnNames, places: Mapping[str, Place], stranger: str) -
         stranger: sentence on unknown joints; otherwise empty.
     """
     if header.is_foreign:
-        yield stranger or _no_column(header, places)
+        yield stranger or _no_known_column_text(header, places)
         return
     yield from header.naming_problems()
     yield from header.missing_time_problems(
         "if the rows are equally spaced, give their rate in a file for --columns"
     )
-    first: dict[Place, str] = {}
+    first_names: dict[Place, str] = {}
     for name in filter(places.get, header.names):
-        other = first.setdefault(places[name]._replace(unit="", gear=1.0), name)
+        other = first_names.setdefault(places[name]._replace(unit="", gear=1.0), name)
         if other != name:
             yield f"columns {other!r} and {name!r} are the same signal; keep one"
 
 
-def _no_column(header: ColumnNames, places: Mapping[str, Place]) -> str:
+def _no_known_column_text(header: ColumnNames, places: Mapping[str, Place]) -> str:
     """Return that no column of a recording is known, with the nearest or some possible names."""
-    first: dict[str, str] = {}
+    name_of_variable: dict[str, str] = {}
     for name, place in places.items():
-        first.setdefault(place.variable, name)
-    usual = [first[name] for name in USUAL if name in first] or list(first.values())[:2]
-    near = [
+        name_of_variable.setdefault(place.variable, name)
+    example_names = [
+        name_of_variable[name] for name in EXAMPLE_VARIABLES if name in name_of_variable
+    ] or list(name_of_variable.values())[:2]
+    suggestions = [
         f"; {name!r} may be {meant!r}" for name, meant in header.intended_columns.items() if meant in places
     ]
-    hint = f"{''.join(near[:1])}; if they have other names, {header.renaming}"
-    return f"expected columns such as {', '.join([TIME, *usual])}{hint}"
+    hint = f"{''.join(suggestions[:1])}; if they have other names, {header.renaming}"
+    return f"expected columns such as {', '.join([TIME, *example_names])}{hint}"
 
 
 @np.errstate(over="ignore")  # an overflow to infinity means a missing sample
@@ -288,14 +304,16 @@ def nearest_turn(angles: FloatArray, others: FloatArray) -> FloatArray:
     return np.asarray(angles - 2 * np.pi * turns)
 
 
-def _elapsed(table: CsvTable, at: int, factors: Mapping[int, float], rate: float | None) -> FloatArray:
+def _elapsed_seconds(
+    table: CsvTable, column_index: int, factors: Mapping[int, float], rate: float | None
+) -> FloatArray:
     """Return the times since the first sample, s; with a stated rate it stands in place of wrong stamps."""
-    stamps = table.values[:, at]
-    if len(stamps) < 2:
-        rows = counted(len(stamps), "row")
+    time_stamps = table.values[:, column_index]
+    if len(time_stamps) < 2:
+        rows = counted(len(time_stamps), "row")
         raise InputError.one(f"has {rows}; a recording needs at least 2", table.source.path)
-    times, replaced = replace_stamps(stamps * factors[at], rate)
+    times, is_replaced = replace_stamps(time_stamps * factors[column_index], rate)
     for problem in time_problems(times):
         raise InputError.one(f"time {problem.message}", table.source.path, table.line_of(problem.sample or 0))
     # subtraction before scaling: stamps since 1970 lose no digits
-    return times if replaced else np.asarray((stamps - stamps[0]) * factors[at])
+    return times if is_replaced else np.asarray((time_stamps - time_stamps[0]) * factors[column_index])

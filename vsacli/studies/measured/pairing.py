@@ -24,14 +24,14 @@ ROUNDING = 1e-8
 """Share of a variable's largest value over all joints below which changes are rounding. Torques of joints at
 rest change by 1e-16 to 1e-12 of it, and 1e-8 of a motion is below the resolution of any sensor."""
 
-WIDEST = 3.0
+MAX_RANGE_RATIO = 3.0
 """Limit of values in the search beyond the range of nearly all samples, in units of this range, so that
 outliers count little."""
 
 LARGEST = 1e100
 """Limit of measured values, whose squares would overflow otherwise."""
 
-ENOUGH = 20_000
+MAX_THINNED_SAMPLES = 20_000
 """Number of samples that suffices to find the approximate shift and exchanged columns."""
 
 NEARLY_ALL = (0.02, 0.98)
@@ -76,9 +76,9 @@ class Pairing(NamedTuple):
     measured: FloatArray
 
     def thinned(self) -> Pairing:
-        """Return the pairing with at most `ENOUGH` samples."""
-        every = -(-len(self.time) // ENOUGH)
-        return self._replace(time=self.time[::every], measured=self.measured[::every])
+        """Return the pairing with at most `MAX_THINNED_SAMPLES` samples."""
+        stride = -(-len(self.time) // MAX_THINNED_SAMPLES)
+        return self._replace(time=self.time[::stride], measured=self.measured[::stride])
 
     def overlap(self, shift: float) -> tuple[FloatArray, BoolArray]:
         """Return computed values at the measured times for a shift, and a mask of those that exist."""
@@ -89,15 +89,19 @@ class Pairing(NamedTuple):
 def tame(values: FloatArray) -> FloatArray:
     """Return measured values with outliers clipped to a range around the others."""
     limited = np.clip(values, -LARGEST, LARGEST)
-    low, high = np.quantile(limited, NEARLY_ALL)
-    room = WIDEST * (high - low)
-    return limited if room == 0 else np.clip(limited, low - room, high + room)
+    low_quantile, high_quantile = np.quantile(limited, NEARLY_ALL)
+    range_margin = MAX_RANGE_RATIO * (high_quantile - low_quantile)
+    return (
+        limited
+        if range_margin == 0
+        else np.clip(limited, low_quantile - range_margin, high_quantile + range_margin)
+    )
 
 
 def noise(values: FloatArray) -> float:
     """Return the variance of the white noise of clipped values, from their second differences."""
-    second = np.abs(np.diff(values, 2))
-    return float(np.median(second) / NORMAL_MEDIAN) ** 2 / 6 if second.size else 0.0
+    second_differences = np.abs(np.diff(values, 2))
+    return float(np.median(second_differences) / NORMAL_MEDIAN) ** 2 / 6 if second_differences.size else 0.0
 
 
 def interpolated(time: FloatArray, values: FloatArray, largest: float) -> Computed:
@@ -108,26 +112,26 @@ def interpolated(time: FloatArray, values: FloatArray, largest: float) -> Comput
         values: values, (samples,), NaN where there is none.
         largest: largest absolute value of the variable over all joints.
     """
-    known = np.isfinite(values)
-    if np.count_nonzero(known) < FEWEST_SAMPLES:
-        return Computed(_nowhere, _nowhere, 0.0, 0.0, moves=False)
-    stamps, given = time[known], values[known]
-    spline = scipy.interpolate.make_interp_spline(stamps, given, k=3)
-    slope, gaps = spline.derivative(), np.where(known, 0.0, np.nan)
+    is_finite = np.isfinite(values)
+    if np.count_nonzero(is_finite) < FEWEST_SAMPLES:
+        return Computed(_undefined_values, _undefined_values, 0.0, 0.0, moves=False)
+    sample_times, finite_values = time[is_finite], values[is_finite]
+    spline = scipy.interpolate.make_interp_spline(sample_times, finite_values, k=3)
+    slope, nan_at_gaps = spline.derivative(), np.where(is_finite, 0.0, np.nan)
 
     def at(times: FloatArray) -> FloatArray:
-        return np.asarray(spline(times) + np.interp(times, time, gaps, left=np.nan, right=np.nan))
+        return np.asarray(spline(times) + np.interp(times, time, nan_at_gaps, left=np.nan, right=np.nan))
 
     return Computed(
         at=at,
         slope=lambda times: np.asarray(slope(times)),
-        error=_interpolation_error(stamps, given),
-        spread=float(np.std(given)),
-        moves=float(np.ptp(given)) > ROUNDING * largest,
+        error=_interpolation_error(sample_times, finite_values),
+        spread=float(np.std(finite_values)),
+        moves=float(np.ptp(finite_values)) > ROUNDING * largest,
     )
 
 
-def _nowhere(times: FloatArray) -> FloatArray:
+def _undefined_values(times: FloatArray) -> FloatArray:
     return np.full(np.shape(times), np.nan)
 
 
@@ -137,23 +141,23 @@ def _interpolation_error(time: FloatArray, values: FloatArray) -> float:
     rounding = float(np.finfo(float).eps * np.abs(values).max())
     if len(time) < 2 * FEWEST_SAMPLES:
         return rounding
-    between = slice(1, len(time) - 1, 2)
-    coarse = scipy.interpolate.make_interp_spline(time[::2], values[::2], k=3)
-    inside = time[between] <= time[::2][-1]
-    apart = coarse(time[between][inside]) - values[between][inside]
-    return rounding + float(np.sqrt(np.mean(apart**2))) / 16
+    odd_samples = slice(1, len(time) - 1, 2)
+    coarse_spline = scipy.interpolate.make_interp_spline(time[::2], values[::2], k=3)
+    is_inside = time[odd_samples] <= time[::2][-1]
+    differences = coarse_spline(time[odd_samples][is_inside]) - values[odd_samples][is_inside]
+    return rounding + float(np.sqrt(np.mean(differences**2))) / 16
 
 
-PRICE = math.log(10.0)
+LINE_PENALTY = math.log(10.0)
 """Penalty for a line, applied twice to a falling one, on the logarithm of the unexplained part."""
 
-EXACT = 1e-5
+MIN_UNEXPLAINED_SHARE = 1e-5
 """Smallest unexplained share of the variance that counts, since the filter of a sensor may cause as much."""
 
-FLAT = 1e-9
+FLAT_VARIANCE_SHARE = 1e-9
 """Share of the variance of a recording below which sums of transforms are rounding."""
 
-NOISIEST = 0.1
+MAX_NOISE_SHARE = 0.1
 """Largest share of the variance attributed to noise, since motion with few samples looks like noise."""
 
 
@@ -219,16 +223,22 @@ def unlikeness(moments: Moments, exact: float, scale: FloatArray | float | None 
         scale: sum of squares to which errors are relative; that of the computed values if None.
     """
     computed, measured, product = moments.spreads()
-    moving = (measured > FLAT * moments.samples * moments.measured_variance) & (computed > 0)
+    moving = (measured > FLAT_VARIANCE_SHARE * moments.samples * moments.measured_variance) & (computed > 0)
     along = np.where(moving, product, 0.0) ** 2 / np.where(moving, computed * measured, 1.0)
     freedom = (moments.samples - 1) / np.maximum(moments.samples - 3, 0.5)
-    line = np.log(np.clip((1 - along) * freedom, 0, 1) + exact) + np.where(product < 0, 2 * PRICE, PRICE)
+    line = np.log(np.clip((1 - along) * freedom, 0, 1) + exact) + np.where(
+        product < 0, 2 * LINE_PENALTY, LINE_PENALTY
+    )
     errors = moments.squared_error() / (computed if scale is None else scale)
     equal = np.log(np.clip(np.nan_to_num(errors, nan=1.0, posinf=1.0), 0, 1) + exact)
     return np.asarray(np.minimum(0.0, np.minimum(equal, line)))
 
 
 def exactness(tamed: FloatArray) -> float:
-    """Return the share of the variance of measured values that is noise, at least `EXACT`."""
+    """Return the share of the variance of measured values that is noise, at least `MIN_UNEXPLAINED_SHARE`."""
     variance = float(np.var(tamed))
-    return min(NOISIEST, max(EXACT, noise(tamed) / variance)) if variance > 0 else EXACT
+    return (
+        min(MAX_NOISE_SHARE, max(MIN_UNEXPLAINED_SHARE, noise(tamed) / variance))
+        if variance > 0
+        else MIN_UNEXPLAINED_SHARE
+    )

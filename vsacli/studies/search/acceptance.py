@@ -31,7 +31,13 @@ from vsacli.dynamics.variants import Variants
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
 from vsacli.studies.search.fix_report import Fix
-from vsacli.studies.search.loads import Instants, Load, TaskSamples, concatenate_task_samples, evenly_chosen
+from vsacli.studies.search.loads import (
+    Instants,
+    Load,
+    TaskSamples,
+    concatenate_task_samples,
+    evenly_spaced_samples,
+)
 from vsacli.studies.search.recorded_limits import RecordedLimits
 from vsacli.trajectory.trajectory import Trajectory
 
@@ -43,7 +49,7 @@ STRICTER = (0.0, 0.0, 0.0, 1e-6, 1e-4, 0.01)
 """Relative tightening of the rule in successive searches. A result that is accepted at its samples can be
 refused between them; the refused instants count in the next search, so that two searches usually suffice."""
 
-RESTING = 1000
+REST_SAMPLES = 1000
 """Number of samples at which it is seen whether a motion is refused even at rest."""
 
 _Found = TypeVar("_Found")
@@ -97,11 +103,11 @@ class Acceptance:
         """
         between = self.between
         for share in STRICTER:
-            found, short = attempt(replace(self, between=between).stricter(share))
-            if short is None:
-                return found, True
-            between = np.union1d(between, short)
-        return found, False
+            candidate, refused_instants = attempt(replace(self, between=between).stricter(share))
+            if refused_instants is None:
+                return candidate, True
+            between = np.union1d(between, refused_instants)
+        return candidate, False
 
     @property
     def counted(self) -> list[int]:
@@ -112,52 +118,52 @@ class Acceptance:
         """Return a mask of the samples that are not accepted, (samples, joints)."""
         block = compute_block(self.robot, part.motion, self.min_margin)
         values = map(block.of_joint, range(len(self.robot.joints)))
-        by_joint = [
-            self._refused(joint, of_joint, part.instants)
-            for joint, of_joint in zip(self.robot.joints, values, strict=True)
+        joint_masks = [
+            self._refused_mask(joint, joint_values, part.instants)
+            for joint, joint_values in zip(self.robot.joints, values, strict=True)
         ]
-        refused = np.stack(by_joint, axis=1)
+        refused = np.stack(joint_masks, axis=1)
         refused[:, list(self.ignored)] = False
         return refused
 
     def parts(self, trajectory: Trajectory, factor: float = 1.0) -> Iterator[TaskSamples]:
         """Yield all samples of a motion, stretched by a factor or not, in blocks; then those of `between`."""
-        samples = usual_block(len(self.robot.joints))
-        for start in range(0, trajectory.samples, samples):
-            yield TaskSamples.of(trajectory, start, start + samples, factor)
+        block_samples = usual_block(len(self.robot.joints))
+        for start in range(0, trajectory.samples, block_samples):
+            yield TaskSamples.of(trajectory, start, start + block_samples, factor)
         if self.between.size:
             yield TaskSamples.between(trajectory, self.between, factor)
 
     def watched(self, trajectory: Trajectory, steps: int) -> TaskSamples:
         """Return at most this many samples of a motion, and all of `between`."""
-        parts = [evenly_chosen(trajectory, steps)]
+        parts = [evenly_spaced_samples(trajectory, steps)]
         if self.between.size:
             parts.append(TaskSamples.between(trajectory, self.between))
         return concatenate_task_samples(parts)
 
     def watched_at_rest(self, trajectory: Trajectory) -> TaskSamples:
-        """Return at most `RESTING` samples of a motion, held, and all of `between`."""
-        return self.watched(trajectory, RESTING).slowed(math.inf)
+        """Return at most `REST_SAMPLES` samples of a motion, held, and all of `between`."""
+        return self.watched(trajectory, REST_SAMPLES).slowed(math.inf)
 
     def refused_steps(self, joint: Joint, load: Load) -> BoolArray:
         """Return a mask of the samples of one joint that are not accepted, (samples,)."""
-        return self._refused(joint, self._driven(joint, load), load.instants)
+        return self._refused_mask(joint, self._drive_variables(joint, load), load.instants)
 
     def beyond_position(self, joint: Joint, load: Load) -> Finding | None:
         """Return the worst violation of the position limit of one joint, which no timing changes."""
-        return self._beyond_limit(joint, {"q": load.command.q}, load.time, load.instants)
+        return self._limit_violation(joint, {"q": load.command.q}, load.time, load.instants)
 
     def reasons(self, part: TaskSamples) -> tuple[str, ...]:
         """Return the worst violation of each joint with a refused sample, as clauses."""
         joints = enumerate(zip(self.robot.joints, part.loads(self.robot), strict=True))
-        found = (self.reason(*pair) for index, pair in joints if index not in self.ignored)
-        return tuple(reason for reason in found if reason)
+        clauses = (self.reason(*pair) for index, pair in joints if index not in self.ignored)
+        return tuple(reason for reason in clauses if reason)
 
     def worst(self, joint: Joint, load: Load) -> Finding | None:
         """Return the worst violation among the samples of one joint; None if all are accepted."""
-        values = self._driven(joint, load)
-        of_limits = self._beyond_limit(joint, values, load.time, load.instants)
-        return self._short_of_margin(joint, load, values) or of_limits
+        values = self._drive_variables(joint, load)
+        limit_finding = self._limit_violation(joint, values, load.time, load.instants)
+        return self._margin_violation(joint, load, values) or limit_finding
 
     def reason(self, joint: Joint, load: Load) -> str:
         """Return the worst violation of one joint as a clause; "" if all samples are accepted."""
@@ -166,27 +172,27 @@ class Acceptance:
 
     def path_reason(self, joint: Joint, load: Load) -> str:
         """Return a position or velocity limit that the motion exceeds, as a clause; "" if there is none."""
-        worst = self._beyond_limit(joint, _path(load), load.time, load.instants)
+        worst = self._limit_violation(joint, _path_variables(load), load.time, load.instants)
         return "" if worst is None else worst.clause
 
     def beyond_path(self, joint: Joint, load: Load) -> BoolArray:
         """Return a mask of the samples that exceed a limit of position or velocity, (samples,)."""
-        return np.asarray(self._limit_flags(joint, _path(load), load.instants) != 0)
+        return np.asarray(self._limit_flags(joint, _path_variables(load), load.instants) != 0)
 
-    def _driven(self, joint: Joint, load: Load) -> VariablesOfJoint:
+    def _drive_variables(self, joint: Joint, load: Load) -> VariablesOfJoint:
         """Return all variables of one joint, by name."""
         return drive(joint, load.command, self.min_margin).by_name()
 
-    def _refused(self, joint: Joint, values: VariablesOfJoint, instants: Instants) -> BoolArray:
-        short = margin(values["stiffness"], values["stiffness_min"], values["stiffness_max"])
+    def _refused_mask(self, joint: Joint, values: VariablesOfJoint, instants: Instants) -> BoolArray:
+        margins = margin(values["stiffness"], values["stiffness_min"], values["stiffness_max"])
         flags = values["flags"]
-        refused: BoolArray = (short < self.min_margin) | has_flag(flags, Flag.INFEASIBLE)
-        refused |= self._near_limits(joint, values)
+        refused: BoolArray = (margins < self.min_margin) | has_flag(flags, Flag.INFEASIBLE)
+        refused |= self._near_limit_mask(joint, values)
         if self.recorded is not None:
             flags = self.recorded.flags(self.robot, joint, values, instants)
         return refused | has_flag(flags, LIMITS)
 
-    def _near_limits(self, joint: Joint, values: VariablesOfJoint) -> BoolArray:
+    def _near_limit_mask(self, joint: Joint, values: VariablesOfJoint) -> BoolArray:
         """Return a mask of the samples closer to a limit than the reserve, (samples,)."""
         near = np.zeros(len(values["flags"]), dtype=np.bool_)
         for check in limit_checks(joint) if self.reserve else ():
@@ -194,23 +200,30 @@ class Acceptance:
                 near |= check.clearance(values) < self.reserve
         return near
 
-    def _short_of_margin(self, joint: Joint, load: Load, values: VariablesOfJoint) -> Finding | None:
+    def _margin_violation(self, joint: Joint, load: Load, values: VariablesOfJoint) -> Finding | None:
         """Return the sample that is furthest from the required margin, if it is short of it."""
-        asked = load.command.commanded["stiffness"]
+        commanded_stiffness = load.command.commanded["stiffness"]
         lower, upper = values["stiffness_min"], values["stiffness_max"]
-        gap = margin(asked, lower, upper)
-        gap[np.isnan(gap)] = np.inf
-        gap[has_flag(values["flags"], Flag.INFEASIBLE) & np.isnan(lower)] = -np.inf
-        step = int(gap.argmin())
-        if gap[step] >= self.min_margin:
+        margins = margin(commanded_stiffness, lower, upper)
+        margins[np.isnan(margins)] = np.inf
+        margins[has_flag(values["flags"], Flag.INFEASIBLE) & np.isnan(lower)] = -np.inf
+        index = int(margins.argmin())
+        if margins[index] >= self.min_margin:
             return None
-        low, high = lower[step] / (1 - self.min_margin), upper[step] / (1 + self.min_margin)
-        bound = low if math.isnan(low) or asked[step] < low else high
-        end = lower[step] if bound == low else upper[step]
+        min_stiffness, max_stiffness = (
+            lower[index] / (1 - self.min_margin),
+            upper[index] / (1 + self.min_margin),
+        )
+        bound = (
+            min_stiffness
+            if math.isnan(min_stiffness) or commanded_stiffness[index] < min_stiffness
+            else max_stiffness
+        )
+        end = lower[index] if bound == min_stiffness else upper[index]
         return Finding(
             MARGIN,
-            float(load.time[step]),
-            float(asked[step]),
+            float(load.time[index]),
+            float(commanded_stiffness[index]),
             float(bound),
             units.STIFFNESS.unit(joint.type),
             joint=joint.name,
@@ -218,14 +231,14 @@ class Acceptance:
             margin=self.min_margin,
         )
 
-    def _beyond_limit(
+    def _limit_violation(
         self, joint: Joint, values: VariablesOfJoint, time: FloatArray, instants: Instants
     ) -> Finding | None:
         """Return the worst violation of the first limit that the given variables exceed, if there is one."""
         flags = self._limit_flags(joint, values, instants)
         checks = (check for check in limit_checks(joint) if check.variable in values)
-        worst = (worst_excess(joint, check, values, time, has_flag(flags, check.flag)) for check in checks)
-        return next(filter(None, worst), None)
+        findings = (worst_excess(joint, check, values, time, has_flag(flags, check.flag)) for check in checks)
+        return next(filter(None, findings), None)
 
     def _limit_flags(self, joint: Joint, values: VariablesOfJoint, instants: Instants) -> FlagArray:
         """Return the flags of the limits that the given variables exceed, (samples,)."""
@@ -235,7 +248,7 @@ class Acceptance:
         return self.recorded.flags(self.robot, joint, {**values, "flags": flags}, instants)
 
 
-def _path(load: Load) -> VariablesOfJoint:
+def _path_variables(load: Load) -> VariablesOfJoint:
     """Return the variables of a load on which neither stiffness nor branch has an effect."""
     return {"q": load.command.q, "dq": load.command.dq}
 
@@ -291,9 +304,9 @@ def admissible_stiffness(joint: Joint, command: Command, min_margin: float) -> R
     """
     actuator = variable_stiffness_actuator(joint)
     corridor = actuator.solve(command.tau_e, command.commanded["stiffness"], command.q)
-    least, most = joint.limits.stiffness
-    low = np.maximum(corridor.lower / (1 - min_margin), least)
-    high = np.minimum(corridor.upper / (1 + min_margin), most)
+    min_limit, max_limit = joint.limits.stiffness
+    low = np.maximum(corridor.lower / (1 - min_margin), min_limit)
+    high = np.minimum(corridor.upper / (1 + min_margin), max_limit)
     if np.isinf(actuator.max_deflections).all():
         return Range(low, high)
     return Range(low, np.minimum(high, _deflection_ceiling(actuator, command, corridor.lower)))
@@ -306,26 +319,29 @@ def _deflection_ceiling(actuator: Actuator, command: Command, lower: FloatArray)
     0..1 to all stiffness above `lower`, as lower + scale x/(1 - x).
     """
     limits = np.array(actuator.max_deflections)[:, None]
-    kept, broken = np.zeros_like(lower), np.ones_like(lower)
+    accepted_share, refused_share = np.zeros_like(lower), np.ones_like(lower)
     for _ in range(BISECTIONS):
-        share = (kept + broken) / 2
+        share = (accepted_share + refused_share) / 2
         stiffness = lower + command.commanded["stiffness"] * share / (1 - share)
         solution = actuator.solve(command.tau_e, stiffness, command.q)
-        within = np.all(np.abs(solution.deflections) <= limits, axis=0)
-        kept, broken = np.where(within, share, kept), np.where(within, broken, share)
-    return lower + command.commanded["stiffness"] * kept / (1 - kept)
+        within_limits = np.all(np.abs(solution.deflections) <= limits, axis=0)
+        accepted_share, refused_share = (
+            np.where(within_limits, share, accepted_share),
+            np.where(within_limits, refused_share, share),
+        )
+    return lower + command.commanded["stiffness"] * accepted_share / (1 - accepted_share)
 
 
-REFUSED = ("infeasible", "singular", "over_limit")
+REFUSED_VERDICTS = ("infeasible", "singular", "over_limit")
 """Verdicts that a fix must remove. Unreliable is not among them: no fix makes a recording less uncertain."""
 
-FINER = 10
+CHECK_SUBDIVISIONS = 10
 """Subdivisions of each sampling interval when a motion is checked between its samples."""
 
-MOST_INSTANTS = 300_000
+MAX_CHECK_INSTANTS = 300_000
 """Largest number of instants in this check: the intervals of longer motions get fewer subdivisions."""
 
-MOST_REFUSED = 1000
+MAX_REFUSED_INSTANTS = 1000
 """Largest number of refused instants that this check returns."""
 
 
@@ -335,8 +351,8 @@ class Verification(NamedTuple):
     Attributes:
         joints: findings of the run at each joint.
         refused: instants at which it misses the margin or a limit, as times since the start of the unchanged
-            task, s: the worst ones of the run, also between samples, and those of a grid `FINER` times as
-            fine; none if only the self-check fails. None if the motion is confirmed.
+            task, s: the worst ones of the run, also between samples, and those of a grid
+            `CHECK_SUBDIVISIONS` times as fine; none if only the self-check fails. None if the motion is confirmed.
     """
 
     joints: Sequence[JointReport]
@@ -365,18 +381,18 @@ def _refused_instants(
     joints = [report.joints[index] for index in acceptance.counted]
     times = [worst.time for tool in report.tools for worst in tool.worst.values()]
     for joint in joints:
-        if joint.margin < acceptance.min_margin or any(map(joint.shows, REFUSED)):
+        if joint.margin < acceptance.min_margin or any(map(joint.shows, REFUSED_VERDICTS)):
             findings = (*joint.worst.values(), *joint.between.values())
             times += [joint.margin_time, *(finding.time for finding in findings)]
-    between = _refused_between(acceptance, run, factor)
+    between = _refused_instants_between(acceptance, run, factor)
     if report.self_check.passed and not times and not between.size:
         return None
     elapsed = (np.array(times) - run.trajectory.start) / factor
     return np.union1d(elapsed[np.isfinite(elapsed)], between)
 
 
-def _refused_between(acceptance: Acceptance, run: PreparedRun, factor: float) -> FloatArray:
-    """Return up to `MOST_REFUSED` refused instants between the samples of a motion, s.
+def _refused_instants_between(acceptance: Acceptance, run: PreparedRun, factor: float) -> FloatArray:
+    """Return up to `MAX_REFUSED_INSTANTS` refused instants between the samples of a motion, s.
 
     With the worst instants of the run alone, 7 of 44 fixes of random tasks miss the margin on this grid.
     """
@@ -385,16 +401,19 @@ def _refused_between(acceptance: Acceptance, run: PreparedRun, factor: float) ->
     if not trajectory.known_between or trajectory.estimates:
         return np.empty(0)
     acceptance = replace(acceptance, robot=robot, between=np.empty(0))
-    steps = (trajectory.times.block(0, trajectory.samples) - trajectory.start) / factor
-    parts = max(1, min(FINER, MOST_INSTANTS // len(steps)))
-    elapsed = (steps[:-1, None] + np.diff(steps)[:, None] * np.arange(1, parts) / parts).ravel()
+    elapsed_samples = (trajectory.times.block(0, trajectory.samples) - trajectory.start) / factor
+    subdivisions = max(1, min(CHECK_SUBDIVISIONS, MAX_CHECK_INSTANTS // len(elapsed_samples)))
+    elapsed = (
+        elapsed_samples[:-1, None]
+        + np.diff(elapsed_samples)[:, None] * np.arange(1, subdivisions) / subdivisions
+    ).ravel()
     refused = np.concatenate(
         [
             part[acceptance.refused(TaskSamples.between(trajectory, part, factor)).any(axis=1)]
             for part in np.array_split(elapsed, 1 + len(elapsed) // usual_block(trajectory.joints))
         ]
     )
-    return refused[evenly(len(refused), MOST_REFUSED)]
+    return refused[evenly(len(refused), MAX_REFUSED_INSTANTS)]
 
 
 def verify_fixes(acceptance: Acceptance, fixes: Sequence[Fix]) -> Iterator[tuple[Fix, FloatArray | None]]:

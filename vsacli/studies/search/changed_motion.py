@@ -32,11 +32,13 @@ def with_raised_stiffness(trajectory: Trajectory, constants: Mapping[int, float]
     if not any(constants.values()):
         return with_stiffness(trajectory, stiffness)
     if not isinstance(stiffness, ClosedForm):
-        steps = np.zeros((3, trajectory.samples))
-        steps[0] = 1.0
-        return with_changed_stiffness(trajectory, {joint: by * steps for joint, by in constants.items()})
-    of_joints = [constants.get(joint, 0.0) for joint in range(trajectory.joints)]
-    return with_stiffness(trajectory, stiffness.rescaled([1.0] * trajectory.joints, of_joints))
+        unit_rows = np.zeros((3, trajectory.samples))
+        unit_rows[0] = 1.0
+        return with_changed_stiffness(
+            trajectory, {joint: constant * unit_rows for joint, constant in constants.items()}
+        )
+    joint_constants = [constants.get(joint, 0.0) for joint in range(trajectory.joints)]
+    return with_stiffness(trajectory, stiffness.rescaled([1.0] * trajectory.joints, joint_constants))
 
 
 def with_scaled_stiffness(trajectory: Trajectory, factors: Mapping[int, float]) -> Trajectory:
@@ -46,8 +48,8 @@ def with_scaled_stiffness(trajectory: Trajectory, factors: Mapping[int, float]) 
     """
     stiffness = trajectory.commanded[STIFFNESS.key]
     if isinstance(stiffness, ClosedForm):
-        of_joints = [factors.get(joint, 1.0) for joint in range(trajectory.joints)]
-        return with_stiffness(trajectory, stiffness.rescaled(of_joints, [0.0] * trajectory.joints))
+        joint_factors = [factors.get(joint, 1.0) for joint in range(trajectory.joints)]
+        return with_stiffness(trajectory, stiffness.rescaled(joint_factors, [0.0] * trajectory.joints))
     elapsed = elapsed_times(trajectory.times.block(0, trajectory.samples))
     rows = stiffness.samples(0, trajectory.samples, elapsed)
     changes = {joint: (factor - 1) * rows[:, joint] for joint, factor in factors.items()}
@@ -56,7 +58,7 @@ def with_scaled_stiffness(trajectory: Trajectory, factors: Mapping[int, float]) 
 
 def with_stiffness(trajectory: Trajectory, stiffness: Profile) -> Trajectory:
     """Return a trajectory at the same times with another profile of the stiffness."""
-    return _fixed(trajectory, trajectory.times, stiffness)
+    return _with_profile(trajectory, trajectory.times, stiffness)
 
 
 def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatArray]) -> Trajectory:
@@ -68,22 +70,22 @@ def with_changed_stiffness(trajectory: Trajectory, changes: Mapping[int, FloatAr
             N m/rad (N/m) per s^k, by joint index.
     """
     time = trajectory.times.block(0, trajectory.samples)
-    stiffness = _at_steps(STIFFNESS, trajectory.commanded[STIFFNESS.key], trajectory, changes)
-    return _fixed(_with_records_at_steps(trajectory), RecordedTimes(time), stiffness)
+    stiffness = _spline_through_samples(STIFFNESS, trajectory.commanded[STIFFNESS.key], trajectory, changes)
+    return _with_profile(_with_recordings_at_samples(trajectory), RecordedTimes(time), stiffness)
 
 
-def _with_records_at_steps(trajectory: Trajectory) -> Trajectory:
+def _with_recordings_at_samples(trajectory: Trajectory) -> Trajectory:
     """Return the trajectory with each resampled recording replaced by its values at the samples."""
     # all recorded signals of a file have the same times, and the stiffness has those of the samples
     resampled = {signal for signal, estimate in trajectory.estimates.items() if estimate.resampled}
 
     def known(signal: Signal, profile: Profile) -> Profile:
-        return _at_steps(signal, profile, trajectory) if signal in resampled else profile
+        return _spline_through_samples(signal, profile, trajectory) if signal in resampled else profile
 
     return trajectory.changed(known, trajectory.times)
 
 
-def _at_steps(
+def _spline_through_samples(
     signal: Signal, profile: Profile, trajectory: Trajectory, changes: Mapping[int, FloatArray] = NOTHING
 ) -> HermiteSpline:
     """Return a signal given by values and derivatives at the samples, with `changes` added by component."""
@@ -94,7 +96,7 @@ def _at_steps(
     return HermiteSpline(signal=signal, time=elapsed, rows=rows)
 
 
-def _fixed(trajectory: Trajectory, times: Times, stiffness: Profile) -> Trajectory:
+def _with_profile(trajectory: Trajectory, times: Times, stiffness: Profile) -> Trajectory:
     fixed = trajectory.changed(lambda signal, profile: stiffness if signal is STIFFNESS else profile, times)
     fixed.name, fixed.sources = as_name(f"{trajectory.name}-fixed"), ()
     return fixed
@@ -126,9 +128,9 @@ def with_kept_rate(trajectory: Trajectory, factor: float, rate: float | None) ->
     if trajectory.estimates and not _has_derivatives(trajectory):
         times = ResampledTimes(*trajectory.times.span, rate)
         return trajectory.changed(lambda _, profile: _resampled(profile, trajectory.start), times), factor
-    slower = trajectory.stretched(factor)
-    stamps = ResampledTimes(*slower.times.span, rate)
-    time = stamps.block(0, stamps.samples)
+    slowed_trajectory = trajectory.stretched(factor)
+    sample_times = ResampledTimes(*slowed_trajectory.times.span, rate)
+    time = sample_times.block(0, sample_times.samples)
     elapsed = elapsed_times(time)
 
     def anew(signal: Signal, profile: Profile) -> Profile:
@@ -136,12 +138,14 @@ def with_kept_rate(trajectory: Trajectory, factor: float, rate: float | None) ->
             return HermiteSpline(signal=signal, time=elapsed, rows=profile.at(elapsed))
         return profile
 
-    return slower.changed(anew, RecordedTimes(time)), 1.0
+    return slowed_trajectory.changed(anew, RecordedTimes(time)), 1.0
 
 
 def _has_derivatives(trajectory: Trajectory) -> bool:
-    recorded = (profile for _, profile in trajectory.profiles() if isinstance(profile, SampledProfile))
-    return any(given is not None for profile in recorded for given in profile.record.derivatives)
+    recorded_profiles = (
+        profile for _, profile in trajectory.profiles() if isinstance(profile, SampledProfile)
+    )
+    return any(given is not None for profile in recorded_profiles for given in profile.record.derivatives)
 
 
 def _resampled(profile: Profile, start: float) -> Profile:
@@ -159,7 +163,7 @@ def _resampled(profile: Profile, start: float) -> Profile:
     return replace(profile, resampled=True) if isinstance(profile, SampledProfile) else profile
 
 
-PARTS = (1, 2, 4, 8, 16)
+SUBDIVISIONS = (1, 2, 4, 8, 16)
 """Subdivisions of the sampling intervals, tried in this order. A reader takes samples with all derivatives
 for one function if the highest derivative is nearly linear between them; splines with a piece per interval
 require eight."""
@@ -172,8 +176,10 @@ def as_one_function(trajectory: Trajectory) -> Trajectory:
     """
     if trajectory.estimates or not trajectory.known_between:
         return trajectory
-    divided = (trajectory if parts == 1 else _refined_motion(trajectory, parts) for parts in PARTS)
-    return next((each for each in divided if reads_back(each)), trajectory)
+    refined_motions = (
+        trajectory if parts == 1 else _refined_motion(trajectory, parts) for parts in SUBDIVISIONS
+    )
+    return next((each for each in refined_motions if reads_back(each)), trajectory)
 
 
 def reads_back(trajectory: Trajectory) -> bool:
@@ -187,9 +193,9 @@ def reads_back(trajectory: Trajectory) -> bool:
 
 def _refined_motion(trajectory: Trajectory, parts: int) -> Trajectory:
     """Return the same functions sampled more finely; closed forms remain closed forms."""
-    steps = trajectory.times.block(0, trajectory.samples)
+    times = trajectory.times.block(0, trajectory.samples)
     shares = np.arange(parts) / parts
-    time = np.append((steps[:-1, None] + np.diff(steps)[:, None] * shares).ravel(), steps[-1])
+    time = np.append((times[:-1, None] + np.diff(times)[:, None] * shares).ravel(), times[-1])
     elapsed = elapsed_times(time)
 
     def recorded(signal: Signal, profile: Profile) -> Profile:

@@ -16,7 +16,13 @@ import numpy as np
 from vsacli.base.arrays import FloatArray, evenly
 from vsacli.studies.search.acceptance import ImpossibleError
 from vsacli.studies.search.changed_motion import rate_of
-from vsacli.studies.search.cutting_planes import FEW, SAME_RANGE, Required, first_accepted, scanned_numbers
+from vsacli.studies.search.cutting_planes import (
+    FACTOR_SEARCH_SAMPLES,
+    RANGE_TOLERANCE,
+    Required,
+    first_accepted,
+    scanned_numbers,
+)
 from vsacli.studies.search.loads import TaskSamples
 from vsacli.studies.search.task import Combination, Task
 from vsacli.trajectory.trajectory import Trajectory
@@ -24,7 +30,7 @@ from vsacli.trajectory.trajectory import Trajectory
 FACTOR_DENOMINATOR = 10_000
 """Grid of the factors, in units of 1/FACTOR_DENOMINATOR, if recorded time stamps are uneven."""
 
-WHOLE = 1e-9
+INTEGER_TOLERANCE = 1e-9
 """Relative difference up to which a number of sampling intervals is an integer but for rounding."""
 
 LARGEST_FACTOR = 1000
@@ -33,10 +39,10 @@ LARGEST_FACTOR = 1000
 STRIDES = ((3.0, 0.01), (30.0, 0.05), (LARGEST_FACTOR, 0.2))
 """Pairs of a factor and the relative stride of the scan up to it: fine strides for small slow-downs."""
 
-FINER = 7
+FACTORS_PER_REFINEMENT = 7
 """Number of factors that are tried at once between the neighbors of the best one."""
 
-MOST_ROUNDS = 20
+MAX_ROUNDS = 20
 """Limit on rounds that add samples refusing a combination that the few accept; two or three are usual."""
 
 BRANCH_GAIN = 0.9
@@ -64,21 +70,21 @@ class Factors(NamedTuple):
     @property
     def first(self) -> int:
         """Number that stands for no slow-down."""
-        return round(self.denominator) if self._whole else math.floor(self.denominator)
+        return round(self.denominator) if self._has_integer_denominator else math.floor(self.denominator)
 
     @property
-    def _whole(self) -> bool:
-        return math.isclose(self.denominator, round(self.denominator), rel_tol=WHOLE)
+    def _has_integer_denominator(self) -> bool:
+        return math.isclose(self.denominator, round(self.denominator), rel_tol=INTEGER_TOLERANCE)
 
     def factor(self, number: int) -> float:
         """Return the factor that a number stands for."""
-        denominator = round(self.denominator) if self._whole else self.denominator
+        denominator = round(self.denominator) if self._has_integer_denominator else self.denominator
         return 1.0 if number == self.first else number / denominator
 
     def scanned(self) -> list[int]:
         """Return the numbers of the factors that a search tries first."""
-        ends = [self.first, *(math.floor(factor * self.denominator) for factor, _ in STRIDES)]
-        pieces = zip(ends, ends[1:], STRIDES, strict=False)
+        bounds = [self.first, *(math.floor(factor * self.denominator) for factor, _ in STRIDES)]
+        pieces = zip(bounds, bounds[1:], STRIDES, strict=False)
         return sorted({n for low, high, (_, share) in pieces for n in scanned_numbers(low, high, share)})
 
 
@@ -94,17 +100,17 @@ def unchanged(required: Required) -> FloatArray:
 
 def constant_change(required: Required) -> FloatArray:
     """Return the smallest constant addition."""
-    (low, high), asked = required.admissible, required.asked
-    rise = np.max(low - asked, axis=1, keepdims=True)
-    fall = np.min(high - asked, axis=1, keepdims=True)
-    possible = rise <= fall + SAME_RANGE * np.abs(asked).max()
-    return np.where(possible, np.clip(0.0, rise, fall), np.inf) + np.zeros_like(asked)
+    (low, high), commanded = required.admissible, required.asked
+    min_change = np.max(low - commanded, axis=1, keepdims=True)
+    max_change = np.min(high - commanded, axis=1, keepdims=True)
+    possible = min_change <= max_change + RANGE_TOLERANCE * np.abs(commanded).max()
+    return np.where(possible, np.clip(0.0, min_change, max_change), np.inf) + np.zeros_like(commanded)
 
 
 def least_change(required: Required) -> FloatArray:
     """Return the smallest addition at each sample separately, a lower bound for every smooth profile."""
-    (low, high), asked = required.admissible, required.asked
-    return np.where(low <= high, np.clip(0.0, low - asked, high - asked), np.inf)
+    (low, high), commanded = required.admissible, required.asked
+    return np.where(low <= high, np.clip(0.0, low - commanded, high - commanded), np.inf)
 
 
 class _Scan(NamedTuple):
@@ -132,14 +138,14 @@ class CombinedSearch:
     """
 
     def __init__(self, task: Task, form: Form = constant_change, *, branches: bool = False) -> None:
-        self._task, self._form, self._exchanging = task, form, branches
+        self._task, self._change_law, self._exchanges_branches = task, form, branches
         self._factors = Factors.of(task.trajectory)
-        self._few = task.few_samples
+        self._few_samples = task.few_samples
 
     @property
     def exchangeable(self) -> bool:
         """Whether the other branch of some joint makes a difference."""
-        return any(len(choices) > 1 for choices in self._few.branches)
+        return any(len(choices) > 1 for choices in self._few_samples.branches)
 
     def smallest(self) -> Combination | None:
         """Return the combination of least size, confirmed at all samples if its changes are constants."""
@@ -150,23 +156,31 @@ class CombinedSearch:
         return self._confirmed(self._fastest)
 
     def _confirmed(self, choose: Callable[[], Combination | None]) -> Combination | None:
-        for _ in range(MOST_ROUNDS):
-            chosen = choose()
-            refused = None if chosen is None or self._form is least_change else self._refused(chosen)
-            if refused is None:
-                return chosen
-            self._few = self._few.with_further(refused)
+        for _ in range(MAX_ROUNDS):
+            combination = choose()
+            refused_samples = (
+                None
+                if combination is None or self._change_law is least_change
+                else self._refused_samples(combination)
+            )
+            if refused_samples is None:
+                return combination
+            self._few_samples = self._few_samples.with_further(refused_samples)
         return None
 
-    def _refused(self, combination: Combination) -> TaskSamples | None:
+    def _refused_samples(self, combination: Combination) -> TaskSamples | None:
         """Return samples that refuse a combination, from the first block with any, as commanded."""
-        factor, change = combination.factor, np.zeros(self._task.trajectory.joints)
-        change[list(combination.constants)] = list(combination.constants.values())
+        factor, stiffness_change = combination.factor, np.zeros(self._task.trajectory.joints)
+        stiffness_change[list(combination.constants)] = list(combination.constants.values())
         acceptance = self._task.acceptance_with(combination)
         for part in acceptance.parts(self._task.trajectory.stretched(factor), factor):
-            steps = np.flatnonzero(np.any(acceptance.refused(part.stiffened(change)), axis=1))
-            if steps.size:
-                return part.select(steps[evenly(len(steps), FEW)]).slowed(1 / factor)
+            refused_indices = np.flatnonzero(
+                np.any(acceptance.refused(part.stiffened(stiffness_change)), axis=1)
+            )
+            if refused_indices.size:
+                return part.select(
+                    refused_indices[evenly(len(refused_indices), FACTOR_SEARCH_SAMPLES)]
+                ).slowed(1 / factor)
         return None
 
     def _fastest(self) -> Combination | None:
@@ -174,82 +188,86 @@ class CombinedSearch:
 
         def accepts(numbers: Sequence[int]) -> Iterator[bool]:
             scan = self._scan(numbers)
-            return (self._at(scan, place) is not None for place in range(len(numbers)))
+            return (
+                self._combination_at(scan, factor_index) is not None for factor_index in range(len(numbers))
+            )
 
         number = first_accepted(accepts, self._factors.scanned())
-        return None if number is None else self._at(self._scan([number]), 0)
+        return None if number is None else self._combination_at(self._scan([number]), 0)
 
     def _smallest(self) -> Combination | None:
         """Return the combination of least size, by a scan, and ever finer ones around its best factor."""
         numbers = self._factors.scanned()
         while True:
-            place, best = self._best(self._scan(numbers))
-            around = numbers[max(place - 1, 0) : place + 2]
-            if best is None or around[-1] - around[0] < len(around):
+            best_index, best = self._smallest_of_scan(self._scan(numbers))
+            bracket = numbers[max(best_index - 1, 0) : best_index + 2]
+            if best is None or bracket[-1] - bracket[0] < len(bracket):
                 return best
-            finer = np.linspace(around[0], around[-1], FINER).round().astype(np.intp)
-            numbers = np.union1d(finer, around).tolist()
+            finer = np.linspace(bracket[0], bracket[-1], FACTORS_PER_REFINEMENT).round().astype(np.intp)
+            numbers = np.union1d(finer, bracket).tolist()
 
-    def _best(self, scan: _Scan) -> tuple[int, Combination | None]:
+    def _smallest_of_scan(self, scan: _Scan) -> tuple[int, Combination | None]:
         """Return the place of the smallest combination of a scan, and this combination.
 
         Sizes of a scan are lower bounds, without which fixes of a 3R with too low a stiffness take 4.4 times
         as long.
         """
-        best, at = None, 0
-        for place in np.argsort(scan.sizes, kind="stable").tolist():
-            if best is not None and scan.sizes[place] >= best.size:
+        smallest, smallest_index = None, 0
+        for index in np.argsort(scan.sizes, kind="stable").tolist():
+            if smallest is not None and scan.sizes[index] >= smallest.size:
                 break
-            combination = self._at(scan, place)
-            if combination is not None and (best is None or combination.size < best.size):
-                best, at = combination, place
-        return at, best
+            combination = self._combination_at(scan, index)
+            if combination is not None and (smallest is None or combination.size < smallest.size):
+                smallest, smallest_index = combination, index
+        return smallest_index, smallest
 
     def _scan(self, numbers: Sequence[int]) -> _Scan:
         """Return the least changes at the factors of numbers."""
         factors = tuple(map(self._factors.factor, numbers))
-        joints: dict[int, dict[str, FloatArray]] = {}
-        squares = np.square(np.subtract(factors, 1))
+        sizes_by_joint: dict[int, dict[str, FloatArray]] = {}
+        squared_sizes = np.square(np.subtract(factors, 1))
         for index in self._task.acceptance.counted:
-            joints[index] = {
-                branch: self._least_sizes(index, self._few.required(index, branch, factors))
-                for branch in (self._few.branches[index] if self._exchanging else ("",))
+            sizes_by_joint[index] = {
+                branch: self._least_sizes(index, self._few_samples.required(index, branch, factors))
+                for branch in (self._few_samples.branches[index] if self._exchanges_branches else ("",))
             }
-            squares += np.min([*joints[index].values()], axis=0) ** 2
-        return _Scan(factors, joints, np.sqrt(squares))
+            squared_sizes += np.min([*sizes_by_joint[index].values()], axis=0) ** 2
+        return _Scan(factors, sizes_by_joint, np.sqrt(squared_sizes))
 
     def _least_sizes(self, index: int, required: Required) -> FloatArray:
-        return np.where(required.refused, self._task.relative_size(index, self._form(required)), 0.0)
+        return np.where(required.refused, self._task.relative_size(index, self._change_law(required)), 0.0)
 
-    def _at(self, scan: _Scan, place: int) -> Combination | None:
+    def _combination_at(self, scan: _Scan, factor_index: int) -> Combination | None:
         """Return the combination that the few samples accept at one of the factors, or None."""
-        sizes, constants, branches = [scan.factors[place] - 1], dict[int, float](), dict[int, str]()
-        for index, choices in scan.joints.items() if scan.sizes[place] < math.inf else ():
-            best = math.inf
-            for branch, least in choices.items():
-                size, constant = self._change(index, branch, scan.factors, place, float(least[place]))
-                if size < BRANCH_GAIN * best:
-                    best, constants[index], branches[index] = size, constant, branch
+        sizes, constants, branches = [scan.factors[factor_index] - 1], dict[int, float](), dict[int, str]()
+        for index, sizes_by_branch in scan.joints.items() if scan.sizes[factor_index] < math.inf else ():
+            best_size = math.inf
+            for branch, min_sizes in sizes_by_branch.items():
+                size, constant = self._joint_change(
+                    index, branch, scan.factors, factor_index, float(min_sizes[factor_index])
+                )
+                if size < BRANCH_GAIN * best_size:
+                    best_size, constants[index], branches[index] = size, constant, branch
                 if not size:
                     break
-            sizes.append(best)
-            if best == math.inf:
+            sizes.append(best_size)
+            if best_size == math.inf:
                 break
         size = math.hypot(*sizes)
-        if not math.hypot(size, scan.sizes[place]) < math.inf:
+        if not math.hypot(size, scan.sizes[factor_index]) < math.inf:
             return None
-        changed = {index: constant for index, constant in constants.items() if constant}
-        exchanged = {index: branch for index, branch in branches.items() if branch}
-        return Combination(scan.factors[place], changed, exchanged, size)
+        constant_changes = {index: constant for index, constant in constants.items() if constant}
+        exchanged_branches = {index: branch for index, branch in branches.items() if branch}
+        return Combination(scan.factors[factor_index], constant_changes, exchanged_branches, size)
 
-    def _change(
-        self, index: int, branch: str, factors: tuple[float, ...], place: int, least: float
+    def _joint_change(
+        self, index: int, branch: str, factors: tuple[float, ...], factor_index: int, min_size: float
     ) -> tuple[float, float]:
         """Return size and constant of the change of a joint at one of the factors; infinite if impossible."""
-        kept = not self._few.required(index, branch, factors).refused[place]
-        if least == math.inf or self._form is least_change or kept:
-            return least, 0.0
-        constant = self._few.constant(index, branch, factors, place)
+        is_accepted = not self._few_samples.required(index, branch, factors).refused[factor_index]
+        if min_size == math.inf or self._change_law is least_change or is_accepted:
+            return min_size, 0.0
+        constant = self._few_samples.constant(index, branch, factors, factor_index)
         return float(self._task.relative_size(index, np.array([constant]))), constant
 
 
@@ -259,9 +277,9 @@ def smallest_slow_down(task: Task) -> Combination:
     Raises:
         ImpossibleError: no factor is accepted; the error has the reason.
     """
-    slower = CombinedSearch(task, unchanged).fastest()
-    if slower is not None:
-        return slower
+    slow_down = CombinedSearch(task, unchanged).fastest()
+    if slow_down is not None:
+        return slow_down
     if reasons := task.acceptance.reasons(task.acceptance.watched_at_rest(task.trajectory)):
         raise ImpossibleError(f"even at rest, under gravity alone, {'; '.join(reasons)}")
     raise ImpossibleError(f"not even one by a factor {LARGEST_FACTOR} does")

@@ -81,8 +81,8 @@ class MotorsOfRun(NamedTuple):
     def of(cls, robot: Robot, trajectory: Trajectory) -> MotorsOfRun:
         """Return the variables of a run along a trajectory."""
         run = Run(robot, trajectory)
-        rows = [(block.time, block.tau_motor, block.elastic_energy) for block in run]
-        time, tau_motor, elastic_energy = map(np.concatenate, zip(*rows, strict=True))
+        block_columns = [(block.time, block.tau_motor, block.elastic_energy) for block in run]
+        time, tau_motor, elastic_energy = map(np.concatenate, zip(*block_columns, strict=True))
         return cls(robot, time, tau_motor, elastic_energy, run.energies())
 
     def torques(self, index: int) -> FloatArray:
@@ -271,14 +271,14 @@ class Energy(Criterion):
 
     def weights(self, time: FloatArray) -> FloatArray:
         """Return the weights of an integral over time, and of the value at the start."""
-        loaded = np.zeros_like(time)
-        loaded[0] = 0.0 if self.repeating else 1.0
-        return np.stack([trapezoidal_weights(time), loaded])
+        initial_weight = np.zeros_like(time)
+        initial_weight[0] = 0.0 if self.repeating else 1.0
+        return np.stack([trapezoidal_weights(time), initial_weight])
 
     def of(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the energy, J."""
-        spent = sum(np.maximum(power, 0.0) for power in _motor_rows(joint, driven.motor_power))
-        return float(np.sum(self.weights(time) * np.stack([spent, driven.elastic_energy])))
+        positive_power = sum(np.maximum(power, 0.0) for power in _motor_rows(joint, driven.motor_power))
+        return float(np.sum(self.weights(time) * np.stack([positive_power, driven.elastic_energy])))
 
     def of_run(self, run: MotorsOfRun, index: int) -> float:
         """Return the positive work in the report of the run and the initial spring energy, J."""
@@ -287,8 +287,8 @@ class Energy(Criterion):
 
     def size(self, joint: Joint, driven: JointVariables, time: FloatArray) -> float:
         """Return the absolute work of the motors, since their positive work may be zero."""
-        passed = sum(map(np.abs, _motor_rows(joint, driven.motor_power)))
-        return float(trapezoidal_weights(time) @ passed) or 1.0
+        absolute_power = sum(map(np.abs, _motor_rows(joint, driven.motor_power)))
+        return float(trapezoidal_weights(time) @ absolute_power) or 1.0
 
 
 class Peak(Criterion):
@@ -348,13 +348,13 @@ def limit_names(checks: Sequence[LimitCheck]) -> list[str]:
 
 
 def limit_bounds(
-    checks: Sequence[LimitCheck], of_joint: Mapping[str, Any], clearance: float
+    checks: Sequence[LimitCheck], joint_variables: Mapping[str, Any], clearance: float
 ) -> Iterator[Any]:
     """Yield the excess of variables over their limits relative to the limits, plus the clearance."""
     for check in checks:
         for sign, bound in _finite_ends(check):
-            size = abs(bound) or 1.0
-            yield sign * (check.values(of_joint) - bound) / size + clearance
+            scale = abs(bound) or 1.0
+            yield sign * (check.values(joint_variables) - bound) / scale + clearance
 
 
 def _finite_ends(check: LimitCheck) -> Iterator[tuple[float, float]]:
@@ -362,7 +362,7 @@ def _finite_ends(check: LimitCheck) -> Iterator[tuple[float, float]]:
     yield from ((sign, end) for sign, end in zip((-1.0, 1.0), check.range, strict=True) if np.isfinite(end))
 
 
-def made_to_carry(joint: Joint, directions: int, *, moving_corridor: bool) -> Joint:
+def with_seeded_stiffness(joint: Joint, directions: int, *, moving_corridor: bool) -> Joint:
     """Return a copy of a joint whose actuator accepts a stiffness that carries derivatives.
 
     Args:
@@ -370,11 +370,13 @@ def made_to_carry(joint: Joint, directions: int, *, moving_corridor: bool) -> Jo
         directions: number of derivatives that the stiffness carries; each motor adds one for phi.
         moving_corridor: whether the ends of the attainable range carry derivatives as well.
     """
-    carrying = with_copied_actuator(joint)
-    implicit = ImplicitSolution(joint.actuator, carrying.actuator, directions + joint.actuator.motor_count)
+    seeded_joint = with_copied_actuator(joint)
+    implicit = ImplicitSolution(
+        joint.actuator, seeded_joint.actuator, directions + joint.actuator.motor_count
+    )
     solve = implicit.solve if moving_corridor else implicit.solve_within
-    object.__setattr__(carrying.actuator, "solve", solve)
-    return carrying
+    object.__setattr__(seeded_joint.actuator, "solve", solve)
+    return seeded_joint
 
 
 def _motor_rows(joint: Joint, variable: Any) -> list[Any]:
@@ -388,10 +390,10 @@ def run_costs(robot: Robot, trajectory: Trajectory, criteria: Mapping[int, Crite
     return {index: criterion.of_run(run, index) for index, criterion in criteria.items()}
 
 
-def asked_size(joint: Joint, load: Load, criterion: Criterion) -> float:
+def commanded_cost_scale(joint: Joint, load: Load, criterion: Criterion) -> float:
     """Return the scale of the cost of a load as commanded; NaN if it is infeasible."""
-    steps = load.at(load.steps)
-    return criterion.size(joint, drive(joint, steps.command), steps.time)
+    samples = load.at(load.steps)
+    return criterion.size(joint, drive(joint, samples.command), samples.time)
 
 
 ROUGH_GAP = 1e-5
@@ -421,11 +423,11 @@ def smoothed_minimum(problem: Problem, start: FloatArray, gap: float, costed: Se
     """
     if gap > WARM_GAP:
         return rough_minima(problem, [start], costed, gap)[0]
-    _smooth(costed, costed[0].smoothings[-1])
-    found = minimize(problem, start, gap)
-    if not found.found:  # steps became short; with new multipliers they are long again
-        found = minimize(problem, found.unknowns, WARM_GAP)
-    return found
+    _set_smoothing(costed, costed[0].smoothings[-1])
+    minimum = minimize(problem, start, gap)
+    if not minimum.found:  # steps became short; with new multipliers they are long again
+        minimum = minimize(problem, minimum.unknowns, WARM_GAP)
+    return minimum
 
 
 def rough_minima(
@@ -436,15 +438,15 @@ def rough_minima(
     See `smoothed_minimum`; only a cold search smooths the cost more than in the end.
     """
     smoothings = costed[0].smoothings
-    found: list[Minimum] = []
+    minima: list[Minimum] = []
     for smoothing in smoothings if gap > WARM_GAP else smoothings[-1:]:
-        _smooth(costed, smoothing)
-        last = ROUGH_GAP if smoothing == smoothings[-1] else WARM_GAP
-        found = minimize_all(problem, starts, gap, last)
-        starts, gap = [each.unknowns for each in found], WARM_GAP
-    return found
+        _set_smoothing(costed, smoothing)
+        last_gap = ROUGH_GAP if smoothing == smoothings[-1] else WARM_GAP
+        minima = minimize_all(problem, starts, gap, last_gap)
+        starts, gap = [each.unknowns for each in minima], WARM_GAP
+    return minima
 
 
-def _smooth(costed: Sequence[Costed], smoothing: float) -> None:
+def _set_smoothing(costed: Sequence[Costed], smoothing: float) -> None:
     for each in costed:
         each.scale = each.scale._replace(smoothing=smoothing)

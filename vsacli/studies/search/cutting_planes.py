@@ -30,29 +30,29 @@ from vsacli.studies.search.acceptance import (
 )
 from vsacli.studies.search.changed_motion import with_stiffness
 from vsacli.studies.search.fix_report import branch_path
-from vsacli.studies.search.fixed_text import changes_of_steps
+from vsacli.studies.search.fixed_text import step_transitions
 from vsacli.studies.search.loads import Instants, Load, TaskSamples, concatenate_task_samples
 from vsacli.studies.search.path_commands import PathCommands, Speeds
 from vsacli.trajectory.curves import RestToRest
 from vsacli.trajectory.curves.steps import PiecewiseProfile, profile_of_levels
 from vsacli.trajectory.trajectory import Trajectory
 
-FEW = 100
+FACTOR_SEARCH_SAMPLES = 100
 """Samples with which a search over slow-downs begins, and the most that a check at all samples adds."""
 
-FEWEST = 10
+OFFSET_SEARCH_SAMPLES = 10
 """Samples of the same kind for a search over constants or transition times."""
 
-SAME_RANGE = 1e-6
+RANGE_TOLERANCE = 1e-6
 """Relative difference up to which the ends of attainable ranges are equal but for rounding."""
 
-SECTIONS = 16
+REFINED_NUMBERS = 16
 """Number of integers that are tried at once between a refused and an accepted one."""
 
-SHARE = 0.01
+SCAN_STRIDE = 0.01
 """Relative stride of a scan."""
 
-LARGEST_RATIO = 100
+MAX_STIFFNESS_RATIO = 100
 """Largest ratio by which an offset may change the stiffness of a joint if nothing else bounds it."""
 
 OFFSET_DIGITS = 4
@@ -78,16 +78,16 @@ def first_accepted(accepts: Callable[[Sequence[int]], Iterable[bool]], numbers: 
         numbers: numbers to scan.
     """
     while numbers:
-        refused = numbers[0] - 1
+        last_refused = numbers[0] - 1
         for number, accepted in zip(numbers, accepts(numbers), strict=False):
             if accepted:
                 break
-            refused = number
+            last_refused = number
         else:
             return None
-        if number - refused == 1:
+        if number - last_refused == 1:
             return number
-        numbers = np.unique(np.linspace(refused + 1, number, SECTIONS).astype(np.intp)).tolist()
+        numbers = np.unique(np.linspace(last_refused + 1, number, REFINED_NUMBERS).astype(np.intp)).tolist()
     return None
 
 
@@ -101,16 +101,16 @@ def smallest_accepted(
         samples: number of samples.
         numbers: ascending numbers to scan, see `first_accepted`.
     """
-    few = evenly(samples, FEWEST)
+    few_indices = evenly(samples, OFFSET_SEARCH_SAMPLES)
 
     def accepts(tried: Sequence[int]) -> Iterator[bool]:
-        return (not refuse(number, few).any() for number in tried)
+        return (not refuse(number, few_indices).any() for number in tried)
 
     while (number := first_accepted(accepts, numbers)) is not None:
         (refused,) = np.nonzero(refuse(number, np.arange(samples)))
         if not refused.size:
             break
-        few = np.union1d(few, refused[evenly(len(refused), FEWEST)])
+        few_indices = np.union1d(few_indices, refused[evenly(len(refused), OFFSET_SEARCH_SAMPLES)])
     return number
 
 
@@ -119,9 +119,9 @@ def scanned_numbers(first: int, last: int, share: float, base: float = 0.0) -> l
     if first > last:
         return []
     start, stop = abs(base + first), abs(base + last)
-    steps = np.arange(math.ceil(abs(math.log(stop / start)) / math.log1p(share)))
-    sums = start * (1 + share) ** (steps if stop > start else -steps)
-    numbers = np.rint(np.abs(sums - abs(base))).astype(np.intp)
+    exponents = np.arange(math.ceil(abs(math.log(stop / start)) / math.log1p(share)))
+    scaled_numbers = start * (1 + share) ** (exponents if stop > start else -exponents)
+    numbers = np.rint(np.abs(scaled_numbers - abs(base))).astype(np.intp)
     return [int(number) for number in np.unique([first, *numbers, last])]
 
 
@@ -140,16 +140,16 @@ def smallest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
         ImpossibleError: no constant is accepted; the error has the reason.
     """
     low, high = _offset_bounds(acceptance, joint, load)
-    raised = _smallest_of_sign(acceptance, joint, load, 1, (low, high))
-    most = -low if raised is None else min(-low, raised)
-    lowered = _smallest_of_sign(acceptance, joint, load, -1, (-high, most))
+    raised = _smallest_offset_of_sign(acceptance, joint, load, 1, (low, high))
+    max_size = -low if raised is None else min(-low, raised)
+    lowered = _smallest_offset_of_sign(acceptance, joint, load, -1, (-high, max_size))
     offsets = [offset for offset in (raised, lowered) if offset is not None]
     if offsets:
         return min(offsets, key=abs)
-    nearest = min(max(low, 0.0), high)
-    reason = acceptance.reason(joint, load.changed(nearest))
-    with_it = f"with {nearest:+.6g}" if nearest else "as it is"
-    raise ImpossibleError(f"none keeps every limit of {joint.name}; {with_it}, {reason}")
+    nearest_offset = min(max(low, 0.0), high)
+    reason = acceptance.reason(joint, load.changed(nearest_offset))
+    offset_clause = f"with {nearest_offset:+.6g}" if nearest_offset else "as it is"
+    raise ImpossibleError(f"none keeps every limit of {joint.name}; {offset_clause}, {reason}")
 
 
 def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
@@ -158,36 +158,38 @@ def lowest_offset(acceptance: Acceptance, joint: Joint, load: Load) -> float:
     Raises:
         ImpossibleError: no stiffness fixes the joint.
     """
-    asked = load.command.commanded["stiffness"]
-    rise = checked_range(acceptance, joint, load).low - asked
-    hardest = int(rise.argmax())
-    return float(rise[hardest] + ROUNDING * (asked[hardest] + rise[hardest]))
+    commanded_stiffness = load.command.commanded["stiffness"]
+    min_offset = checked_range(acceptance, joint, load).low - commanded_stiffness
+    index = int(min_offset.argmax())
+    return float(min_offset[index] + ROUNDING * (commanded_stiffness[index] + min_offset[index]))
 
 
 def _offset_bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[float, float]:
     """Return the offsets that attainable range, stiffness limits and deflection limits admit."""
     admissible = checked_range(acceptance, joint, load)
-    asked = load.command.commanded["stiffness"]
-    rise, fall = admissible.low - asked, admissible.high - asked
-    first, last = int(rise.argmax()), int(fall.argmin())
-    if rise[first] > fall[last]:
+    commanded_stiffness = load.command.commanded["stiffness"]
+    min_offset, max_offset = admissible.low - commanded_stiffness, admissible.high - commanded_stiffness
+    rise_index, fall_index = int(min_offset.argmax()), int(max_offset.argmin())
+    if min_offset[rise_index] > max_offset[fall_index]:
         unit = units.STIFFNESS.unit(joint.type)
         raise ImpossibleError(
-            f"none takes {joint.name} from {asked[first]:.6g} to at least "
-            f"{significant(admissible.low[first], toward=math.inf)} {unit} at t = {load.time[first]:.3f} s "
-            f"and from {asked[last]:.6g} to at most "
-            f"{significant(admissible.high[last], toward=-math.inf)} {unit} at t = {load.time[last]:.3f} s"
+            f"none takes {joint.name} from {commanded_stiffness[rise_index]:.6g} to at least "
+            f"{significant(admissible.low[rise_index], toward=math.inf)} {unit} at t = "
+            f"{load.time[rise_index]:.3f} s "
+            f"and from {commanded_stiffness[fall_index]:.6g} to at most "
+            f"{significant(admissible.high[fall_index], toward=-math.inf)} {unit} at t = "
+            f"{load.time[fall_index]:.3f} s"
         )
-    return float(rise[first]), float(fall[last])
+    return float(min_offset[rise_index]), float(max_offset[fall_index])
 
 
-def _smallest_of_sign(
+def _smallest_offset_of_sign(
     acceptance: Acceptance, joint: Joint, load: Load, sign: int, bounds: tuple[float, float]
 ) -> float | None:
     """Return the accepted constant of a sign that is closest to zero, with bounds on its size; or None."""
-    softest = float(load.command.commanded["stiffness"].min())
-    exponent = math.floor(math.log10(softest)) - OFFSET_DIGITS
-    unit, ratio = 10.0**exponent, LARGEST_RATIO - 1 if sign > 0 else 1 - 1 / LARGEST_RATIO
+    min_stiffness = float(load.command.commanded["stiffness"].min())
+    exponent = math.floor(math.log10(min_stiffness)) - OFFSET_DIGITS
+    unit, ratio = 10.0**exponent, MAX_STIFFNESS_RATIO - 1 if sign > 0 else 1 - 1 / MAX_STIFFNESS_RATIO
 
     def offset(number: int) -> float:
         return float(f"{sign * number}e{exponent}")  # nearest to the decimal fraction
@@ -196,9 +198,9 @@ def _smallest_of_sign(
         return acceptance.refused_steps(joint, load.at(steps).changed(offset(number)))
 
     first = math.ceil(max(bounds[0], 0.0) / unit - GRID_ROUNDING)
-    last = math.floor(min(bounds[1], ratio * softest) / unit + GRID_ROUNDING)
+    last = math.floor(min(bounds[1], ratio * min_stiffness) / unit + GRID_ROUNDING)
     number = smallest_accepted(
-        refuse, len(load.time), scanned_numbers(first, last, SHARE, sign * softest / unit)
+        refuse, len(load.time), scanned_numbers(first, last, SCAN_STRIDE, sign * min_stiffness / unit)
     )
     return None if number is None else offset(number)
 
@@ -206,7 +208,7 @@ def _smallest_of_sign(
 def transitions_between_levels(trajectory: Trajectory) -> list[RestToRest]:
     """Return the transitions between levels of the stiffness; none if it is another curve."""
     stiffness = trajectory.commanded[STIFFNESS.key]
-    return (changes_of_steps(stiffness) or []) if isinstance(stiffness, PiecewiseProfile) else []
+    return (step_transitions(stiffness) or []) if isinstance(stiffness, PiecewiseProfile) else []
 
 
 def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple[float, float, Trajectory]:
@@ -222,26 +224,28 @@ def smallest_transition(acceptance: Acceptance, trajectory: Trajectory) -> tuple
         ImpossibleError: no transition that ends before the next one begins is accepted.
     """
     changes = transitions_between_levels(trajectory)
-    limits = [*(change.span[0] for change in changes[1:]), trajectory.duration]
-    shortest = min(change.span[1] - change.span[0] for change in changes)
-    longest = min(limit - change.span[0] for change, limit in zip(changes, limits, strict=True))
-    exponent = math.floor(math.log10(shortest)) - TRANSITION_DIGITS
-    first, last = (math.floor(end / 10.0**exponent * (1 + ROUNDING)) for end in (shortest, longest))
+    next_starts = [*(change.span[0] for change in changes[1:]), trajectory.duration]
+    min_length = min(change.span[1] - change.span[0] for change in changes)
+    max_length = min(limit - change.span[0] for change, limit in zip(changes, next_starts, strict=True))
+    exponent = math.floor(math.log10(min_length)) - TRANSITION_DIGITS
+    first, last = (math.floor(end / 10.0**exponent * (1 + ROUNDING)) for end in (min_length, max_length))
     elapsed = trajectory.times.block(0, trajectory.samples) - trajectory.start
     instants = np.union1d(elapsed, acceptance.between)
 
     def length(number: int) -> float:
-        return min(float(f"{number}e{exponent}"), longest)
+        return min(float(f"{number}e{exponent}"), max_length)
 
     def refuse(number: int, places: IndexArray) -> BoolArray:
-        longer = _with_transitions(trajectory, changes, limits, length(number))
-        refused: BoolArray = np.any(acceptance.refused(TaskSamples.between(longer, instants[places])), axis=1)
+        longer_transitions = _with_transitions(trajectory, changes, next_starts, length(number))
+        refused: BoolArray = np.any(
+            acceptance.refused(TaskSamples.between(longer_transitions, instants[places])), axis=1
+        )
         return refused
 
-    number = smallest_accepted(refuse, len(instants), scanned_numbers(first + 1, last, SHARE))
+    number = smallest_accepted(refuse, len(instants), scanned_numbers(first + 1, last, SCAN_STRIDE))
     if number is None:
-        raise ImpossibleError(f"none of up to {longest:.4g} s does; then the next change begins")
-    return shortest, length(number), _with_transitions(trajectory, changes, limits, length(number))
+        raise ImpossibleError(f"none of up to {max_length:.4g} s does; then the next change begins")
+    return min_length, length(number), _with_transitions(trajectory, changes, next_starts, length(number))
 
 
 def _with_transitions(
@@ -301,8 +305,8 @@ class FewSamples:
 
     def with_further(self, samples: TaskSamples) -> FewSamples:
         """Return these samples with further ones."""
-        together = concatenate_task_samples([self.samples, samples])
-        return FewSamples(self._acceptance, together, self._impossible)
+        all_samples = concatenate_task_samples([self.samples, samples])
+        return FewSamples(self._acceptance, all_samples, self._impossible)
 
     @cached_property
     def branches(self) -> list[dict[str, Joint]]:
@@ -313,7 +317,7 @@ class FewSamples:
             branch = joint.actuator.opposite_branch
             if branch is not None:
                 exchanged = robot.replace(branch_path(robot, index), branch).joints[index]
-                if not _mirror_images(joint.actuator, exchanged.actuator, load.command):
+                if not _are_mirror_images(joint.actuator, exchanged.actuator, load.command):
                     choices[index][branch] = exchanged
         return choices
 
@@ -322,28 +326,28 @@ class FewSamples:
         time, count = self.samples.motion.time, len(self.samples.motion.time)
         factor = np.repeat(factors, count)
         instants = Instants(np.tile(time, len(factors)), factor)
-        commands = self._path.at(Speeds.even(factor), np.tile(np.arange(count), len(factors)))
+        commands = self._path.at(Speeds.uniform(factor), np.tile(np.arange(count), len(factors)))
         return [Load(instants.time, command, instants) for command in commands]
 
     def _compute_required(self, index: int, branch: str, factors: tuple[float, ...]) -> Required:
         """Return the stiffness that a joint on a branch requires."""
         joint = self.branches[index][branch] if branch else self._acceptance.robot.joints[index]
-        load, shape = self._loads(factors)[index], (len(factors), -1)
+        load, factor_shape = self._loads(factors)[index], (len(factors), -1)
         asked = load.command.commanded.get(STIFFNESS.key, np.zeros_like(load.time))
-        refused = np.any(self._acceptance.refused_steps(joint, load).reshape(shape), axis=1)
+        refused = np.any(self._acceptance.refused_steps(joint, load).reshape(factor_shape), axis=1)
         admissible = Range(*np.full((2, len(asked)), np.nan))
         if refused.any() and STIFFNESS.key in joint.actuator.commanded:
             admissible = admissible_stiffness(joint, load.command, self._acceptance.min_margin)
             admissible.low[self._acceptance.beyond_path(joint, load)] = np.nan
-        ranges = Range(*(end.reshape(shape) for end in admissible))
-        return Required(joint, load, asked.reshape(shape), refused, ranges)
+        ranges = Range(*(end.reshape(factor_shape) for end in admissible))
+        return Required(joint, load, asked.reshape(factor_shape), refused, ranges)
 
-    def constant(self, index: int, branch: str, factors: tuple[float, ...], place: int) -> float:
+    def constant(self, index: int, branch: str, factors: tuple[float, ...], factor_index: int) -> float:
         """Return the smallest constant that fixes a joint at one of the factors; infinite if none does."""
-        key, count = (index, branch, factors[place]), len(self.samples.factor)
+        key, count = (index, branch, factors[factor_index]), len(self.samples.factor)
         if key not in self._constants and key not in self._impossible:
             required = self.required(index, branch, factors)
-            load = required.load.at(slice(place * count, (place + 1) * count))
+            load = required.load.at(slice(factor_index * count, (factor_index + 1) * count))
             try:
                 self._constants[key] = smallest_offset(self._acceptance, required.joint, load)
             except ImpossibleError:
@@ -351,11 +355,14 @@ class FewSamples:
         return self._constants.get(key, math.inf)
 
 
-def _mirror_images(one: Actuator, other: Actuator, command: Command) -> bool:
+def _are_mirror_images(one: Actuator, other: Actuator, command: Command) -> bool:
     """Return whether the branches of an actuator are mirror images, as those of equal springs are."""
     if len(set(one.motors)) > 1 or len(set(one.max_deflections)) > 1:
         return False
-    asked = command.tau_e, command.commanded["stiffness"], command.q
-    first, second = one.solve(*asked), other.solve(*asked)
-    pairs = (first.lower, second.lower), (first.upper, second.upper)
-    return all(np.allclose(here, there, rtol=SAME_RANGE, equal_nan=True) for here, there in pairs)
+    demand = command.tau_e, command.commanded["stiffness"], command.q
+    solution, other_solution = one.solve(*demand), other.solve(*demand)
+    range_ends = (solution.lower, other_solution.lower), (solution.upper, other_solution.upper)
+    return all(
+        np.allclose(value, other_value, rtol=RANGE_TOLERANCE, equal_nan=True)
+        for value, other_value in range_ends
+    )

@@ -68,39 +68,39 @@ def fixes(
     if robot.limited_tools:
         from vsacli.studies.search.tool_fixes import with_stiff_tools
 
-        of_joints = fixes(
+        joint_fixes = fixes(
             robot.without_tool_limits(robot.limited_tools), trajectory, min_margin, progress=progress
         )
-        return with_stiff_tools(robot, trajectory, of_joints)
+        return with_stiff_tools(robot, trajectory, joint_fixes)
     task = Task(Acceptance(robot, min_margin, RecordedLimits(trajectory)), trajectory)
     damped = damped_joints(robot, trajectory)
     if damped or not task.refused_loads:
-        as_it_is = verify(task.acceptance, PreparedRun(robot, trajectory))
-        if as_it_is.refused is None:
+        verification = verify(task.acceptance, PreparedRun(robot, trajectory))
+        if verification.refused is None:
             return Fixes(min_margin)
         if damped:
             refuse_damped_transmissions(robot, trajectory, "fixes")
-        task = replace(task, acceptance=replace(task.acceptance, between=as_it_is.refused))
+        task = replace(task, acceptance=replace(task.acceptance, between=verification.refused))
     causes = _causes(task)
     with progress(len(SEARCHES)) as bar:
         searches = Countdown(bar.update, len(SEARCHES))
-        tried = _search_fixes(task, causes, searches)
-        if not tried.chosen and any(cause.fixable for cause in causes.values()):
+        candidates = _search_fixes(task, causes, searches)
+        if not candidates.chosen and any(cause.fixable for cause in causes.values()):
             for index, cause in causes.items():
-                fixable = cause.fixable and bool(_fixes_alone(task, index, SEARCHES))
+                fixable = cause.fixable and bool(_fixes_of_joint(task, index, SEARCHES))
                 causes[index] = replace(cause, fixable=fixable)
-            tried = _search_fixes(task, causes, searches)
+            candidates = _search_fixes(task, causes, searches)
         searches.finish()
     return Fixes(
         min_margin,
-        **{name: tried.change(name) for name in ALONE},
+        **{name: candidates.change(name) for name in ALONE},
         causes=tuple(causes.values()),
-        fixes=tuple(in_order(tried.chosen)),
+        fixes=tuple(in_order(candidates.chosen)),
     )
 
 
 @dataclass
-class _Tried:
+class _CandidateFixes:
     """Results of searches, and which of their fixes runs have confirmed or refused.
 
     Attributes:
@@ -119,7 +119,7 @@ class _Tried:
         chosen: list[Fix] = []
         results = (result for result in self.results.values() if isinstance(result, list))
         for fix in sorted(chain(*results), key=lambda fix: (len(fix.kinds), fix.size)):
-            if fix not in self.refused and not any(_superfluous(fix, simpler) for simpler in chosen):
+            if fix not in self.refused and not any(_is_superfluous(fix, simpler) for simpler in chosen):
                 chosen.append(next((known for known in self.confirmed if known == fix), fix))
         return chosen
 
@@ -129,12 +129,12 @@ class _Tried:
             result = self.results.get(name)
             if isinstance(result, NotPossible):
                 continue
-            kept = [fix for fix in result or () if fix not in self.refused]
-            if result is None or len(kept) < len(result):
+            remaining = [fix for fix in result or () if fix not in self.refused]
+            if result is None or len(remaining) < len(result):
                 try:
-                    self.results[name] = kept + list(SEARCHES[name](task))
+                    self.results[name] = remaining + list(SEARCHES[name](task))
                 except ImpossibleError as error:
-                    self.results[name] = kept or NotPossible(error.reasons)
+                    self.results[name] = remaining or NotPossible(error.reasons)
                 progress.count()
 
     def confirm(self, acceptance: Acceptance) -> FloatArray | None:
@@ -154,64 +154,70 @@ class _Tried:
         return NotPossible((NOT_CONFIRMED,)) if result[0] in self.refused else getattr(result[0], name)
 
 
-def _search_fixes(task: Task, causes: Mapping[int, Finding], searches: Countdown) -> _Tried:
+def _search_fixes(task: Task, causes: Mapping[int, Finding], searches: Countdown) -> _CandidateFixes:
     """Search for fixes of all joints that can be fixed."""
     hopeless = frozenset(index for index, cause in causes.items() if not cause.fixable)
     if hopeless == causes.keys():
         reasons = NotPossible(tuple(map(str, causes.values())))
-        return _Tried({name: reasons for name in ALONE if name != "transition"})
-    asked = replace(task, acceptance=replace(task.acceptance, ignored=hopeless))
-    tried = _search_and_confirm(asked, SEARCHES, searches)
+        return _CandidateFixes({name: reasons for name in ALONE if name != "transition"})
+    fixable_task = replace(task, acceptance=replace(task.acceptance, ignored=hopeless))
+    candidates = _search_and_confirm(fixable_task, SEARCHES, searches)
     # new samples between the recorded ones may exceed a position limit that these keep, at any speed
-    lost = not tried.chosen or (_slows_down(tried.refused) and not _slows_down(tried.chosen))
-    if lost and isinstance(task.trajectory.times, RecordedTimes):
-        at_samples = _search_and_confirm(replace(asked, keeps_rate=False), SEARCHES, searches)
-        return at_samples if at_samples.chosen else tried
-    return tried
+    lacks_fix = not candidates.chosen or (
+        _slows_down(candidates.refused) and not _slows_down(candidates.chosen)
+    )
+    if lacks_fix and isinstance(task.trajectory.times, RecordedTimes):
+        at_samples = _search_and_confirm(replace(fixable_task, keeps_rate=False), SEARCHES, searches)
+        return at_samples if at_samples.chosen else candidates
+    return candidates
 
 
 def _slows_down(fixes: Iterable[Fix]) -> bool:
     return any(fix.longer > 0 for fix in fixes)
 
 
-def _search_and_confirm(task: Task, names: Iterable[str], progress: Countdown) -> _Tried:
+def _search_and_confirm(task: Task, names: Iterable[str], progress: Countdown) -> _CandidateFixes:
     """Run searches; repeat those whose fix a run refuses, with the refused instants as samples."""
-    tried, stepped = _Tried(), bool(transitions_between_levels(task.trajectory))
-    names = [name for name in names if stepped or name != "transition"]
+    candidates, has_transitions = _CandidateFixes(), bool(transitions_between_levels(task.trajectory))
+    names = [name for name in names if has_transitions or name != "transition"]
 
-    def attempt(rule: Acceptance) -> tuple[_Tried, FloatArray | None]:
-        tried.search(replace(task, acceptance=rule), names, progress)
-        return tried, tried.confirm(task.acceptance)
+    def attempt(rule: Acceptance) -> tuple[_CandidateFixes, FloatArray | None]:
+        candidates.search(replace(task, acceptance=rule), names, progress)
+        return candidates, candidates.confirm(task.acceptance)
 
     task.acceptance.confirmed(attempt)
-    return tried
+    return candidates
 
 
-def _constants(task: Task) -> Iterator[Fix]:
+def _constant_fixes(task: Task) -> Iterator[Fix]:
     search = CombinedSearch(task)
     combinations = search.smallest(), search.fastest()
     return (task.with_constants(found) for found in combinations if found is not None)
 
 
 def _profile_fixes(task: Task) -> Iterator[Fix]:
-    least = CombinedSearch(task, least_change)
-    profiles = list(_with_profiles(task, least.smallest(), least.fastest()))
-    yield from profiles or _with_profiles(task, CombinedSearch(task).smallest())
+    search = CombinedSearch(task, least_change)
+    profiles = list(_fixes_with_profiles(task, search.smallest(), search.fastest()))
+    yield from profiles or _fixes_with_profiles(task, CombinedSearch(task).smallest())
 
 
-def _other_branches(task: Task) -> Iterator[Fix]:
-    exchanged = CombinedSearch(task, branches=True)
-    found = exchanged.smallest() if exchanged.exchangeable else None
-    if found is not None and found.branches:
-        yield task.with_constants(found)
+def _branch_fixes(task: Task) -> Iterator[Fix]:
+    search = CombinedSearch(task, branches=True)
+    combination = search.smallest() if search.exchangeable else None
+    if combination is not None and combination.branches:
+        yield task.with_constants(combination)
 
 
-def _with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Fix]:
+def _fixes_with_profiles(task: Task, *combinations: Combination | None) -> Iterator[Fix]:
     """Yield fixes with profiles at the slow-downs of these combinations, where profiles are found."""
-    factors = {found.factor: found for found in combinations if found is not None and found.factor > 1}
-    for found in factors.values():
+    combinations_by_factor = {
+        combination.factor: combination
+        for combination in combinations
+        if combination is not None and combination.factor > 1
+    }
+    for combination in combinations_by_factor.values():
         with suppress(ImpossibleError):
-            yield task.with_profiles(found)
+            yield task.with_profiles(combination)
 
 
 _Search = Callable[[Task], Iterable[Fix]]
@@ -225,89 +231,96 @@ SEARCHES: Mapping[str, _Search] = {
     "stiffness_offset": lambda task: [task.with_constants(task.constants())],
     "stiffness_profile": lambda task: [task.with_profiles(AS_IT_IS)],
     "transition": lambda task: [task.with_transition()],
-    "constants": _constants,
+    "constants": _constant_fixes,
     "profiles": _profile_fixes,
-    "branches": _other_branches,
+    "branches": _branch_fixes,
 }
 """Searches by name; those that are not `ALONE` may combine several kinds of change."""
 
 
-def _superfluous(fix: Fix, beside: Fix) -> bool:
+def _is_superfluous(fix: Fix, simpler: Fix) -> bool:
     """Return whether another fix with the same or fewer kinds of change makes this one superfluous."""
-    if beside.kinds < fix.kinds:
-        return beside.size <= SIMILAR * fix.size
-    faster = fix.longer < FASTER_SHARE * beside.longer
-    return beside.kinds == fix.kinds and beside.size <= fix.size and not faster
+    if simpler.kinds < fix.kinds:
+        return simpler.size <= SIMILAR * fix.size
+    is_faster = fix.longer < FASTER_SHARE * simpler.longer
+    return simpler.kinds == fix.kinds and simpler.size <= fix.size and not is_faster
 
 
 def _causes(task: Task) -> dict[int, Finding]:
     """Return the worst violation of each refused joint, with advice, by index."""
-    resting = task.acceptance.watched_at_rest(task.trajectory).loads(task.acceptance.robot)
+    rest_loads = task.acceptance.watched_at_rest(task.trajectory).loads(task.acceptance.robot)
     loads = task.refused_loads.items()
-    return {index: _cause(task, index, load, resting[index]) for index, load in loads}
+    return {index: _cause(task, index, load, rest_loads[index]) for index, load in loads}
 
 
-def _fixes_alone(task: Task, index: int, names: Iterable[str]) -> list[Fix]:
+def _fixes_of_joint(task: Task, index: int, names: Iterable[str]) -> list[Fix]:
     """Return fixes of one joint by some searches, with the other joints ignored."""
-    others = frozenset(range(len(task.acceptance.robot.joints))) - {index}
-    alone = replace(task, acceptance=replace(task.acceptance, ignored=others))
-    return _search_and_confirm(alone, names, Countdown(lambda _: None, 0)).chosen
+    other_joints = frozenset(range(len(task.acceptance.robot.joints))) - {index}
+    joint_task = replace(task, acceptance=replace(task.acceptance, ignored=other_joints))
+    return _search_and_confirm(joint_task, names, Countdown(lambda _: None, 0)).chosen
 
 
-def _cause(task: Task, index: int, load: Load, resting: Load) -> Finding:
+def _cause(task: Task, index: int, load: Load, rest_load: Load) -> Finding:
     """Return the worst violation at rest, or else in motion, with advice; fixable unless known not to be."""
     acceptance, joint = task.acceptance, task.acceptance.robot.joints[index]
     loads = load.at(load.steps), load  # violations at samples come first
-    beyond, moving = (
+    position_violation, worst_violation = (
         next(filter(None, (find(joint, part) for part in loads)), None)
         for find in (acceptance.beyond_position, acceptance.worst)
     )
-    if beyond is not None:
+    if position_violation is not None:
         advice = "timing and stiffness have no effect on that: change the path or the limit"
-        return replace(beyond, advice=advice, fixable=False)
-    at_rest = acceptance.worst(joint, resting)
-    if at_rest is None:
-        first = float(load.time[acceptance.refused_steps(joint, load).argmax()])
-        return moving or Finding(Flag.NOT_FINITE.label, first, math.nan, math.nan, "", joint=joint.name)
-    at_rest = replace(at_rest, at_rest=True)
+        return replace(position_violation, advice=advice, fixable=False)
+    rest_violation = acceptance.worst(joint, rest_load)
+    if rest_violation is None:
+        first_time = float(load.time[acceptance.refused_steps(joint, load).argmax()])
+        return worst_violation or Finding(
+            Flag.NOT_FINITE.label, first_time, math.nan, math.nan, "", joint=joint.name
+        )
+    rest_violation = replace(rest_violation, at_rest=True)
     if "stiffness" not in joint.actuator.commanded:
         advice = "no slower motion helps, and it has no stiffness to choose"
     else:
         try:
-            smallest_offset(acceptance, joint, resting)
-            return replace(at_rest, advice=_constant_fix_text(task, index, load))
+            smallest_offset(acceptance, joint, rest_load)
+            return replace(rest_violation, advice=_constant_fix_text(task, index, load))
         except ImpossibleError:
-            way = _in_the_way(acceptance, joint, resting)
-            advice = f"no slower motion and no constant stiffness helps{way}"
-    return replace(at_rest, advice=advice, fixable=bool(_fixes_alone(task, index, SEARCHES)))
+            limit_clause = _limit_clause(acceptance, joint, rest_load)
+            advice = f"no slower motion and no constant stiffness helps{limit_clause}"
+    return replace(rest_violation, advice=advice, fixable=bool(_fixes_of_joint(task, index, SEARCHES)))
 
 
 def _constant_fix_text(task: Task, index: int, load: Load) -> str:
     """Return the constant stiffness that fixes a joint, as a run confirms, or the constant addition to it."""
-    fixes_alone = _fixes_alone(task, index, ["stiffness_offset"])
+    fixes_alone = _fixes_of_joint(task, index, ["stiffness_offset"])
     if not (fixes_alone and fixes_alone[0].stiffness_offset):
         return "neither a slower motion nor another constant stiffness helps alone"
-    joint, asked = task.acceptance.robot.joints[index], load.command.commanded["stiffness"]
+    joint, commanded_stiffness = task.acceptance.robot.joints[index], load.command.commanded["stiffness"]
     offset = fixes_alone[0].stiffness_offset.by_joint[joint.name]
-    if asked.min() == asked.max():
-        does = f"a stiffness of {'at least' if offset > 0 else 'at most'} {asked[0] + offset:.10g}"
+    if commanded_stiffness.min() == commanded_stiffness.max():
+        remedy = (
+            f"a stiffness of {'at least' if offset > 0 else 'at most'} {commanded_stiffness[0] + offset:.10g}"
+        )
     else:
-        does = f"{'an increase' if offset > 0 else 'a decrease'} of {abs(offset):.10g}"
-    return f"no slower motion helps, {does} {STIFFNESS.unit(joint.type)} does"
+        remedy = f"{'an increase' if offset > 0 else 'a decrease'} of {abs(offset):.10g}"
+    return f"no slower motion helps, {remedy} {STIFFNESS.unit(joint.type)} does"
 
 
-def _in_the_way(acceptance: Acceptance, joint: Joint, resting: Load) -> str:
+def _limit_clause(acceptance: Acceptance, joint: Joint, rest_load: Load) -> str:
     """Return, as a clause, the limit that the softest admissible constant exceeds; "" if there is none."""
     try:
-        offset = lowest_offset(acceptance, joint, resting)
+        offset = lowest_offset(acceptance, joint, rest_load)
     except ImpossibleError:
         return ""
-    worst = acceptance.worst(joint, resting.changed(offset))
-    if worst is None:
+    violation = acceptance.worst(joint, rest_load.changed(offset))
+    if violation is None:
         return ""
-    asked, unit = resting.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
-    if asked.min() == asked.max():
-        least = significant(asked[0] + offset, toward=math.inf)
-        return f", since with {least} {unit}, the least it may have, {worst.text}"
-    moved, by = ("raised", "as little as") if offset > 0 else ("lowered", "as far as")
-    return f", since {moved} by {abs(offset):.4g} {unit} throughout, {by} its minimum permits, {worst.text}"
+    commanded_stiffness, unit = rest_load.command.commanded["stiffness"], STIFFNESS.unit(joint.type)
+    if commanded_stiffness.min() == commanded_stiffness.max():
+        min_stiffness = significant(commanded_stiffness[0] + offset, toward=math.inf)
+        return f", since with {min_stiffness} {unit}, the least it may have, {violation.text}"
+    verb, extent = ("raised", "as little as") if offset > 0 else ("lowered", "as far as")
+    return (
+        f", since {verb} by {abs(offset):.4g} {unit} throughout, {extent} its minimum permits, "
+        f"{violation.text}"
+    )

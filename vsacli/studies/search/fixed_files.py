@@ -74,16 +74,16 @@ def write_fixed(fix: Fix, path: str | Path, outputs: Outputs) -> None:
     """
     document, table, robot = fixed_paths(path)
     trajectory, names = fix.declared, fix.robot.joint_names
-    declared = _signal_declarations(trajectory, table.name, fix.robot.tool_names)
-    recorded = [signal for signal, keys in declared.items() if keys["type"] == "csv"]
-    beside = None
-    if recorded:
-        beside = TableFile(table.name, lambda file: _write_table(trajectory, recorded, names, file))
-    text = edited_text(fix, beside, document.parent) if recorded in ([], [STIFFNESS]) else None
-    lines = _document(trajectory, fix.factor, declared) if text is None else [text]
+    signal_keys = _signal_declarations(trajectory, table.name, fix.robot.tool_names)
+    table_signals = [signal for signal, keys in signal_keys.items() if keys["type"] == "csv"]
+    table_file = None
+    if table_signals:
+        table_file = TableFile(table.name, lambda file: _write_table(trajectory, table_signals, names, file))
+    text = edited_text(fix, table_file, document.parent) if table_signals in ([], [STIFFNESS]) else None
+    lines = _document_lines(trajectory, fix.factor, signal_keys) if text is None else [text]
     contents: dict[Path, Callable[[TextIO], object]] = {document: lambda file: file.writelines(lines)}
-    if beside is not None:
-        contents[table] = beside.write
+    if table_file is not None:
+        contents[table] = table_file.write
     if fix.branch is not None:
         contents[robot] = lambda file: file.write(robot_text(fix, robot.parent))
     for target, write in contents.items():
@@ -96,20 +96,20 @@ def _signal_declarations(
 ) -> dict[Signal, dict[str, Any]]:
     """Return the keys and values that declare each signal; signals without a formula refer to the table."""
     profiles: dict[Signal, Profile | None] = {POSITION: trajectory.position}
-    chosen = [key for key in trajectory.commanded if trajectory.chosen(key).any()]
-    profiles |= {COMMANDED[key]: trajectory.commanded[key] for key in chosen}
+    commanded_keys = [key for key in trajectory.commanded if trajectory.chosen(key).any()]
+    profiles |= {COMMANDED[key]: trajectory.commanded[key] for key in commanded_keys}
     wrenches = {} if trajectory.wrench is None else _wrenches_on(tools, trajectory.wrench)
     profiles |= {signal: profile for signal, (profile, _) in wrenches.items()}
     formulas = {signal: formula(profile) for signal, profile in profiles.items()}
     if None not in formulas.values() and not isinstance(trajectory.times, UniformTimes):
         formulas[POSITION] = None  # the table has the times
-    declared = {
+    signal_keys = {
         signal: {"type": "csv", "file": table, **_fit_options(profiles[signal])} if keys is None else keys
         for signal, keys in formulas.items()
     }
     for signal, (_, frame) in wrenches.items():
-        declared[signal]["frame"] = frame
-    return declared
+        signal_keys[signal]["frame"] = frame
+    return signal_keys
 
 
 def _wrenches_on(tools: Sequence[str], wrench: WrenchProfile) -> dict[Signal, tuple[Profile | None, str]]:
@@ -119,9 +119,11 @@ def _wrenches_on(tools: Sequence[str], wrench: WrenchProfile) -> dict[Signal, tu
     """
     if isinstance(wrench.frame, str):
         return {signal: (profile, wrench.frame) for signal, profile in wrench.profiles.items()}
-    by_place = {signal.first: profile for signal, profile in wrench.profiles.items() if signal.tool}
+    profile_by_column = {signal.first: profile for signal, profile in wrench.profiles.items() if signal.tool}
     frames = zip(map(wrench_on, tools, range(len(tools))), wrench.frame, strict=True)
-    return {signal: (by_place.get(signal.first), frame) for signal, frame in frames if frame is not None}
+    return {
+        signal: (profile_by_column.get(signal.first), frame) for signal, frame in frames if frame is not None
+    }
 
 
 def _fit_options(profile: Profile | None) -> dict[str, Any]:
@@ -129,14 +131,14 @@ def _fit_options(profile: Profile | None) -> dict[str, Any]:
     estimate = None if profile is None else profile.estimate
     if estimate is None:
         return {"fit": INTERPOLATE}
-    chosen = estimate.choice
-    noise = None if chosen.noise is None else list(chosen.noise)
-    said = {"fit": chosen.method, "noise": noise, "bandwidth": chosen.bandwidth}
-    return {key: value for key, value in said.items() if value is not None}
+    fit_choice = estimate.choice
+    noise = None if fit_choice.noise is None else list(fit_choice.noise)
+    options = {"fit": fit_choice.method, "noise": noise, "bandwidth": fit_choice.bandwidth}
+    return {key: value for key, value in options.items() if value is not None}
 
 
-def _document(
-    trajectory: Trajectory, factor: float, declared: Mapping[Signal, dict[str, Any]]
+def _document_lines(
+    trajectory: Trajectory, factor: float, signal_keys: Mapping[Signal, dict[str, Any]]
 ) -> Iterator[str]:
     """Yield the lines of the trajectory file."""
     yield f"format: {file_formats.TRAJECTORY}\n"
@@ -144,13 +146,13 @@ def _document(
     if factor != 1:
         yield f"slow_down: {factor!r}\n"
     if isinstance(trajectory.times, UniformTimes) and not any(
-        keys["type"] == "csv" for keys in declared.values()
+        keys["type"] == "csv" for keys in signal_keys.values()
     ):
         yield f"duration: {trajectory.times.duration!r}\nrate: {trajectory.times.rate!r}\n"
     if isinstance(trajectory.times, ResampledTimes) and trajectory.estimates:
         yield f"rate: {trajectory.times.rate!r}\n"
-    for signal, keys in declared.items():
-        if signal.tool and signal == next(each for each in declared if each.tool):
+    for signal, keys in signal_keys.items():
+        if signal.tool and signal == next(each for each in signal_keys if each.tool):
             yield f"{WRENCHES}:\n"
         indent = "  " if signal.tool else ""
         yield f"{indent}{signal.tool or signal.key}:\n"
@@ -161,7 +163,7 @@ def _write_table(
     trajectory: Trajectory, recorded: Sequence[Signal], joint_names: Sequence[str], stream: TextIO
 ) -> None:
     """Write fitted recordings as they were recorded, and other signals with derivatives at the samples."""
-    raw = {
+    recorded_rows = {
         (variable, signal.first): each.record.columns[name]
         for signal, each in trajectory.estimates.items()
         for name, variable in zip(signal.names, signal.variables, strict=True)
@@ -169,31 +171,37 @@ def _write_table(
     }
     columns = [
         _TableColumns(
-            signal, variable, _headers(signal, name, joint_names), raw.get((variable, signal.first))
+            signal,
+            variable,
+            _column_headers(signal, name, joint_names),
+            recorded_rows.get((variable, signal.first)),
         )
         for signal in recorded
         for name, variable in zip(signal.names, signal.variables, strict=True)
-        if (signal.variables[0], signal.first) not in raw or (variable, signal.first) in raw
+        if (signal.variables[0], signal.first) not in recorded_rows
+        or (variable, signal.first) in recorded_rows
     ]
-    chosen = {key: trajectory.chosen(key) for key in trajectory.commanded}
-    masks = [chosen.get(each.signal.key, ...) for each in columns]
+    component_masks = {key: trajectory.chosen(key) for key in trajectory.commanded}
+    masks = [component_masks.get(each.signal.key, ...) for each in columns]
     headers = [np.array(each.headers)[mask] for each, mask in zip(columns, masks, strict=True)]
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(["time", *np.concatenate(headers).tolist()])
-    computing = any(each.raw is None for each in columns)
-    stamps, samples = _stamps(trajectory), usual_block(len(joint_names))
-    for start in range(0, len(stamps), samples):
-        part = slice(start, start + samples)
-        computed = trajectory.block(start, start + samples).variables() if computing else {}
-        rows = (
-            computed[each.variable][:, each.signal.columns] if each.raw is None else each.raw[:, part].T
+    needs_samples = any(each.raw is None for each in columns)
+    times, block_samples = _table_times(trajectory), usual_block(len(joint_names))
+    for start in range(0, len(times), block_samples):
+        block_slice = slice(start, start + block_samples)
+        variables = trajectory.block(start, start + block_samples).variables() if needs_samples else {}
+        signal_rows = (
+            variables[each.variable][:, each.signal.columns]
+            if each.raw is None
+            else each.raw[:, block_slice].T
             for each in columns
         )
-        selected = [of_signal[:, mask] for of_signal, mask in zip(rows, masks, strict=True)]
-        writer.writerows(np.concatenate([stamps[part, None], *selected], axis=1).tolist())
+        selected = [of_signal[:, mask] for of_signal, mask in zip(signal_rows, masks, strict=True)]
+        writer.writerows(np.concatenate([times[block_slice, None], *selected], axis=1).tolist())
 
 
-def _stamps(trajectory: Trajectory) -> FloatArray:
+def _table_times(trajectory: Trajectory) -> FloatArray:
     """Return the times of the table: those of a resampled recording, otherwise those of the samples."""
     for estimate in trajectory.estimates.values():
         if estimate.resampled:
@@ -201,7 +209,7 @@ def _stamps(trajectory: Trajectory) -> FloatArray:
     return trajectory.times.block(0, trajectory.samples)
 
 
-def _headers(signal: Signal, name: str, joint_names: Sequence[str]) -> list[str]:
+def _column_headers(signal: Signal, name: str, joint_names: Sequence[str]) -> list[str]:
     return wrench_columns(name) if signal.is_wrench else [f"{joint}.{name}" for joint in joint_names]
 
 
@@ -214,13 +222,13 @@ def robot_text(fix: Fix, folder: Path) -> str:
         InputError: the robot was not read from a file, or its text does not admit the change.
     """
     assert fix.branch is not None
-    own, home = text_to_change(fix.robot)
+    robot_source, source_folder = text_to_change(fix.robot)
     values = {
         branch_path(fix.robot, fix.robot.joint_names.index(joint)): branch
         for joint, branch in fix.branch.branches.items()
     }
     try:
-        return edited(own, values | dict(moved_files(own, home, folder)))
+        return edited(robot_source, values | dict(moved_files(robot_source, source_folder, folder)))
     except InputError as error:
         raise InputError.one(
             f"{fix.branch.sentence} there by hand: {error}", fix.robot.sources[0].path

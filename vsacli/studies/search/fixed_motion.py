@@ -29,7 +29,7 @@ from vsacli.studies.search.criteria import (
     Scale,
     limit_bounds,
     limit_names,
-    made_to_carry,
+    with_seeded_stiffness,
 )
 from vsacli.studies.search.interior_point import minimize
 from vsacli.studies.search.loads import Load
@@ -67,13 +67,13 @@ class FixedMotion:
         self.criterion, self.scale, self._clearance = criterion, scale, CLEARANCE + reserve
         self.stiffness = float(np.median(load.command.commanded[STIFFNESS.key]))
         self.smoothings = SMOOTHINGS if _has_sharp_friction(joint) else criterion.smoothings
-        self._speed = math.sqrt(float(np.mean(load.command.dq**2))) or 1.0
-        self._limits = [check for check in limit_checks(joint) if check.variable in OF_MOTORS]
+        self._rms_velocity = math.sqrt(float(np.mean(load.command.dq**2))) or 1.0
+        self._limit_checks = [check for check in limit_checks(joint) if check.variable in OF_MOTORS]
 
     @property
     def bound_names(self) -> list[str]:
         """Names of the first bounds; the bounds after these belong to levels."""
-        return [*ENDS_OF_CORRIDOR, *limit_names(self._limits)]
+        return [*ENDS_OF_CORRIDOR, *limit_names(self._limit_checks)]
 
     @property
     def further_bounds(self) -> int:
@@ -84,14 +84,20 @@ class FixedMotion:
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
         """Return integrands of the cost, and bounds; see `Functions`."""
-        driven = self.driven(rows[: STIFFNESS.orders], instants)
+        drive_variables = self.driven(rows[: STIFFNESS.orders], instants)
         level = rows[STIFFNESS.orders] if self.criterion.levels else None
-        asked = (self.joint, driven, level, self.scale)
-        low, high = (row[instants] for row in self.admissible)
-        size = self.stiffness
-        bounds = [(low - rows[0]) / size + CLEARANCE, (rows[0] - high) / size + CLEARANCE]
-        bounds += limit_bounds(self._limits, driven.by_name(), self._clearance)
-        return list(self.criterion.integrands(*asked)), [*bounds, *self.criterion.bounds(*asked)]
+        cost_arguments = (self.joint, drive_variables, level, self.scale)
+        min_stiffness, max_stiffness = (row[instants] for row in self.admissible)
+        scale = self.stiffness
+        bounds = [
+            (min_stiffness - rows[0]) / scale + CLEARANCE,
+            (rows[0] - max_stiffness) / scale + CLEARANCE,
+        ]
+        bounds += limit_bounds(self._limit_checks, drive_variables.by_name(), self._clearance)
+        return list(self.criterion.integrands(*cost_arguments)), [
+            *bounds,
+            *self.criterion.bounds(*cost_arguments),
+        ]
 
     def driven(self, rows: Sequence[Dual] | FloatArray, instants: IndexArray) -> JointVariables:
         """Return the variables of the motors for a stiffness and its derivatives."""
@@ -99,36 +105,40 @@ class FixedMotion:
         commanded: dict[str, Any] = {**load.commanded, **dict(zip(STIFFNESS.names, rows, strict=True))}
         joint = self._smoothed_joint()
         if isinstance(rows[0], Dual):
-            joint = made_to_carry(joint, STIFFNESS.orders, moving_corridor=False)
+            joint = with_seeded_stiffness(joint, STIFFNESS.orders, moving_corridor=False)
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
             return drive_without_limits(joint, load._replace(commanded=commanded), MIN_MARGIN)
 
     def costs_of_constants(self, constants: FloatArray, instants: IndexArray) -> FloatArray:
         """Return the cost of each constant, (constants,); infinite if a motor exceeds a limit."""
-        asked = np.repeat(constants, len(instants))
-        still = np.zeros_like(asked)
-        driven = self.driven(np.stack([asked, still, still]), np.tile(instants, len(constants)))
-        excess = np.max([still - 1, *limit_bounds(self._limits, driven.by_name(), self._clearance)], axis=0)
-        kept = np.all(excess.reshape(len(constants), -1) < 0, axis=1)
+        stiffness = np.repeat(constants, len(instants))
+        zeros = np.zeros_like(stiffness)
+        drive_variables = self.driven(np.stack([stiffness, zeros, zeros]), np.tile(instants, len(constants)))
+        excess = np.max(
+            [zeros - 1, *limit_bounds(self._limit_checks, drive_variables.by_name(), self._clearance)], axis=0
+        )
+        within_limits = np.all(excess.reshape(len(constants), -1) < 0, axis=1)
         time, costs = self.load.time[instants], np.full(len(constants), np.inf)
-        for number in np.flatnonzero(kept).tolist():
-            part = slice(number * len(instants), (number + 1) * len(instants))
-            own = {name: variable[..., part] for name, variable in driven.by_name().items()}
-            costs[number] = self.criterion.of(self.joint, JointVariables.of(own), time)
+        for number in np.flatnonzero(within_limits).tolist():
+            constant_slice = slice(number * len(instants), (number + 1) * len(instants))
+            variables = {
+                name: variable[..., constant_slice] for name, variable in drive_variables.by_name().items()
+            }
+            costs[number] = self.criterion.of(self.joint, JointVariables.of(variables), time)
         return np.where(np.isnan(costs), np.inf, costs)
 
     def _smoothed_joint(self) -> Joint:
         """Return the joint with its sharp friction smoothed."""
         if not _has_sharp_friction(self.joint):
             return self.joint
-        return _with_friction_of(self.joint, self.scale.smoothing * self._speed)
+        return _with_friction_width(self.joint, self.scale.smoothing * self._rms_velocity)
 
 
 def _has_sharp_friction(joint: Joint) -> bool:
     return any(motor.friction is not None and motor.friction.sharp for motor in joint.actuator.motors)
 
 
-def _with_friction_of(joint: Joint, width: float) -> Joint:
+def _with_friction_width(joint: Joint, width: float) -> Joint:
     """Return a joint whose motors' friction changes its sign over a width of their velocity at the joint.
 
     A sharp change would make a sum over instants jump wherever a motor stops at another one.
@@ -136,13 +146,13 @@ def _with_friction_of(joint: Joint, width: float) -> Joint:
     actuator: Any = joint.actuator
     motors = []
     for motor in actuator.motor:
-        least = abs(motor.ratio_of_side) * width
-        friction = motor.friction and replace(motor.friction, width=max(motor.friction.width, least))
+        min_width = abs(motor.ratio_of_side) * width
+        friction = motor.friction and replace(motor.friction, width=max(motor.friction.width, min_width))
         motors.append(replace(motor, friction=friction))
     return replace(joint, actuator=replace(actuator, motor=tuple(motors)))
 
 
-GRID, SAME_CONSTANT = 33, 1e-6
+GRID, CONSTANT_TOLERANCE = 33, 1e-6
 """Constants that are compared at once, and the relative width of their range at which the search ends."""
 
 
@@ -154,50 +164,52 @@ def best_of_constants(
     Grids become finer and finer around the best of the one before.
     """
     best, grid = None, np.geomspace(low, high, GRID)
-    while best is None or grid[-1] - grid[0] > SAME_CONSTANT * best[0]:
+    while best is None or grid[-1] - grid[0] > CONSTANT_TOLERANCE * best[0]:
         costs = motion.costs_of_constants(grid, instants)
-        at = int(costs.argmin())
-        if costs[at] == np.inf:
+        index = int(costs.argmin())
+        if costs[index] == np.inf:
             return best
-        if best is None or costs[at] <= best[1]:
-            best = float(grid[at]), float(costs[at])
-        grid = np.geomspace(grid[max(at - 1, 0)], grid[min(at + 1, GRID - 1)], GRID)
+        if best is None or costs[index] <= best[1]:
+            best = float(grid[index]), float(costs[index])
+        grid = np.geomspace(grid[max(index - 1, 0)], grid[min(index + 1, GRID - 1)], GRID)
     return best
 
 
-INSIDE = 1e-3
+START_CLEARANCE = 1e-3
 """Relative distance that a start keeps from the ends of the admissible range, if possible."""
 
-DRAWN, LEVELS = 2, 6
+RANDOM_TARGETS, LEVELS = 2, 6
 """Number of random targets, and of the random levels that each of them interpolates."""
 
 
 class _Distance:
     """The `Functions` of the squared distance from a target stiffness, within bounds."""
 
-    def __init__(self, target: FloatArray, within: Range, size: float) -> None:
-        self._target, self._within, self._size = target, within, size
+    def __init__(self, target: FloatArray, bounds: Range, scale: float) -> None:
+        self._target, self._bounds, self._scale = target, bounds, scale
 
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Dual | FloatArray], list[Dual | FloatArray]]:
         """Return the square of the distance, and the excess over the bounds."""
-        low, high = (row[instants] for row in self._within)
-        missed = (rows[0] - self._target[instants]) / self._size
-        return [missed * missed], [(low - rows[0]) / self._size, (rows[0] - high) / self._size]
+        low, high = (row[instants] for row in self._bounds)
+        distance = (rows[0] - self._target[instants]) / self._scale
+        return [distance * distance], [(low - rows[0]) / self._scale, (rows[0] - high) / self._scale]
 
 
-def targets(asked: FloatArray, admissible: Range, time: FloatArray, seed: int) -> Iterator[FloatArray]:
+def targets(
+    commanded_stiffness: FloatArray, admissible: Range, time: FloatArray, seed: int
+) -> Iterator[FloatArray]:
     """Yield targets for starts: the command, the lower end of the range, constants, random profiles."""
-    highest = float(admissible.low.max())
+    min_constant = float(admissible.low.max())
     generator = np.random.default_rng(seed)
-    yield asked
+    yield commanded_stiffness
     yield 1.05 * admissible.low
-    yield np.full_like(time, 1.05 * highest)
-    yield np.full_like(time, 2 * highest)
-    places = np.linspace(time[0], time[-1], LEVELS)
-    for _ in range(DRAWN):
-        yield admissible.low * np.interp(time, places, generator.uniform(1.0, 2.0, LEVELS))
+    yield np.full_like(time, 1.05 * min_constant)
+    yield np.full_like(time, 2 * min_constant)
+    level_times = np.linspace(time[0], time[-1], LEVELS)
+    for _ in range(RANDOM_TARGETS):
+        yield admissible.low * np.interp(time, level_times, generator.uniform(1.0, 2.0, LEVELS))
 
 
 def nearest_profile(
@@ -211,23 +223,23 @@ def nearest_profile(
         target: target, (instants,).
         admissible: range in which the spline must lie at the instants.
     """
-    size = float(np.median(admissible.low))
-    clearance = np.minimum(INSIDE * size, (admissible.high - admissible.low) / 4)
-    within = Range(admissible.low + clearance, admissible.high - clearance)
-    wanted = np.minimum(np.maximum(target, within.low), within.high)
-    fitted = np.asarray(np.linalg.lstsq(basis, wanted, rcond=None)[0], dtype=np.float64)
-    near = basis @ fitted
-    if np.all((within.low < near) & (near < within.high)):
-        return fitted
+    scale = float(np.median(admissible.low))
+    clearance = np.minimum(START_CLEARANCE * scale, (admissible.high - admissible.low) / 4)
+    bounds = Range(admissible.low + clearance, admissible.high - clearance)
+    clipped_target = np.minimum(np.maximum(target, bounds.low), bounds.high)
+    coefficients = np.asarray(np.linalg.lstsq(basis, clipped_target, rcond=None)[0], dtype=np.float64)
+    profile = basis @ coefficients
+    if np.all((bounds.low < profile) & (profile < bounds.high)):
+        return coefficients
     group = Group(
-        functions=_Distance(target, within, size),
+        functions=_Distance(target, bounds, scale),
         instants=np.arange(len(time)),
         basis=basis[None],
         unknowns=np.arange(basis.shape[1]),
         weights=trapezoidal_weights(time)[None] / (time[-1] - time[0]),
-        there=np.isfinite(np.stack(within)),
-        scales=np.array([size]),
+        bound_mask=np.isfinite(np.stack(bounds)),
+        scales=np.array([scale]),
     )
     problem = SeparableProblem([group])
-    start = interior(problem, fitted)
+    start = interior(problem, coefficients)
     return None if start is None else minimize(problem, start).unknowns

@@ -78,46 +78,49 @@ def _sequence(chain: PiecewiseProfile) -> dict[str, Any] | None:
     """Return the keys of a sequence: its parts with their durations, constant ones as dwells."""
     parts = []
     for part in chain.parts:
-        declared = formula(part)
-        if declared is None:
+        keys = formula(part)
+        if keys is None:
             return None
         if isinstance(part, ConstantProfile):
-            declared = {"type": "dwell"}
-        parts.append(declared if "times" in declared else {**declared, "duration": _profile_duration(part)})
+            keys = {"type": "dwell"}
+        parts.append(keys if "times" in keys else {**keys, "duration": _profile_duration(part)})
     return {"type": "sequence", "parts": parts}
 
 
-def changes_of_steps(chain: PiecewiseProfile) -> list[RestToRest] | None:
+def step_transitions(chain: PiecewiseProfile) -> list[RestToRest] | None:
     """Return the transitions of a step profile, which have equal durations; None for another chain."""
-    changes = [part for part in chain.parts if isinstance(part, RestToRest)]
-    held = [part for part in chain.parts if isinstance(part, ConstantProfile)]
-    durations = list(map(_profile_duration, changes))
-    if len(changes) + len(held) < len(chain.parts) or not changes:
+    transitions = [part for part in chain.parts if isinstance(part, RestToRest)]
+    dwells = [part for part in chain.parts if isinstance(part, ConstantProfile)]
+    durations = list(map(_profile_duration, transitions))
+    if len(transitions) + len(dwells) < len(chain.parts) or not transitions:
         return None
-    if len({change.degree for change in changes}) > 1 or not math.isclose(
+    if len({change.degree for change in transitions}) > 1 or not math.isclose(
         min(durations), max(durations), rel_tol=SAME_TRANSITION
     ):
         return None
-    return changes
+    return transitions
 
 
 def _step_keys(chain: PiecewiseProfile) -> dict[str, Any] | None:
     """Return the keys of a step profile: levels, start times and duration of its transitions."""
-    changes = changes_of_steps(chain)
-    if changes is None:
+    transitions = step_transitions(chain)
+    if transitions is None:
         return None
     return {
         "type": "steps",
-        "degree": changes[0].degree,
-        "levels": [_values_or_null(changes[0].start), *(_values_or_null(change.end) for change in changes)],
-        "times": [change.span[0] - chain.span[0] for change in changes],
-        "transition": min(map(_profile_duration, changes)),
+        "degree": transitions[0].degree,
+        "levels": [
+            _values_or_null(transitions[0].start),
+            *(_values_or_null(change.end) for change in transitions),
+        ],
+        "times": [change.span[0] - chain.span[0] for change in transitions],
+        "transition": min(map(_profile_duration, transitions)),
     }
 
 
 def _profile_duration(profile: ClosedForm) -> float:
-    first, last = profile.span
-    return last - first
+    start, end = profile.span
+    return end - start
 
 
 def _values_or_null(values: Sequence[float]) -> list[float | None]:
@@ -156,49 +159,55 @@ def edited_text(fix: Fix, table: TableFile | None, folder: Path) -> str | None:
         table: table with the stiffness, if it no longer has a formula.
         folder: folder of the new file.
     """
-    asked = fix.asked
-    source = None if asked is None else next(iter(asked.sources), None)
-    if asked is None or source is None or source.text is None or is_table(source.path):
+    commanded = fix.asked
+    source = None if commanded is None else next(iter(commanded.sources), None)
+    if commanded is None or source is None or source.text is None or is_table(source.path):
         return None
-    for values in _candidates(fix, asked, source.text):
+    for values in _candidates(fix, commanded, source.text):
         try:
-            text = _with(source.text, values, table)
+            text = _with_new_values(source.text, values, table)
             moved = dict(moved_files(source.text, Path(source.path).parent, folder))
-            if _says(text, source.path, fix, table):
-                kept = {
+            if _reproduces_fix(text, source.path, fix, table):
+                moved_paths = {
                     path: file for path, file in moved.items() if table is None or path != "stiffness.file"
                 }
-                return edited(text, kept)
+                return edited(text, moved_paths)
         except InputError:
             continue
     return None
 
 
-def _candidates(fix: Fix, asked: Trajectory, text: str) -> Iterator[Values]:
+def _candidates(fix: Fix, commanded: Trajectory, text: str) -> Iterator[Values]:
     """Yield values by path that may declare the fix: first with other times, then with `slow_down`."""
     root, names = root_of(text), fix.robot.joint_names
     fixed = fix.declared
-    named = {"name": fixed.name}
+    name_value = {"name": fixed.name}
     if fix.factor == 1:
-        yield named | _changed_formulas(root, asked, fixed, names) | _duration(root, asked, fixed)
+        yield (
+            name_value
+            | _changed_formula_values(root, commanded, fixed, names)
+            | _duration_value(root, commanded, fixed)
+        )
     factor = 1 + fix.longer
     unstretched = fixed if fix.factor != 1 else fixed.stretched(1 / factor)
-    before = node_at(root, "slow_down")
-    declared = float(before.value) if isinstance(before, ScalarNode) else 1.0
-    slower = {} if factor == 1 else {"slow_down": _rounded_number(declared * factor)}
-    yield named | _changed_formulas(root, asked, unstretched, names) | slower
+    slow_down_node = node_at(root, "slow_down")
+    declared_factor = float(slow_down_node.value) if isinstance(slow_down_node, ScalarNode) else 1.0
+    slow_down_value = {} if factor == 1 else {"slow_down": _rounded_number(declared_factor * factor)}
+    yield name_value | _changed_formula_values(root, commanded, unstretched, names) | slow_down_value
 
 
-def _duration(root: Node, asked: Trajectory, fixed: Trajectory) -> Values:
-    if asked.duration == fixed.duration or node_at(root, "duration") is None:
+def _duration_value(root: Node, commanded: Trajectory, fixed: Trajectory) -> Values:
+    if commanded.duration == fixed.duration or node_at(root, "duration") is None:
         return {}
     return {"duration": _rounded_number(fixed.duration)}
 
 
-def _changed_formulas(root: Node, asked: Trajectory, fixed: Trajectory, names: Sequence[str]) -> Values:
+def _changed_formula_values(
+    root: Node, commanded: Trajectory, fixed: Trajectory, names: Sequence[str]
+) -> Values:
     """Return the values of formulas that differ, by path, where the text has them."""
     values: Values = {}
-    for signal, profile in _profiles_by_signal(asked).items():
+    for signal, profile in _profiles_by_signal(commanded).items():
         old, new = formula(profile), formula(_profiles_by_signal(fixed)[signal])
         node = node_at(root, signal.key)
         if old is not None and new is not None and node is not None:
@@ -207,11 +216,11 @@ def _changed_formulas(root: Node, asked: Trajectory, fixed: Trajectory, names: S
 
 
 def _profiles_by_signal(trajectory: Trajectory) -> dict[Signal, Profile]:
-    found: dict[Signal, Profile] = {POSITION: trajectory.position}
-    found |= {COMMANDED[key]: profile for key, profile in trajectory.commanded.items()}
+    profiles: dict[Signal, Profile] = {POSITION: trajectory.position}
+    profiles |= {COMMANDED[key]: profile for key, profile in trajectory.commanded.items()}
     if trajectory.wrench is not None:
-        found |= trajectory.wrench.profiles
-    return found
+        profiles |= trajectory.wrench.profiles
+    return profiles
 
 
 def _changed_values(
@@ -220,20 +229,20 @@ def _changed_values(
     """Yield paths below `path` and their new values: single values if the text has them, else whole lists."""
     if isinstance(old, dict):
         for key, value in old.items():
-            below = node_at(node, key)
-            if below is not None:
-                yield from _changed_values(below, f"{path}.{key}", value, new[key], names)
+            child_node = node_at(node, key)
+            if child_node is not None:
+                yield from _changed_values(child_node, f"{path}.{key}", value, new[key], names)
     elif isinstance(old, list):
         if _equal_up_to_rounding(old, new):
             return
-        words = list(names) if isinstance(node, MappingNode) else list(map(str, range(len(old))))
+        keys = list(names) if isinstance(node, MappingNode) else list(map(str, range(len(old))))
         if isinstance(node, ScalarNode):
-            yield path, _shared(new)
+            yield path, _value_for_all(new)
             return
-        for word, before, after in zip(words, old, new, strict=True):
-            below = node_at(node, word)
-            if below is not None:
-                yield from _changed_values(below, f"{path}.{word}", before, after, names)
+        for child_key, old_value, new_value in zip(keys, old, new, strict=True):
+            child_node = node_at(node, child_key)
+            if child_node is not None:
+                yield from _changed_values(child_node, f"{path}.{child_key}", old_value, new_value, names)
     elif not _equal_up_to_rounding(old, new):
         yield path, _rounded_number(new)
 
@@ -247,10 +256,12 @@ def _equal_up_to_rounding(old: Any, new: Any) -> bool:
     return bool(old == new)
 
 
-def _shared(values: list[Any]) -> Any:
+def _value_for_all(values: list[Any]) -> Any:
     """Return one number if it holds for all joints, else the list."""
-    given = [None if value is None else _rounded_number(value) for value in values]
-    return given[0] if all(value == given[0] for value in given) else given
+    rounded_values = [None if value is None else _rounded_number(value) for value in values]
+    return (
+        rounded_values[0] if all(value == rounded_values[0] for value in rounded_values) else rounded_values
+    )
 
 
 def _rounded_number(value: float) -> float | int:
@@ -258,39 +269,45 @@ def _rounded_number(value: float) -> float | int:
     return int(number) if number.is_integer() and abs(number) < 10**DIGITS else number
 
 
-def _with(text: str, values: Values, table: TableFile | None) -> str:
+def _with_new_values(text: str, values: Values, table: TableFile | None) -> str:
     """Return the text with new values; with a table, stiffness and times come from the table."""
     if table is None:
         return edited(text, values)
     values = {key: value for key, value in values.items() if not key.startswith("stiffness.")}
     values["stiffness"] = {"type": "csv", "file": table.name}
     text = edited(text, values)
-    marks = [node_at(root_of(text), key) for key in ("duration", "rate", "slow_down")]
-    for node in sorted((node for node in marks if node is not None), key=lambda node: -node.start_mark.index):
-        line = text.rfind("\n", 0, node.start_mark.index) + 1
-        text = f"{text[:line]}# {text[line:]}"
+    time_nodes = [node_at(root_of(text), key) for key in ("duration", "rate", "slow_down")]
+    for node in sorted(
+        (node for node in time_nodes if node is not None), key=lambda node: -node.start_mark.index
+    ):
+        line_start = text.rfind("\n", 0, node.start_mark.index) + 1
+        text = f"{text[:line_start]}# {text[line_start:]}"
     return text
 
 
-def _says(text: str, path: str, fix: Fix, table: TableFile | None) -> bool:
+def _reproduces_fix(text: str, path: str, fix: Fix, table: TableFile | None) -> bool:
     """Return whether a text in place of the user's file reproduces the fix at every sample."""
-    with temporary_folder() as place:
-        copies = {path: str(place / "text")}
-        (place / "text").write_text(text, encoding="utf-8")
+    with temporary_folder() as folder:
+        copies = {path: str(folder / "text")}
+        (folder / "text").write_text(text, encoding="utf-8")
         if table is not None:
-            copies[os.path.join(os.path.dirname(path), table.name)] = str(place / "table")
-            with (place / "table").open("w", encoding="utf-8") as stream:
+            copies[os.path.join(os.path.dirname(path), table.name)] = str(folder / "table")
+            with (folder / "table").open("w", encoding="utf-8") as stream:
                 table.write(stream)
         with reading_copies(copies):
-            again = load_trajectory(path, fix.robot)
-    wanted = fix.trajectory
-    if again.samples != wanted.samples:
+            read_trajectory = load_trajectory(path, fix.robot)
+    expected_trajectory = fix.trajectory
+    if read_trajectory.samples != expected_trajectory.samples:
         return False
-    blocks = (each.block(0, each.samples).variables() for each in (again, wanted))
-    found, expected = blocks
-    return found.keys() == expected.keys() and all(
+    blocks = (each.block(0, each.samples).variables() for each in (read_trajectory, expected_trajectory))
+    read_variables, expected_variables = blocks
+    return read_variables.keys() == expected_variables.keys() and all(
         np.allclose(
-            found[name], array, rtol=0, atol=CLOSE * np.nanmax(np.abs(array), initial=0.0), equal_nan=True
+            read_variables[name],
+            array,
+            rtol=0,
+            atol=CLOSE * np.nanmax(np.abs(array), initial=0.0),
+            equal_nan=True,
         )
-        for name, array in expected.items()
+        for name, array in expected_variables.items()
     )

@@ -26,13 +26,13 @@ WARM_GAP = 1e-3
 NEARLY_SOLVED = 0.1
 """Share of the gap below which the gain of a Newton step ends a barrier problem."""
 
-CENTERED = 10.0
+CENTRALITY_BOUND = 10.0
 """Largest deviation of slack times multiplier from the barrier parameter then, as a multiple of it."""
 
-SAFEGUARD = 1e5
+MAX_MULTIPLIER_RATIO = 1e5
 """Largest ratio of a multiplier to its central value: equation 16 of Waechter & Biegler, but tighter."""
 
-FOUND = 100.0
+MINIMUM_TOLERANCE = 100.0
 """Remaining gain at a minimum, gap plus Newton step, as a multiple of the last gap."""
 
 PATIENCE, STALLED = 8, 1e-5
@@ -44,13 +44,13 @@ TO_BOUNDARY = 0.995
 ARMIJO = 1e-4
 """Required share of the decrease that the slope predicts, in the line search."""
 
-SHORTEST_STEP = 1e-10
+MIN_STEP_SHARE = 1e-10
 """Share of a step below which the line search gives up, since rounding hides the gain."""
 
-MOST_ADDED = 1e6
+MAX_DIAGONAL_SHARE = 1e6
 """Largest multiple of its diagonal added to a matrix to make it definite; it is gradient descent by then."""
 
-MOST_STEPS = 200
+MAX_STEPS = 200
 """Limit on steps; twenty to forty are usual."""
 
 
@@ -136,70 +136,70 @@ def minimize_all(
     return _run_searches(problem, [_search_from(start, gap, last, stalled) for start in starts])
 
 
-class _Wanted(NamedTuple):
+class _EvaluationRequest(NamedTuple):
     """Unknowns at which a search needs the problem, and whether with derivatives."""
 
     unknowns: FloatArray
     derivatives: bool
 
 
-_Search = Generator[_Wanted, Any, Minimum]
-"""A search, which receives a `Point`, or cost and bounds, for each `_Wanted`."""
+_Search = Generator[_EvaluationRequest, Any, Minimum]
+"""A search, which receives a `Point`, or cost and bounds, for each `_EvaluationRequest`."""
 
 
 def _run_searches(problem: Problem, searches: Sequence[_Search]) -> list[Minimum]:
     """Run searches, each round of which needs one evaluation of the problem."""
-    found: dict[int, Minimum] = {}
-    wanted = {number: next(search) for number, search in enumerate(searches)}
-    while wanted:
+    minima: dict[int, Minimum] = {}
+    requests = {index: next(search) for index, search in enumerate(searches)}
+    while requests:
         # derivatives last, so that as many searches as possible need them at the same time
-        derivatives = all(each.derivatives for each in wanted.values())
-        asked = [number for number, each in wanted.items() if each.derivatives == derivatives]
-        places = [wanted[number].unknowns for number in asked]
-        answers: Sequence[Any] = problem.at(places) if derivatives else problem.values(places)
-        for number, answer in zip(asked, answers, strict=True):
+        derivatives = all(request.derivatives for request in requests.values())
+        search_indices = [index for index, request in requests.items() if request.derivatives == derivatives]
+        unknowns = [requests[index].unknowns for index in search_indices]
+        answers: Sequence[Any] = problem.at(unknowns) if derivatives else problem.values(unknowns)
+        for index, answer in zip(search_indices, answers, strict=True):
             try:
-                wanted[number] = searches[number].send(answer)
+                requests[index] = searches[index].send(answer)
             except StopIteration as end:
-                found[number] = end.value
-                del wanted[number]
-    return [found[number] for number in range(len(searches))]
+                minima[index] = end.value
+                del requests[index]
+    return [minima[index] for index in range(len(searches))]
 
 
 def _search_from(
     start: FloatArray,
     gap: float,
-    last: float,
+    last_gap: float,
     stalled: float,
     enough: Callable[[FloatArray], bool] = lambda _: False,
 ) -> _Search:
     """Search from one start; see `minimize`."""
     unknowns = start
-    point = yield _Wanted(unknowns, derivatives=True)
-    count = max(len(point.bounds), 1)
-    multipliers = gap / count / -point.bounds
+    point = yield _EvaluationRequest(unknowns, derivatives=True)
+    bound_count = max(len(point.bounds), 1)
+    multipliers = gap / bound_count / -point.bounds
     costs = [point.cost]
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         newton = _Newton(point, multipliers)
         if newton.factor is None:
             return Minimum(unknowns, point.cost, found=False)
-        step = newton.step(gap / count)
-        while gap > last and step.gain <= NEARLY_SOLVED * gap and newton.centered(gap / count):
-            gap = max(min(0.2 * gap, gap**1.5), last)
-            step = newton.step(gap / count)
-        solved = gap <= last and step.gain <= NEARLY_SOLVED * gap and newton.centered(gap / count)
-        if solved or enough(unknowns) or _stalled(costs, stalled):
+        step = newton.step(gap / bound_count)
+        while gap > last_gap and step.gain <= NEARLY_SOLVED * gap and newton.centered(gap / bound_count):
+            gap = max(min(0.2 * gap, gap**1.5), last_gap)
+            step = newton.step(gap / bound_count)
+        solved = gap <= last_gap and step.gain <= NEARLY_SOLVED * gap and newton.centered(gap / bound_count)
+        if solved or enough(unknowns) or _has_stalled(costs, stalled):
             break
-        moved = yield from _line_search(point, unknowns, step, gap / count)
-        if moved is None:
+        next_point = yield from _search_along_step(point, unknowns, step, gap / bound_count)
+        if next_point is None:
             break
-        unknowns, point = moved
-        multipliers = _step_multipliers(multipliers, step.multipliers, gap / count / -point.bounds)
+        unknowns, point = next_point
+        multipliers = _next_multipliers(multipliers, step.multipliers, gap / bound_count / -point.bounds)
         costs.append(point.cost)
-    return Minimum(unknowns, point.cost, gap + step.gain <= FOUND * last)
+    return Minimum(unknowns, point.cost, gap + step.gain <= MINIMUM_TOLERANCE * last_gap)
 
 
-def _stalled(costs: Sequence[float], share: float) -> bool:
+def _has_stalled(costs: Sequence[float], share: float) -> bool:
     """Return whether the cost has hardly changed in the last `PATIENCE` steps."""
     recent = costs[-PATIENCE - 1 :]
     return len(recent) > PATIENCE and max(recent) - min(recent) < share * abs(recent[-1])
@@ -224,17 +224,17 @@ class _Newton:
     def step(self, barrier: float) -> _NewtonStep:
         """Return the step; multipliers are eliminated, and the Cholesky factor solves for the unknowns."""
         assert self.factor is not None
-        right = -(self._point.gradient + self._point.pull(barrier / self._slack))
-        unknowns = scipy.linalg.cho_solve(self.factor, right)
+        right_hand_side = -(self._point.gradient + self._point.pull(barrier / self._slack))
+        unknowns = scipy.linalg.cho_solve(self.factor, right_hand_side)
         multipliers = (
             barrier / self._slack - self._multipliers + self._stiffening * self._point.changes(unknowns)
         )
-        return _NewtonStep(unknowns, multipliers, float(right @ unknowns))
+        return _NewtonStep(unknowns, multipliers, float(right_hand_side @ unknowns))
 
     def centered(self, barrier: float) -> bool:
         """Return whether all products of slack and multiplier are near the barrier parameter."""
-        off = np.abs(self._slack * self._multipliers - barrier)
-        return bool(off.max(initial=0.0) <= CENTERED * barrier)
+        deviation = np.abs(self._slack * self._multipliers - barrier)
+        return bool(deviation.max(initial=0.0) <= CENTRALITY_BOUND * barrier)
 
 
 def _newton_factor(
@@ -244,20 +244,22 @@ def _newton_factor(
 
     Return None if that fails, because values overflow or nothing depends on some unknown.
     """
-    matrix, added = point.newton_matrix(multipliers, stiffening, convex=False), 0.0
-    while added <= MOST_ADDED and np.isfinite(matrix).all():
+    matrix, diagonal_share = point.newton_matrix(multipliers, stiffening, convex=False), 0.0
+    while diagonal_share <= MAX_DIAGONAL_SHARE and np.isfinite(matrix).all():
         try:
-            return scipy.linalg.cho_factor(matrix + added * np.diag(np.abs(np.diag(matrix))), lower=True)
+            return scipy.linalg.cho_factor(
+                matrix + diagonal_share * np.diag(np.abs(np.diag(matrix))), lower=True
+            )
         except scipy.linalg.LinAlgError:
-            if not added:
+            if not diagonal_share:
                 matrix = point.newton_matrix(multipliers, stiffening, convex=True)
-            added = max(10 * added, 1e-12)
+            diagonal_share = max(10 * diagonal_share, 1e-12)
     return None
 
 
-def _line_search(
+def _search_along_step(
     point: Point, unknowns: FloatArray, step: _NewtonStep, barrier: float
-) -> Generator[_Wanted, Any, tuple[FloatArray, Point] | None]:
+) -> Generator[_EvaluationRequest, Any, tuple[FloatArray, Point] | None]:
     """Return the unknowns after a share of the step that lowers the barrier function inside the bounds.
 
     Args:
@@ -275,24 +277,30 @@ def _line_search(
     def lower(cost: float, bounds: FloatArray, share: float) -> bool:
         if not (np.isfinite(cost) and np.all(bounds < 0)):
             return False
-        there = cost - barrier * float(np.log(-bounds).sum())
-        return there <= merit - ARMIJO * share * step.gain + rounding
+        trial_merit = cost - barrier * float(np.log(-bounds).sum())
+        return trial_merit <= merit - ARMIJO * share * step.gain + rounding
 
     share = _share_to_boundary(-point.bounds, -point.changes(step.unknowns))
-    while share > SHORTEST_STEP:
-        tried = unknowns + share * step.unknowns
-        cost, bounds = yield _Wanted(tried, derivatives=False)
+    while share > MIN_STEP_SHARE:
+        next_unknowns = unknowns + share * step.unknowns
+        cost, bounds = yield _EvaluationRequest(next_unknowns, derivatives=False)
         if lower(cost, bounds, share):
-            there = yield _Wanted(tried, derivatives=True)
-            return tried, there
+            next_point = yield _EvaluationRequest(next_unknowns, derivatives=True)
+            return next_unknowns, next_point
         share /= 2
     return None
 
 
-def _step_multipliers(multipliers: FloatArray, step: FloatArray, central: FloatArray) -> FloatArray:
-    """Return the multipliers after a step, positive and within `SAFEGUARD` of the central ones."""
-    moved = multipliers + _share_to_boundary(multipliers, step) * step
-    return np.clip(moved, central / SAFEGUARD, central * SAFEGUARD)
+def _next_multipliers(
+    multipliers: FloatArray, step: FloatArray, central_multipliers: FloatArray
+) -> FloatArray:
+    """Return the multipliers after a step, positive and within `MAX_MULTIPLIER_RATIO` of the central ones."""
+    next_multipliers = multipliers + _share_to_boundary(multipliers, step) * step
+    return np.clip(
+        next_multipliers,
+        central_multipliers / MAX_MULTIPLIER_RATIO,
+        central_multipliers * MAX_MULTIPLIER_RATIO,
+    )
 
 
 def _share_to_boundary(values: FloatArray, step: FloatArray) -> float:

@@ -51,7 +51,7 @@ class TaskSamples(NamedTuple):
         """Return the samples start..stop-1 of a task, or of a task stretched by a factor."""
         motion = trajectory.block(start, stop)
         if factor != 1:
-            motion = motion.mapped(_unstretched(trajectory, motion.time, factor), lambda array, _: array)
+            motion = motion.mapped(_task_times(trajectory, motion.time, factor), lambda array, _: array)
         return cls(motion, np.full(len(motion.time), factor))
 
     @classmethod
@@ -64,7 +64,7 @@ class TaskSamples(NamedTuple):
             factor: factor by which the trajectory is stretched.
         """
         motion = motion_between(trajectory, elapsed, factor)
-        unstretched = _unstretched(trajectory, motion.time, factor)
+        unstretched = _task_times(trajectory, motion.time, factor)
         return cls(motion.mapped(unstretched, lambda array, _: array), np.full(len(elapsed), factor))
 
     @property
@@ -101,14 +101,14 @@ def motion_between(trajectory: Trajectory, elapsed: FloatArray, factor: float = 
     return trajectory.at(np.clip(trajectory.start + factor * elapsed, *trajectory.times.span))
 
 
-def evenly_chosen(trajectory: Trajectory, steps: int) -> TaskSamples:
+def evenly_spaced_samples(trajectory: Trajectory, steps: int) -> TaskSamples:
     """Return at most this many samples of a trajectory, both ends included."""
-    chosen = evenly(trajectory.samples, steps)
-    samples = usual_block(trajectory.joints)
+    indices = evenly(trajectory.samples, steps)
+    block_samples = usual_block(trajectory.joints)
     return concatenate_task_samples(
-        TaskSamples.of(trajectory, start, start + samples).select(inside - start)
-        for start in range(0, trajectory.samples, samples)
-        if (inside := chosen[(start <= chosen) & (chosen < start + samples)]).size
+        TaskSamples.of(trajectory, start, start + block_samples).select(block_indices - start)
+        for start in range(0, trajectory.samples, block_samples)
+        if (block_indices := indices[(start <= indices) & (indices < start + block_samples)]).size
     )
 
 
@@ -117,8 +117,8 @@ def concatenate_task_samples(parts: Iterable[TaskSamples]) -> TaskSamples:
     motions, factors = zip(*parts, strict=True)
     variables = [motion.variables() for motion in motions]
     arrays = {name: np.concatenate([each[name] for each in variables]) for name in variables[0]}
-    last = motions[-1].wrench
-    wrench = last and Wrench(*(arrays[name] for name in WRENCH_NAMES), frame=last.frame)
+    last_wrench = motions[-1].wrench
+    wrench = last_wrench and Wrench(*(arrays[name] for name in WRENCH_NAMES), frame=last_wrench.frame)
     return TaskSamples(Motion.of(arrays["time"], arrays, wrench), np.concatenate(factors))
 
 
@@ -141,9 +141,9 @@ class Load:
     @classmethod
     def over(cls, trajectory: Trajectory, factor: float, time: FloatArray, command: Command) -> Load:
         """Return a load at times of a stretched task, which include the samples."""
-        unstretched = _unstretched(trajectory, time, factor)
+        task_times = _task_times(trajectory, time, factor)
         steps = np.searchsorted(time, trajectory.times.block(0, trajectory.samples))
-        return cls(time, command, Instants(unstretched, np.full(len(time), factor)), steps)
+        return cls(time, command, Instants(task_times, np.full(len(time), factor)), steps)
 
     def at(self, steps: IndexArray | slice) -> Load:
         """Return the load at the times with the given indices."""
@@ -176,16 +176,19 @@ def joint_loads(
         factor: factor by which the trajectory is stretched.
         between: further instants, as times since the start of the unchanged task, s.
     """
-    instants = 2 * trajectory.samples - 1
+    instant_count = 2 * trajectory.samples - 1
     names = Command.names(trajectory.commanded)
-    time, rows = np.empty(instants), np.empty((len(joints), len(names), instants))
-    samples = usual_block(len(robot.joints))
-    for start in range(0, trajectory.samples, samples):
-        steps = trajectory.block(start, start + samples + 1)
-        middles = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
-        for motion, first in ((steps, 2 * start), (middles, 2 * start + 1)):
-            places = slice(first, first + 2 * len(motion.time), 2)
-            time[places], rows[:, :, places] = motion.time, _command_rows(robot, motion, joints, names)
+    time, rows = np.empty(instant_count), np.empty((len(joints), len(names), instant_count))
+    block_samples = usual_block(len(robot.joints))
+    for start in range(0, trajectory.samples, block_samples):
+        steps = trajectory.block(start, start + block_samples + 1)
+        midpoints = trajectory.at((steps.time[:-1] + steps.time[1:]) / 2)
+        for motion, first in ((steps, 2 * start), (midpoints, 2 * start + 1)):
+            instant_slice = slice(first, first + 2 * len(motion.time), 2)
+            time[instant_slice], rows[:, :, instant_slice] = (
+                motion.time,
+                _command_rows(robot, motion, joints, names),
+            )
     if between is not None and between.size:
         motion = motion_between(trajectory, between, factor)
         time, chosen = np.unique(np.concatenate([time, motion.time]), return_index=True)
@@ -202,21 +205,21 @@ def _command_rows(robot: Robot, motion: Motion, joints: list[int], names: tuple[
     return np.stack([[commanded[name][:, joint] for name in names] for joint in joints])
 
 
-def _unstretched(trajectory: Trajectory, time: FloatArray, factor: float) -> FloatArray:
+def _task_times(trajectory: Trajectory, time: FloatArray, factor: float) -> FloatArray:
     """Return times of a stretched trajectory as times of the unchanged one."""
     return stretch(time, trajectory.start, 1 / factor)
 
 
-SAME = 1e-6
+PERIOD_TOLERANCE = 1e-6
 """Largest difference between periods, relative to the peak of each variable."""
 
-AT_REST = 1e-9
+REST_SPEED_SHARE = 1e-9
 """Share of its peak velocity below which a joint is at rest but for rounding."""
 
 LOADING = ("q", "dq", "ddq", "tau_e", "dtau_e", "ddtau_e")
 """Variables that load the motors, apart from the stiffness."""
 
-FEWEST_STEPS = 20
+MIN_PERIOD_SAMPLES = 20
 """Smallest number of samples in a period; faster repetition is not distinguished from noise."""
 
 
@@ -248,8 +251,8 @@ def rests(trajectory: Trajectory) -> bool:
 
 def _moving_ends(trajectory: Trajectory) -> tuple[bool, bool]:
     """Return whether any joint moves at the start, and at the end."""
-    some = np.abs(trajectory.block(0, trajectory.samples).dq)
-    first, last = (bool(np.any(row > AT_REST * some.max(axis=0))) for row in some[[0, -1]])
+    speeds = np.abs(trajectory.block(0, trajectory.samples).dq)
+    first, last = (bool(np.any(row > REST_SPEED_SHARE * speeds.max(axis=0))) for row in speeds[[0, -1]])
     return first, last
 
 
@@ -260,10 +263,12 @@ def periods(load: Load) -> int:
     """
     arrays = load.command.arrays()
     rows = np.stack([arrays[name] for name in LOADING])
-    tolerance = SAME * np.abs(rows).max(axis=1, keepdims=True)
-    steps = rows.shape[1] // 2
-    for count in range(max(steps // FEWEST_STEPS, 1), 0, -1):
-        period, rest = divmod(steps, count)
-        if not rest and np.all(np.abs(rows[:, 2 * period :] - rows[:, : -2 * period]) <= tolerance):
+    tolerance = PERIOD_TOLERANCE * np.abs(rows).max(axis=1, keepdims=True)
+    intervals = rows.shape[1] // 2
+    for count in range(max(intervals // MIN_PERIOD_SAMPLES, 1), 0, -1):
+        period_intervals, remainder = divmod(intervals, count)
+        if not remainder and np.all(
+            np.abs(rows[:, 2 * period_intervals :] - rows[:, : -2 * period_intervals]) <= tolerance
+        ):
             return count
     return 0

@@ -43,7 +43,7 @@ PIECES_PER_SMOOTHING = 2
 FLAT_ENDS = 2
 """Number of derivatives that are zero at both ends."""
 
-SMOOTHED = 3
+PENALIZED_ORDER = 3
 """Derivative that the objective suppresses. Its square has no integral where the second one jumps; if the
 second derivative itself is suppressed, it jumps at both ends, from the zero that is prescribed there."""
 
@@ -53,10 +53,10 @@ END_HALVINGS = 4
 DECAY_SMOOTHING_TIMES = 16
 """Smoothing times over which a change decays, to e^-8."""
 
-MOST_COEFFICIENTS = 100
+MAX_COEFFICIENTS = 100
 """Number of coefficients that the dense solver handles in 0.1 s; if there are more, pieces become coarser."""
 
-MOST_ROUNDS = 100
+MAX_ROUNDS = 100
 """Limit on rounds that add instants of violated bounds; about five are needed."""
 
 BOUND_ACCURACY = 1e-7
@@ -107,12 +107,12 @@ def nearest_spline(bounds: Bounds, smoothing: float, knots: FloatArray | None = 
     Raises:
         NoSplineError: the bounds are too narrow or change too fast.
     """
-    knots, free, smoothing = _choose_knots(bounds, smoothing, knots)
-    shapes = _shapes(free)
-    size = float(np.max(bounds.missed_by(np.zeros_like(bounds.time))))
-    scaled = Bounds(bounds.time, bounds.low / size, bounds.high / size)
-    amounts = _least_amounts(scaled, knots, shapes, smoothing)
-    return scipy.interpolate.BSpline(knots, size * (shapes @ amounts), DEGREE)
+    knots, is_free, smoothing = _choose_knots(bounds, smoothing, knots)
+    shapes = _shapes(is_free)
+    largest_violation = float(np.max(bounds.missed_by(np.zeros_like(bounds.time))))
+    scaled = Bounds(bounds.time, bounds.low / largest_violation, bounds.high / largest_violation)
+    coefficients = _least_norm_coefficients(scaled, knots, shapes, smoothing)
+    return scipy.interpolate.BSpline(knots, largest_violation * (shapes @ coefficients), DEGREE)
 
 
 def _choose_knots(
@@ -122,92 +122,109 @@ def _choose_knots(
     first, last = bounds.time[[0, -1]]
     while True:
         pieces = int(np.ceil(PIECES_PER_SMOOTHING * (last - first) / smoothing))
-        ends = _graded(np.linspace(first, last, pieces + 1))
+        piece_ends = _graded_piece_ends(np.linspace(first, last, pieces + 1))
         if allowed is not None:
-            ends = np.unique(allowed[np.clip(np.searchsorted(allowed, ends), 0, len(allowed) - 1)])
-        knots = np.concatenate([[first] * DEGREE, ends, [last] * DEGREE])
-        near = _pieces_near(ends, bounds.time[bounds.excluding_zero], DECAY_SMOOTHING_TIMES * smoothing)
+            piece_ends = np.unique(
+                allowed[np.clip(np.searchsorted(allowed, piece_ends), 0, len(allowed) - 1)]
+            )
+        knots = np.concatenate([[first] * DEGREE, piece_ends, [last] * DEGREE])
+        is_near_bounds = _pieces_near(
+            piece_ends, bounds.time[bounds.excluding_zero], DECAY_SMOOTHING_TIMES * smoothing
+        )
         # coefficient i belongs to the pieces i-5..i
-        free = np.convolve(near, np.ones(DEGREE + 1)) > 0
-        if np.count_nonzero(free) <= MOST_COEFFICIENTS:
-            return knots, free, smoothing
+        is_free = np.convolve(is_near_bounds, np.ones(DEGREE + 1)) > 0
+        if np.count_nonzero(is_free) <= MAX_COEFFICIENTS:
+            return knots, is_free, smoothing
         smoothing *= 1.5
 
 
-def _graded(ends: FloatArray) -> FloatArray:
+def _graded_piece_ends(ends: FloatArray) -> FloatArray:
     """Return the ends of equal pieces, with the first and last pieces halved repeatedly towards the ends."""
-    halves = (ends[1] - ends[0]) * 0.5 ** np.arange(END_HALVINGS, 0, -1)
-    return np.concatenate([ends[:1], ends[0] + halves, ends[1:-1], ends[-1] - halves[::-1], ends[-1:]])
+    end_lengths = (ends[1] - ends[0]) * 0.5 ** np.arange(END_HALVINGS, 0, -1)
+    return np.concatenate(
+        [ends[:1], ends[0] + end_lengths, ends[1:-1], ends[-1] - end_lengths[::-1], ends[-1:]]
+    )
 
 
-def _shapes(free: BoolArray) -> FloatArray:
+def _shapes(is_free: BoolArray) -> FloatArray:
     """Return the B-spline coefficients of each shape, (coefficients, shapes).
 
     There is one shape per free coefficient; only the first three coefficients share one, and so do the last
     three, since the first two derivatives are zero at an end where these are equal.
     """
-    rows = np.arange(len(free))
-    shape_of = np.clip(rows - FLAT_ENDS, 0, len(free) - 1 - 2 * FLAT_ENDS)
-    shapes = np.eye(shape_of[-1] + 1)[shape_of]
-    return shapes[:, np.any(shapes[free], axis=0)]
+    rows = np.arange(len(is_free))
+    shape_indices = np.clip(rows - FLAT_ENDS, 0, len(is_free) - 1 - 2 * FLAT_ENDS)
+    shapes = np.eye(shape_indices[-1] + 1)[shape_indices]
+    return shapes[:, np.any(shapes[is_free], axis=0)]
 
 
-def _pieces_near(ends: FloatArray, times: FloatArray, reach: float) -> BoolArray:
-    """Return a mask of the pieces within `reach` of any of the ascending times."""
-    next_time = np.append(times, np.inf)[np.searchsorted(times, ends[:-1] - reach)]
-    return next_time <= ends[1:] + reach
+def _pieces_near(ends: FloatArray, times: FloatArray, max_distance: float) -> BoolArray:
+    """Return a mask of the pieces within `max_distance` of any of the ascending times."""
+    next_time = np.append(times, np.inf)[np.searchsorted(times, ends[:-1] - max_distance)]
+    return next_time <= ends[1:] + max_distance
 
 
-def _least_amounts(bounds: Bounds, knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:
+def _least_norm_coefficients(
+    bounds: Bounds, knots: FloatArray, shapes: FloatArray, smoothing: float
+) -> FloatArray:
     """Return the coefficient of each shape; bounds are added at instants where they are violated."""
-    root = _objective(knots, shapes, smoothing)
-    bounding = np.flatnonzero(bounds.excluding_zero)
-    watched = bounding[evenly(len(bounding), MOST_COEFFICIENTS)]
-    for _ in range(MOST_ROUNDS):
-        rows = scipy.interpolate.BSpline.design_matrix(bounds.time[watched], knots, DEGREE).toarray() @ shapes
-        finite = np.isfinite(bounds.high[watched])
-        above = np.concatenate([bounds.low[watched], -bounds.high[watched][finite]])
-        amounts = _least_distance(root, np.concatenate([rows, -rows[finite]]), above)
-        missed = bounds.missed_by(scipy.interpolate.BSpline(knots, shapes @ amounts, DEGREE)(bounds.time))
-        if missed.max() <= BOUND_ACCURACY:
-            return amounts
-        watched = np.union1d(watched, peaks(missed))
+    objective_factor = _objective(knots, shapes, smoothing)
+    excluding_indices = np.flatnonzero(bounds.excluding_zero)
+    constrained = excluding_indices[evenly(len(excluding_indices), MAX_COEFFICIENTS)]
+    for _ in range(MAX_ROUNDS):
+        constraint_rows = (
+            scipy.interpolate.BSpline.design_matrix(bounds.time[constrained], knots, DEGREE).toarray()
+            @ shapes
+        )
+        finite = np.isfinite(bounds.high[constrained])
+        lower_bounds = np.concatenate([bounds.low[constrained], -bounds.high[constrained][finite]])
+        coefficients = _least_distance(
+            objective_factor, np.concatenate([constraint_rows, -constraint_rows[finite]]), lower_bounds
+        )
+        violation = bounds.missed_by(
+            scipy.interpolate.BSpline(knots, shapes @ coefficients, DEGREE)(bounds.time)
+        )
+        if violation.max() <= BOUND_ACCURACY:
+            return coefficients
+        constrained = np.union1d(constrained, peaks(violation))
     raise NoSplineError
 
 
 def _objective(knots: FloatArray, shapes: FloatArray, smoothing: float) -> FloatArray:
     """Return upper triangular R such that |R x|^2 is the integral in smoothing times, by Gauss quadrature."""
     ends = knots[DEGREE:-DEGREE]
-    half = np.diff(ends) / 2
+    half_lengths = np.diff(ends) / 2
     nodes, weights = np.polynomial.legendre.leggauss(DEGREE + 1)
-    time = ((ends[:-1] + half)[:, None] + half[:, None] * nodes).ravel()
-    share = np.sqrt(half[:, None] * weights / smoothing).ravel()
+    time = ((ends[:-1] + half_lengths)[:, None] + half_lengths[:, None] * nodes).ravel()
+    root_weights = np.sqrt(half_lengths[:, None] * weights / smoothing).ravel()
     basis = scipy.interpolate.BSpline(knots, shapes, DEGREE)
-    smoothed = smoothing**SMOOTHED * basis(time, nu=SMOOTHED)
-    rows = [share[:, None] * basis(time), share[:, None] * smoothed]
+    scaled_derivative = smoothing**PENALIZED_ORDER * basis(time, nu=PENALIZED_ORDER)
+    rows = [root_weights[:, None] * basis(time), root_weights[:, None] * scaled_derivative]
     return np.asarray(np.linalg.qr(np.concatenate(rows), mode="r"), dtype=np.float64)
 
 
-def _least_distance(root: FloatArray, rows: FloatArray, low: FloatArray) -> FloatArray:
+def _least_distance(objective_factor: FloatArray, rows: FloatArray, lower_bounds: FloatArray) -> FloatArray:
     """Return the x that minimizes |root x| subject to rows x >= low."""
-    distance_rows = scipy.linalg.solve_triangular(root, rows.T, trans="T")  # rows of y = root x
-    problem = np.concatenate([distance_rows, low[None, :]])
-    target = np.append(np.zeros(len(root)), 1.0)
+    distance_rows = scipy.linalg.solve_triangular(objective_factor, rows.T, trans="T")  # rows of y = root x
+    dual_matrix = np.concatenate([distance_rows, lower_bounds[None, :]])
+    target = np.append(np.zeros(len(objective_factor)), 1.0)
     try:
-        multipliers, _ = scipy.optimize.nnls(problem, target)
+        multipliers, _ = scipy.optimize.nnls(dual_matrix, target)
     except RuntimeError as error:  # too many iterations
         raise NoSplineError from error
-    residual = problem @ multipliers - target
+    residual = dual_matrix @ multipliers - target
     if -residual[-1] < BOUND_ACCURACY:
         raise NoSplineError
-    return np.asarray(scipy.linalg.solve_triangular(root, residual[:-1] / -residual[-1]), dtype=np.float64)
+    return np.asarray(
+        scipy.linalg.solve_triangular(objective_factor, residual[:-1] / -residual[-1]), dtype=np.float64
+    )
 
 
-def peaks(missed: FloatArray) -> IndexArray:
+def peaks(violation: FloatArray) -> IndexArray:
     """Return the index of the worst instant of each stretch with violated bounds."""
-    padded = np.concatenate([[0.0], np.maximum(missed, 0), [0.0]])
+    padded = np.concatenate([[0.0], np.maximum(violation, 0), [0.0]])
     rising, falling = padded[1:-1] > padded[:-2], padded[1:-1] >= padded[2:]
-    return np.flatnonzero(rising & falling & (missed > 0))
+    return np.flatnonzero(rising & falling & (violation > 0))
 
 
 MARGIN_FACTORS = (1, 2, 4, 8)
@@ -216,7 +233,7 @@ MARGIN_FACTORS = (1, 2, 4, 8)
 SMOOTHING_FACTORS = (1, 2, 4, 8)
 """Multiples of the smoothing time to try then: torques grow with the second derivative."""
 
-MOST_CHANGES = 4
+MAX_CHANGES = 4
 """Changes to try one after the other between bounds that depend on the rates of the last one."""
 
 RATES_RESERVE = 1e-3
@@ -231,7 +248,7 @@ GRID_HALVINGS = 12
 RESONANCE_SHARE = 0.7
 """Smoothing time as a share of that of the resonance."""
 
-FEWEST_STEPS = 10
+MIN_SMOOTHING_INTERVALS = 10
 """Sampling intervals in a smoothing time, at least: samples resolve the second derivative."""
 
 CLEARANCE = 1e-6
@@ -282,15 +299,17 @@ def nearest_change(
         ImpossibleError: no change that was tried is accepted; the error has the reason.
     """
     _check_possible(acceptance, joint, load)
-    nearest, *others = product(MARGIN_FACTORS, SMOOTHING_FACTORS)
-    change = _change_with_margins(acceptance, joint, load, *nearest)
-    tried = [change]
+    first_factors, *other_factors = product(MARGIN_FACTORS, SMOOTHING_FACTORS)
+    change = _change_with_margins(acceptance, joint, load, *first_factors)
+    candidates = [change]
     with suppress(ImpossibleError):
-        tried.append(Change.constant(load.time, smallest_offset(acceptance, joint, judged(load))))
-    if not _accepted(acceptance, joint, load, change):
-        tried += [_change_with_margins(acceptance, joint, load, *factors) for factors in others]
-        tried += _changes_within_limits(acceptance, joint, load)
-    accepted = [each for each in tried if each is not None and _accepted(acceptance, joint, load, each)]
+        candidates.append(Change.constant(load.time, smallest_offset(acceptance, joint, judged(load))))
+    if not _is_accepted(acceptance, joint, load, change):
+        candidates += [_change_with_margins(acceptance, joint, load, *factors) for factors in other_factors]
+        candidates += _changes_within_limits(acceptance, joint, load)
+    accepted = [
+        each for each in candidates if each is not None and _is_accepted(acceptance, joint, load, each)
+    ]
     if not accepted:
         raise ImpossibleError(_refusal_reason(acceptance, joint, load, change))
     return min(accepted, key=lambda each: each.rms)
@@ -299,36 +318,42 @@ def nearest_change(
 def _check_possible(acceptance: Acceptance, joint: Joint, load: Load) -> None:
     """Raise ImpossibleError if no stiffness is admissible at some instant."""
     low, high = checked_range(acceptance, joint, load)
-    worst = int((low - high).argmax())
-    if low[worst] > high[worst]:
+    index = int((low - high).argmax())
+    if low[index] > high[index]:
         raise ImpossibleError(
-            f"{joint.name} needs a stiffness of at least {significant(low[worst], toward=math.inf)} at t = "
-            f"{load.time[worst]:.3f} s, but its limits of stiffness and deflection allow at most "
-            f"{significant(high[worst])} {units.STIFFNESS.unit(joint.type)}"
+            f"{joint.name} needs a stiffness of at least {significant(low[index], toward=math.inf)} at t = "
+            f"{load.time[index]:.3f} s, but its limits of stiffness and deflection allow at most "
+            f"{significant(high[index])} {units.STIFFNESS.unit(joint.type)}"
         )
 
 
 def _change_with_margins(
-    acceptance: Acceptance, joint: Joint, load: Load, margins: float, smoothings: float
+    acceptance: Acceptance, joint: Joint, load: Load, margin_factor: float, smoothing_factor: float
 ) -> Change | None:
     """Return the nearest change for multiples of margin and smoothing time; None if no spline is found."""
-    min_margin = margins * acceptance.min_margin
+    min_margin = margin_factor * acceptance.min_margin
     if min_margin >= 1:
         return None
-    return _change_within(admissible_stiffness(joint, load.command, min_margin), joint, load, smoothings)
+    return _change_within(
+        admissible_stiffness(joint, load.command, min_margin), joint, load, smoothing_factor
+    )
 
 
-def _change_within(admissible: Range, joint: Joint, load: Load, smoothings: float) -> Change | None:
+def _change_within(admissible: Range, joint: Joint, load: Load, smoothing_factor: float) -> Change | None:
     """Return the nearest change to a stiffness within a range; None if no spline is found."""
-    asked = load.command.commanded["stiffness"]
-    bounds = _narrowed(load.time, admissible.low - asked, admissible.high - asked)
+    commanded_stiffness = load.command.commanded["stiffness"]
+    bounds = _narrowed_bounds(
+        load.time, admissible.low - commanded_stiffness, admissible.high - commanded_stiffness
+    )
     if np.any(bounds.low > bounds.high):
         return None
     if not bounds.excluding_zero.any():
         return Change.constant(load.time, 0.0)
     try:
         # pieces end at samples: a file with derivatives at the samples then describes exactly this spline
-        spline = nearest_spline(bounds, smoothings * _smoothing_time(joint, load), load.time[load.steps])
+        spline = nearest_spline(
+            bounds, smoothing_factor * _smoothing_time(joint, load), load.time[load.steps]
+        )
     except NoSplineError:
         return None
     return Change(load.time, np.stack([spline(load.time, nu=order) for order in range(STIFFNESS.orders)]))
@@ -336,17 +361,17 @@ def _change_within(admissible: Range, joint: Joint, load: Load, smoothings: floa
 
 def _changes_within_limits(acceptance: Acceptance, joint: Joint, load: Load) -> Iterator[Change]:
     """Yield changes within the stiffness that each instant accepts at the rates of the change before."""
-    rates, reserved = (
+    rates, reserved_acceptance = (
         np.zeros((2, len(load.time))),
         replace(acceptance, reserve=acceptance.reserve + RATES_RESERVE),
     )
-    for _ in range(MOST_CHANGES):
-        admissible = _accepted_stiffness(reserved, joint, load, rates)
+    for _ in range(MAX_CHANGES):
+        admissible = _accepted_stiffness(reserved_acceptance, joint, load, rates)
         change = None if admissible is None else _change_within(admissible, joint, load, 1)
         if change is None:
             return
         yield change
-        if _accepted(acceptance, joint, load, change):
+        if _is_accepted(acceptance, joint, load, change):
             return
         rates = change.rows[1:]
 
@@ -363,52 +388,59 @@ def _accepted_stiffness(acceptance: Acceptance, joint: Joint, load: Load, rates:
         rates: addition to the first two derivatives of the stiffness, (2, instants).
     """
     instants = np.arange(len(load.time))
-    asked = load.command.commanded["stiffness"]
+    commanded_stiffness = load.command.commanded["stiffness"]
 
     def accepts(stiffness: FloatArray) -> BoolArray:
-        rows = (stiffness - asked).ravel(), *np.tile(rates, len(stiffness))
-        changed = load.at(np.tile(instants, len(stiffness))).changed(*rows)
+        additions = (stiffness - commanded_stiffness).ravel(), *np.tile(rates, len(stiffness))
+        changed = load.at(np.tile(instants, len(stiffness))).changed(*additions)
         return ~acceptance.refused_steps(joint, changed).reshape(stiffness.shape)
 
     low, high = admissible_stiffness(joint, load.command, acceptance.min_margin)
     shares = np.arange(GRID)[:, None] / GRID
-    grid = np.minimum(low + asked * shares / (1 - shares), high)
-    grid = np.sort(np.concatenate([grid, np.clip(asked, low, high)[None]]), axis=0)
-    accepted = accepts(grid)
-    if not accepted.any(axis=0).all():
+    grid = np.minimum(low + commanded_stiffness * shares / (1 - shares), high)
+    grid = np.sort(np.concatenate([grid, np.clip(commanded_stiffness, low, high)[None]]), axis=0)
+    accepted_mask = accepts(grid)
+    if not accepted_mask.any(axis=0).all():
         return None
-    nearest = np.where(accepted, np.abs(grid - asked), np.inf).argmin(axis=0)
-    rows = np.arange(len(grid))[:, None]
-    refused_below = np.where(~accepted & (rows < nearest), rows, -1).max(axis=0)
-    refused_above = np.where(~accepted & (rows > nearest), rows, len(grid)).min(axis=0)
-    inside = np.stack([grid[refused_below + 1, instants], grid[refused_above - 1, instants]])
-    outside = np.stack(
+    nearest_row = np.where(accepted_mask, np.abs(grid - commanded_stiffness), np.inf).argmin(axis=0)
+    row_indices = np.arange(len(grid))[:, None]
+    refused_below = np.where(~accepted_mask & (row_indices < nearest_row), row_indices, -1).max(axis=0)
+    refused_above = np.where(~accepted_mask & (row_indices > nearest_row), row_indices, len(grid)).min(axis=0)
+    accepted_ends = np.stack([grid[refused_below + 1, instants], grid[refused_above - 1, instants]])
+    refused_ends = np.stack(
         [grid[np.maximum(refused_below, 0), instants], grid[np.minimum(refused_above, GRID), instants]]
     )
     for _ in range(GRID_HALVINGS):
-        middle = (inside + outside) / 2
-        inside, outside = np.where(accepts(middle), (middle, outside), (inside, middle))
-    return Range(*inside)
+        middles = (accepted_ends + refused_ends) / 2
+        accepted_ends, refused_ends = np.where(
+            accepts(middles), (middles, refused_ends), (accepted_ends, middles)
+        )
+    return Range(*accepted_ends)
 
 
-def _narrowed(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
+def _narrowed_bounds(time: FloatArray, low: FloatArray, high: FloatArray) -> Bounds:
     """Return the bounds, narrowed by `CLEARANCE` where they are wide enough and else to their middle."""
     clearance = CLEARANCE * max(low.max(), -high.min(), 0.0)
     middle = (low + high) / 2
-    wide = high - low > 2 * clearance
-    return Bounds(time, np.where(wide, low + clearance, middle), np.where(wide, high - clearance, middle))
+    is_wide = high - low > 2 * clearance
+    return Bounds(
+        time, np.where(is_wide, low + clearance, middle), np.where(is_wide, high - clearance, middle)
+    )
 
 
 def _smoothing_time(joint: Joint, load: Load) -> float:
-    """Return `RESONANCE_SHARE` of sqrt(B/sigma), at least `FEWEST_STEPS` sampling intervals, s."""
+    """Return `RESONANCE_SHARE` of sqrt(B/sigma), at least `MIN_SMOOTHING_INTERVALS` sampling intervals, s."""
     # changes slower than this resonance require little inertial torque of the motors
     inertia = max(motor.inertia for motor in variable_stiffness_actuator(joint).motors)
     resonance = math.sqrt(inertia / float(load.command.commanded["stiffness"].min()))
-    step = float(np.median(np.diff(load.time[load.steps])))
-    return min(max(RESONANCE_SHARE * resonance, FEWEST_STEPS * step), float(load.time[-1] - load.time[0]))
+    sampling_interval = float(np.median(np.diff(load.time[load.steps])))
+    return min(
+        max(RESONANCE_SHARE * resonance, MIN_SMOOTHING_INTERVALS * sampling_interval),
+        float(load.time[-1] - load.time[0]),
+    )
 
 
-def _accepted(acceptance: Acceptance, joint: Joint, load: Load, change: Change | None) -> bool:
+def _is_accepted(acceptance: Acceptance, joint: Joint, load: Load, change: Change | None) -> bool:
     return change is not None and not acceptance.refused_steps(joint, load.changed(*change.rows)).any()
 
 

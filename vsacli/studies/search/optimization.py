@@ -33,19 +33,19 @@ from vsacli.studies.search.cheapest_stiffness import (
     cheapest_stiffness,
     check_timing_varies,
     checked_criterion,
-    chosen_joints,
-    falls_short,
+    joints_with_stiffness,
+    refused_times,
     varied_joints,
 )
 from vsacli.studies.search.combined import CombinedSearch
-from vsacli.studies.search.criteria import Criterion, Scale, asked_size, run_costs
+from vsacli.studies.search.criteria import Criterion, Scale, commanded_cost_scale, run_costs
 from vsacli.studies.search.loads import Ends, joint_loads
 from vsacli.studies.search.optimum import JointOptimum, Optimum, TimingOptimum, TotalCost
 from vsacli.studies.search.paced_motion import (
-    LOOKED_AT,
+    MIN_CHECK_INSTANTS,
     PacedJoint,
     PacedMotion,
-    instants_of,
+    checked_instants,
     path_at,
     retimed,
 )
@@ -96,17 +96,17 @@ def optimize(
     _refuse_limits_of_tools(robot)
     varied = varied_joints(robot, vary)
     warnings = (*robot.warnings, *trajectory.warnings)
-    what = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin, warnings=warnings)
-    what = replace(what, admissible=falls_short(what, trajectory) is None)
+    optimum = Optimum(robot, trajectory.name, minimize, "duration", vary, min_margin, warnings=warnings)
+    optimum = replace(optimum, admissible=refused_times(optimum, trajectory) is None)
     if minimize == TIME:
         check_timing_varies(vary)
-        return optimize_timing(what, trajectory, varied, seed, progress)
-    shared = vary in (TIMING, BOTH)
-    criterion = checked_criterion(robot, minimize, range(len(robot.joints)) if shared else varied)
-    what = replace(what, words=criterion.words)
-    if shared:
-        return cheapest_pace(what, trajectory, criterion, varied, seed, progress)
-    return cheapest_stiffness(what, trajectory, criterion, seed, progress)
+        return optimize_timing(optimum, trajectory, varied, seed, progress)
+    varies_timing = vary in (TIMING, BOTH)
+    criterion = checked_criterion(robot, minimize, range(len(robot.joints)) if varies_timing else varied)
+    optimum = replace(optimum, words=criterion.words)
+    if varies_timing:
+        return cheapest_pace(optimum, trajectory, criterion, varied, seed, progress)
+    return cheapest_stiffness(optimum, trajectory, criterion, seed, progress)
 
 
 def _refuse_limits_of_tools(robot: Robot) -> None:
@@ -126,56 +126,64 @@ def _refuse_limits_of_tools(robot: Robot) -> None:
 
 def searches(robot: Robot, minimize: str, vary: str) -> int:
     """Return the number of searches that an optimization is expected to report as progress."""
-    of_pace = SEARCHES * (vary in (TIMING, BOTH))
-    return of_pace + (0 if minimize == TIME or vary == TIMING else SEARCHES * len(chosen_joints(robot)))
+    timing_searches = SEARCHES * (vary in (TIMING, BOTH))
+    return timing_searches + (
+        0 if minimize == TIME or vary == TIMING else SEARCHES * len(joints_with_stiffness(robot))
+    )
 
 
-MOST_DIVIDED = 4 * LOOKED_AT
+MAX_REFINED_SAMPLES = 4 * MIN_CHECK_INSTANTS
 """Number of samples up to which the sampling of a result is refined."""
 
-ROOM = 0.02
+ADDED_MARGIN = 0.02
 """Additional margin with which the slow-down is found from which a search starts."""
 
 _Search = TypeVar("_Search", bound=PacedSearch)
 
 
 def optimize_timing(
-    what: Optimum, trajectory: Trajectory, varied: Sequence[int], seed: int, progress: Callable[[int], object]
+    optimum_so_far: Optimum,
+    trajectory: Trajectory,
+    varied: Sequence[int],
+    seed: int,
+    progress: Callable[[int], object],
 ) -> Optimum:
     """Return the fastest timing, with the stiffness of the joints `varied` (indices), confirmed by runs.
 
     If no slow-down makes the commanded stiffness feasible, the search starts from the smallest slow-down
     with constant changes of the stiffness.
     """
-    bar, ends = Countdown(progress, SEARCHES), _loads_at_ends(what, trajectory)
+    bar, ends = Countdown(progress, SEARCHES), _motion_ends(optimum_so_far, trajectory)
     try:
         try:
-            uniform, found, best = _fastest_timing(what, trajectory, ends, varied, seed, bar.count)
+            uniform, pacing, fastest = _fastest_timing(
+                optimum_so_far, trajectory, ends, varied, seed, bar.count
+            )
         except NoStartError:
             if not varied:
                 raise
             path = with_raised_stiffness(
-                trajectory, _smallest_confirmed_slow_down(what, trajectory).constants
+                trajectory, _smallest_confirmed_slow_down(optimum_so_far, trajectory).constants
             )
-            _, found, best = _fastest_timing(what, path, ends, varied, seed, bar.count)
+            _, pacing, fastest = _fastest_timing(optimum_so_far, path, ends, varied, seed, bar.count)
             uniform = math.nan
     except ImpossibleError as error:
-        return replace(what, reasons=error.reasons)
+        return replace(optimum_so_far, reasons=error.reasons)
     bar.finish()
     optimum = TimingOptimum(
         before=trajectory.duration,
         uniform=uniform,
-        after=best.duration,
-        found=found.found,
-        starts=found.starts,
-        agreeing=found.agreeing,
-        bounding=found.bounding,
+        after=fastest.duration,
+        found=pacing.found,
+        starts=pacing.starts,
+        agreeing=pacing.agreeing,
+        bounding=pacing.bounding,
     )
-    return replace(what, timing=optimum, trajectory=best, pace=found.pace(max(ends.periods, 1)))
+    return replace(optimum_so_far, timing=optimum, trajectory=fastest, pace=pacing.pace(max(ends.periods, 1)))
 
 
 def _fastest_timing(
-    what: Optimum,
+    optimum: Optimum,
     path: Trajectory,
     ends: Ends,
     varied: Sequence[int],
@@ -183,14 +191,14 @@ def _fastest_timing(
     progress: Callable[[], None],
 ) -> tuple[float, Pacing, Trajectory]:
     """Return the duration of the fastest uniform timing, the fastest timing, and the motion with it."""
-    search, found, best = _confirmed(
-        what, path, ends, lambda rule: TimingSearch(rule, path, ends, varied, seed, progress)
+    search, pacing, fastest = _search_until_confirmed(
+        optimum, path, ends, lambda rule: TimingSearch(rule, path, ends, varied, seed, progress)
     )
-    return search.uniform, found, best
+    return search.uniform, pacing, fastest
 
 
 def cheapest_pace(
-    what: Optimum,
+    optimum: Optimum,
     trajectory: Trajectory,
     criterion: Criterion,
     varied: Sequence[int],
@@ -204,7 +212,7 @@ def cheapest_pace(
     slow-down. If it lasts no longer than commanded, the search for least cost starts from it; otherwise the
     motion is slowed down by that factor.
     """
-    ends = _loads_at_ends(what, trajectory)
+    ends = _motion_ends(optimum, trajectory)
     criterion = type(criterion)(repeating=ends.periods > 0)
 
     def along(path: Trajectory, near: Pacing | None = None, slow_down: float = 1.0) -> Optimum:
@@ -212,72 +220,74 @@ def cheapest_pace(
 
         def search(rule: Acceptance) -> CheapestPaceSearch:
             duration = path.duration / max(ends.periods, 1)
-            motion = PacedMotion(what.robot, path, instants_of(path, duration, rule.between))
-            costed = _costed(rule, motion, criterion, _cost_scales(what, criterion, trajectory, path), varied)
+            motion = PacedMotion(optimum.robot, path, checked_instants(path, duration, rule.between))
+            costed = _joints_with_costs(
+                rule, motion, criterion, _cost_scales(optimum, criterion, trajectory, path), varied
+            )
             return CheapestPaceSearch(motion, costed, varied, ends, seed, bar.count, near)
 
-        _, found, best = _confirmed(what, path, ends, search)
+        _, pacing, cheapest = _search_until_confirmed(optimum, path, ends, search)
         bar.finish()
-        joints = _joint_costs(what.robot, criterion, found, trajectory, best)
+        joints = _joint_costs(optimum.robot, criterion, pacing, trajectory, cheapest)
         return replace(
-            what,
+            optimum,
             joints=joints,
             together=_total_cost(criterion, joints),
             slow_down=slow_down,
-            trajectory=best,
-            pace=_of_faster(found.pace(max(ends.periods, 1)), slow_down),
+            trajectory=cheapest,
+            pace=_pace_of_unchanged_path(pacing.pace(max(ends.periods, 1)), slow_down),
         )
 
     try:
         if not varied:
             return along(trajectory)
         stiffness = CheapestStiffness(
-            Acceptance(what.robot, what.min_margin), trajectory, criterion, seed, progress
+            Acceptance(optimum.robot, optimum.min_margin), trajectory, criterion, seed, progress
         )
         try:
-            return along(stiffness.confirmed(what).trajectory)
+            return along(stiffness.confirmed(optimum).trajectory)
         except ImpossibleError:
-            slower = _smallest_confirmed_slow_down(what, trajectory)
-        path = with_raised_stiffness(trajectory, slower.constants)
-        _, near, quickest = _fastest_timing(
-            what, path, ends, varied, seed, Countdown(progress, SEARCHES).count
+            slow_down_fix = _smallest_confirmed_slow_down(optimum, trajectory)
+        path = with_raised_stiffness(trajectory, slow_down_fix.constants)
+        _, near, fastest = _fastest_timing(
+            optimum, path, ends, varied, seed, Countdown(progress, SEARCHES).count
         )
-        if quickest.duration <= path.duration:
+        if fastest.duration <= path.duration:
             return along(path, near)
-        return along(path.stretched(slower.factor), slow_down=slower.factor)
+        return along(path.stretched(slow_down_fix.factor), slow_down=slow_down_fix.factor)
     except ImpossibleError as error:
-        return replace(what, reasons=error.reasons)
+        return replace(optimum, reasons=error.reasons)
 
 
-def _of_faster(pace: BSpline[np.float64], factor: float) -> BSpline[np.float64]:
+def _pace_of_unchanged_path(pace: BSpline[np.float64], factor: float) -> BSpline[np.float64]:
     """Return a pace along a slowed-down path as a pace along the unchanged path."""
     return pace if factor == 1 else type(pace)(pace.t / factor, factor * pace.c, pace.k)
 
 
-def _loads_at_ends(what: Optimum, trajectory: Trajectory) -> Ends:
-    return Ends.of(trajectory, joint_loads(what.robot, trajectory, list(range(len(what.robot.joints)))))
+def _motion_ends(optimum: Optimum, trajectory: Trajectory) -> Ends:
+    return Ends.of(trajectory, joint_loads(optimum.robot, trajectory, list(range(len(optimum.robot.joints)))))
 
 
-def _smallest_confirmed_slow_down(what: Optimum, trajectory: Trajectory) -> Combination:
+def _smallest_confirmed_slow_down(optimum: Optimum, trajectory: Trajectory) -> Combination:
     """Return the smallest slow-down at which constant stiffness changes keep every limit, and the changes.
 
     Raises:
         ImpossibleError: no slow-down was found.
     """
-    min_margin = what.min_margin + ROOM * (1 - what.min_margin)
-    found = CombinedSearch(Task(Acceptance(what.robot, min_margin), trajectory)).fastest()
-    if found is None:
+    min_margin = optimum.min_margin + ADDED_MARGIN * (1 - optimum.min_margin)
+    combination = CombinedSearch(Task(Acceptance(optimum.robot, min_margin), trajectory)).fastest()
+    if combination is None:
         raise ImpossibleError("no slow-down keeps every limit with any constant change of the stiffness")
-    return found
+    return combination
 
 
-def _confirmed(
-    what: Optimum, path: Trajectory, ends: Ends, search_by: Callable[[Acceptance], _Search]
+def _search_until_confirmed(
+    optimum: Optimum, path: Trajectory, ends: Ends, search_by: Callable[[Acceptance], _Search]
 ) -> tuple[_Search, Pacing, Trajectory]:
     """Search until a run of the result keeps every limit between its samples as well.
 
     Args:
-        what: optimum with robot and margin.
+        optimum: optimum with robot and margin.
         path: motion along the path, as commanded.
         ends: ends of the motion.
         search_by: function that makes a search from a rule, whose `between` are values of s on the path.
@@ -288,49 +298,55 @@ def _confirmed(
     Raises:
         ImpossibleError: nothing was found, or runs of all results fail between samples.
     """
-    count = max(ends.periods, 1)
+    period_count = max(ends.periods, 1)
 
     def attempt(rule: Acceptance) -> tuple[tuple[_Search, Pacing, Trajectory], FloatArray | None]:
         search = search_by(rule)
-        found = search.best()
-        best, short = _retime_and_check(what, path, found, count)
+        result = search.best()
+        best, short = _retime_and_check(optimum, path, result, period_count)
         if short is not None:
-            short = np.mod(path_at(short, found.pace(count), path.duration), path.duration / count)
-        return (search, found, best), short
+            short = np.mod(
+                path_at(short, result.pace(period_count), path.duration), path.duration / period_count
+            )
+        return (search, result, best), short
 
-    found, kept = Acceptance(what.robot, what.min_margin).confirmed(attempt)
-    if not kept:
+    result, is_confirmed = Acceptance(optimum.robot, optimum.min_margin).confirmed(attempt)
+    if not is_confirmed:
         raise ImpossibleError("a motion within all limits at some instants exceeds one between them")
-    return found
+    return result
 
 
 def _retime_and_check(
-    what: Optimum, path: Trajectory, found: Pacing, count: int
+    optimum: Optimum, path: Trajectory, pacing: Pacing, period_count: int
 ) -> tuple[Trajectory, FloatArray | None]:
     """Return the motion at a pace, and the instants at which a run of it fails, or None.
 
     Samples have the rate of the path, or a multiple if a file would not describe the motion between them.
     """
-    name = as_name(f"{what.asked}-{what.minimized}")
+    name = as_name(f"{optimum.asked}-{optimum.minimized}")
     parts = 1
     while True:
-        best = retimed(path, found.pace(count), found.stiffness(count), name, parts)
-        last = 2 * parts * path.samples > MOST_DIVIDED
-        if last or reads_back(best):
-            short = falls_short(what, best)
-            if last or short is None:
-                return best, short
+        retimed_motion = retimed(path, pacing.pace(period_count), pacing.stiffness(period_count), name, parts)
+        is_last = 2 * parts * path.samples > MAX_REFINED_SAMPLES
+        if is_last or reads_back(retimed_motion):
+            refused_instants = refused_times(optimum, retimed_motion)
+            if is_last or refused_instants is None:
+                return retimed_motion, refused_instants
         parts *= 2
 
 
-def _costed(
-    rule: Acceptance, motion: PacedMotion, criterion: Criterion, sizes: Sequence[float], varied: Sequence[int]
+def _joints_with_costs(
+    rule: Acceptance,
+    motion: PacedMotion,
+    criterion: Criterion,
+    cost_scales: Sequence[float],
+    varied: Sequence[int],
 ) -> list[PacedJoint]:
-    """Return the joints with their shares of the cost, which is about 1 for the motion of `sizes`."""
+    """Return the joints with their shares of the cost, which is about 1 for the motion of `cost_scales`."""
     if criterion.relative:
-        share = 1 / len(sizes)
+        share = 1 / len(cost_scales)
     else:
-        share, sizes = 1.0, [math.fsum(sizes)] * len(sizes)
+        share, cost_scales = 1.0, [math.fsum(cost_scales)] * len(cost_scales)
     duration = float(motion.s[-1])
     return [
         PacedJoint(
@@ -343,37 +359,37 @@ def _costed(
             rule.reserve,
             varied=index in varied,
         )
-        for index, size in enumerate(sizes)
+        for index, size in enumerate(cost_scales)
     ]
 
 
-def _cost_scales(what: Optimum, criterion: Criterion, *motions: Trajectory) -> list[float]:
+def _cost_scales(optimum: Optimum, criterion: Criterion, *motions: Trajectory) -> list[float]:
     """Return the scale of each joint's cost, from the first motion along which it is finite."""
-    sizes = np.full(len(what.robot.joints), np.nan)
+    cost_scales = np.full(len(optimum.robot.joints), np.nan)
     for motion in motions:
-        loads = joint_loads(what.robot, motion, list(range(len(sizes))))
-        pairs = zip(what.robot.joints, loads, strict=True)
-        found = np.array([asked_size(joint, load, criterion) for joint, load in pairs])
-        sizes = np.where(np.isfinite(sizes), sizes, found)
-    return [size if math.isfinite(size) and size > 0 else 1.0 for size in sizes.tolist()]
+        loads = joint_loads(optimum.robot, motion, list(range(len(cost_scales))))
+        pairs = zip(optimum.robot.joints, loads, strict=True)
+        motion_scales = np.array([commanded_cost_scale(joint, load, criterion) for joint, load in pairs])
+        cost_scales = np.where(np.isfinite(cost_scales), cost_scales, motion_scales)
+    return [size if math.isfinite(size) and size > 0 else 1.0 for size in cost_scales.tolist()]
 
 
 def _joint_costs(
-    robot: Robot, criterion: Criterion, found: Pacing, asked: Trajectory, best: Trajectory
+    robot: Robot, criterion: Criterion, pacing: Pacing, commanded: Trajectory, optimized: Trajectory
 ) -> dict[str, JointOptimum]:
     """Return the costs of each joint before and after, by name."""
     criteria = dict.fromkeys(range(len(robot.joints)), criterion)
-    before, after = (run_costs(robot, each, criteria) for each in (asked, best))
+    costs_before, costs_after = (run_costs(robot, each, criteria) for each in (commanded, optimized))
     return {
         joint.name: JointOptimum(
-            before=before[index],
+            before=costs_before[index],
             constant=math.nan,
-            after=after[index],
+            after=costs_after[index],
             unit=criterion.quantity.unit(joint.type),
-            found=found.found,
-            starts=found.starts,
-            agreeing=found.agreeing,
-            bounding=found.bounding.get(joint.name, {}),
+            found=pacing.found,
+            starts=pacing.starts,
+            agreeing=pacing.agreeing,
+            bounding=pacing.bounding.get(joint.name, {}),
         )
         for index, joint in enumerate(robot.joints)
     }
@@ -386,6 +402,6 @@ def _total_cost(criterion: Criterion, joints: Mapping[str, JointOptimum]) -> Tot
             for when in ("before", "after")
         )
         return TotalCost(before, after, ENERGY.unit("revolute"))
-    shares = [each.after / each.before if each.before else 1.0 for each in joints.values()]
-    after = criterion.together(shares)
+    ratios = [each.after / each.before if each.before else 1.0 for each in joints.values()]
+    after = criterion.together(ratios)
     return TotalCost(math.nan if math.isnan(after) else 1.0, after, "")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 VARIED = {"stiffness": "stiffness", "timing": "timing", "both": "timing and stiffness"}
 """Varied quantities in words."""
 
-FULL = 0.995
+MIN_FULL_SHARE = 0.995
 """Share of the time or path from which on the text says "all"."""
 
 
@@ -98,14 +98,19 @@ class TimingOptimum(Published):
             "local optimum": self.after,
         }
         header = ("timing", "duration\ns", "change\n%")
-        known = {words: value for words, value in durations.items() if not math.isnan(value)}
-        rows = [(words, f"{value:.4g}", _change_text(self.before, value)) for words, value in known.items()]
+        finite_durations = {words: value for words, value in durations.items() if not math.isnan(value)}
+        rows = [
+            (words, f"{value:.4g}", _change_text(self.before, value))
+            for words, value in finite_durations.items()
+        ]
         return [header, *rows]
 
     def lines(self) -> Iterator[str]:
         """Yield how it was found, and the active bounds of each joint."""
         yield _search_text(self)
-        yield from (f"{name}: {_along(shares, 'path')}" for name, shares in self.bounding.items())
+        yield from (
+            f"{name}: {_active_bounds_clause(shares, 'path')}" for name, shares in self.bounding.items()
+        )
 
 
 @dataclass(frozen=True)
@@ -179,10 +184,10 @@ class Optimum(Published, TextReport):
     @property
     def title(self) -> str:
         """Names, the objective, and what was gained."""
-        what = f"{self.words} by {VARIED[self.varied]}"
-        return f"{self.robot_name}, {self.asked}: {what}: {self._gain()}"
+        objective = f"{self.words} by {VARIED[self.varied]}"
+        return f"{self.robot_name}, {self.asked}: {objective}: {self._gain_text()}"
 
-    def _gain(self) -> str:
+    def _gain_text(self) -> str:
         """Return cost before and after with the change; of several joints, the range of changes."""
         if self.trajectory is None:
             return "nothing feasible was found"
@@ -196,11 +201,16 @@ class Optimum(Published, TextReport):
         if len(self.joints) == 1:
             [only] = self.joints.values()
             return _cost_text(only.before, only.after, only.unit)
-        known = {name: each for name, each in self.joints.items() if each.before > 0}
-        if not known:
+        feasible_optima = {name: each for name, each in self.joints.items() if each.before > 0}
+        if not feasible_optima:
             return "feasible, which it is not as commanded"
-        order = sorted(known, key=lambda name: known[name].after / known[name].before)
-        changes = [f"{_change_text(known[name].before, known[name].after)} % ({name})" for name in order]
+        joint_names = sorted(
+            feasible_optima, key=lambda name: feasible_optima[name].after / feasible_optima[name].before
+        )
+        changes = [
+            f"{_change_text(feasible_optima[name].before, feasible_optima[name].after)} % ({name})"
+            for name in joint_names
+        ]
         return " to ".join(dict.fromkeys((changes[0], changes[-1])))
 
     def as_text(self) -> ReportText:
@@ -212,35 +222,39 @@ class Optimum(Published, TextReport):
             return ReportText(self.title, [*self.reasons, *warnings])
         if self.timing is not None:
             return ReportText(self.title, warnings, [self.timing.rows()], list(self.timing.lines()))
-        slowed = (
+        slow_down_sentence = (
             f"slowed down by a factor {self.slow_down:.4g} to {self.trajectory.duration:.4g} s: no feasible "
             "timing of the commanded duration was found"
         )
-        whole = "time" if self.together is None else "path"
+        path_or_time = "time" if self.together is None else "path"
         lines = [
-            f"{name}: {_along(each.bounding, whole)}; {_search_text(each)}"
+            f"{name}: {_active_bounds_clause(each.bounding, path_or_time)}; {_search_text(each)}"
             for name, each in self.joints.items()
         ]
-        found = [*([slowed] if self.slow_down != 1 else []), *warnings]
-        return ReportText(self.title, found, [self._rows()], lines)
+        findings = [*([slow_down_sentence] if self.slow_down != 1 else []), *warnings]
+        return ReportText(self.title, findings, [self._rows()], lines)
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Return the table of costs, the total last."""
         costs: dict[str, JointOptimum | TotalCost] = dict(self.joints)
-        constants = self.together is None
+        has_constants = self.together is None
         if self.together is not None:
             costs["together" if self.together.unit else "together, relative"] = self.together
         units = in_header(each.unit for each in costs.values() if each.unit)
-        names = ("as commanded", *(["best constant"] if constants else []), "local optimum")
+        names = ("as commanded", *(["best constant"] if has_constants else []), "local optimum")
         rows = [("joint", *(f"{name}\n{units}".rstrip() for name in names), "change\n%")]
         for name, each in costs.items():
-            constant = [_cost(each.constant)] if constants and isinstance(each, JointOptimum) else []
-            change = _change_text(each.before, each.after)
-            rows.append((name, _cost(each.before), *constant, _cost(each.after), change))
+            constant_cells = (
+                [_format_cost(each.constant)] if has_constants and isinstance(each, JointOptimum) else []
+            )
+            change_text = _change_text(each.before, each.after)
+            rows.append(
+                (name, _format_cost(each.before), *constant_cells, _format_cost(each.after), change_text)
+            )
         return rows
 
 
-def _cost(cost: float) -> str:
+def _format_cost(cost: float) -> str:
     return "-" if math.isnan(cost) else f"{cost:.4g}"
 
 
@@ -253,22 +267,22 @@ def _change_text(before: float, after: float) -> str:
 
 def _cost_text(before: float, after: float, unit: str) -> str:
     """Return a cost before and after with its change; only the latter if the former is infeasible."""
-    found = f"{_cost(after)} {unit}".rstrip()
+    final_cost = f"{_format_cost(after)} {unit}".rstrip()
     if math.isnan(before):
-        return f"{found} (infeasible as commanded)"
+        return f"{final_cost} (infeasible as commanded)"
     change = _change_text(before, after)
-    return f"{_cost(before)} to {found}" + ("" if change == "-" else f" ({change} %)")
+    return f"{_format_cost(before)} to {final_cost}" + ("" if change == "-" else f" ({change} %)")
 
 
-def _along(bounding: Mapping[str, float], whole: str) -> str:
+def _active_bounds_clause(bounding: Mapping[str, float], path_or_time: str) -> str:
     """Return a clause with the active bounds and their shares."""
-    along = [
-        f"{name} {'all' if share > FULL else f'{100 * share:.2g} %'} of the {whole}"
+    clauses = [
+        f"{name} {'all' if share > MIN_FULL_SHARE else f'{100 * share:.2g} %'} of the {path_or_time}"
         for name, share in bounding.items()
     ]
-    return f"active bounds: {', '.join(along) or 'none'}"
+    return f"active bounds: {', '.join(clauses) or 'none'}"
 
 
 def _search_text(optimum: JointOptimum | TimingOptimum) -> str:
-    ended = "local optimum" if optimum.found else "no local optimum: the search ended before"
-    return f"{ended}; reached from {optimum.agreeing} of {counted(optimum.starts, 'start')}"
+    outcome = "local optimum" if optimum.found else "no local optimum: the search ended before"
+    return f"{outcome}; reached from {optimum.agreeing} of {counted(optimum.starts, 'start')}"

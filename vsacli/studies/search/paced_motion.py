@@ -27,9 +27,9 @@ from vsacli.studies.search.criteria import (
     Scale,
     limit_bounds,
     limit_names,
-    made_to_carry,
+    with_seeded_stiffness,
 )
-from vsacli.studies.search.loads import AT_REST
+from vsacli.studies.search.loads import REST_SPEED_SHARE
 from vsacli.studies.search.path_commands import PathCommands, Row, Speeds
 from vsacli.trajectory.recorded.hermite import HermiteSpline
 from vsacli.trajectory.times import RecordedTimes
@@ -38,7 +38,7 @@ from vsacli.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
-LOOKED_AT = 4000
+MIN_CHECK_INSTANTS = 4000
 """Largest number of evenly spaced instants at which bounds are checked."""
 
 FEWEST_LOOKED_AT = 1000
@@ -67,7 +67,7 @@ class PacedMotion:
         self.robot, self.s = robot, s
         motion = trajectory.at(trajectory.start + s)
         self._path = PathCommands(robot, motion)
-        self._known: tuple[bytes, list[Command]] | None = None
+        self._latest_commands: tuple[bytes, list[Command]] | None = None
 
     def commands(self, pace: Sequence[Row], instants: IndexArray) -> list[Command]:
         """Return the command of each joint, with link torques, for a pace with its derivatives.
@@ -77,30 +77,32 @@ class PacedMotion:
         """
         values = np.stack([*(value_of(row) for row in pace), instants])
         key = values.tobytes() + type(pace[0]).__name__.encode()
-        if self._known is None or self._known[0] != key:
-            self._known = key, self._path.at(Speeds.of(pace), instants)
-        return self._known[1]
+        if self._latest_commands is None or self._latest_commands[0] != key:
+            self._latest_commands = key, self._path.at(Speeds.of(pace), instants)
+        return self._latest_commands[1]
 
     @property
     def resting(self) -> BoolArray:
         """Mask of the inner instants at which all joints rest, also at both neighbors, (instants,)."""
-        still: BoolArray = np.all(
+        is_at_rest: BoolArray = np.all(
             [
-                np.abs(row) <= AT_REST * np.abs(row).max()
+                np.abs(row) <= REST_SPEED_SHARE * np.abs(row).max()
                 for name in POSITION.names[1:]
                 for row in self._path.by_s[name]
             ],
             axis=0,
         )
-        inner = (self.s > 0) & (self.s < self.s[-1])
-        return np.asarray(still & np.roll(still, 1) & np.roll(still, -1) & inner)
+        is_inner = (self.s > 0) & (self.s < self.s[-1])
+        return np.asarray(is_at_rest & np.roll(is_at_rest, 1) & np.roll(is_at_rest, -1) & is_inner)
 
     def stiffness(self, joint: int) -> FloatArray:
         """Return the commanded stiffness of a joint, (instants,)."""
         return np.asarray(self._path.by_s[STIFFNESS.key][joint])
 
 
-def instants_of(trajectory: Trajectory, duration: float, further: FloatArray = NOTHING) -> FloatArray:
+def checked_instants(
+    trajectory: Trajectory, duration: float, further_instants: FloatArray = NOTHING
+) -> FloatArray:
     """Return the path coordinates s at which bounds are checked: even, and ever denser towards both ends.
 
     Near a start from rest, a high pace can violate a bound before the motion has moved noticeably.
@@ -108,21 +110,25 @@ def instants_of(trajectory: Trajectory, duration: float, further: FloatArray = N
     Args:
         trajectory: trajectory that defines the path.
         duration: length of the checked part of the path, s.
-        further: coordinates to include, s.
+        further_instants: coordinates to include, s.
     """
-    even = np.linspace(0.0, 1.0, min(max(2 * trajectory.samples - 1, FEWEST_LOOKED_AT), LOOKED_AT))
-    towards = np.geomspace(*TOWARDS_END)
-    return np.union1d(duration * np.unique(np.concatenate([even, towards, 1 - towards])), further)
+    even_shares = np.linspace(
+        0.0, 1.0, min(max(2 * trajectory.samples - 1, FEWEST_LOOKED_AT), MIN_CHECK_INSTANTS)
+    )
+    end_shares = np.geomspace(*TOWARDS_END)
+    return np.union1d(
+        duration * np.unique(np.concatenate([even_shares, end_shares, 1 - end_shares])), further_instants
+    )
 
 
 CLEARANCE = 1e-4
 """Relative distance from each bound at the checked instants, as an allowance for the time between them: with
 4000 instants, the motor of a hardening spring exceeded its limit by 2e-5 between them."""
 
-FASTEST = 0.02
+MIN_PACE = 0.02
 """Smallest pace, fifty times as fast as commanded; beyond that, wrong units are more likely."""
 
-NOT_OF_THE_PACE = ("q", "damping")
+INDEPENDENT_VARIABLES = ("q", "damping")
 """Limited variables that do not depend on the pace."""
 
 
@@ -135,18 +141,18 @@ class Pace:
     """
 
     def __init__(self, held: BoolArray, duration: float) -> None:
-        self._held, self._duration = held, duration
+        self._is_paused, self._duration = held, duration
 
     def __call__(
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
         """Return the integrand of the time, and the bound on the pace; see `Functions`."""
-        return [rows[0] / self._duration], [least_pace(self._held)[instants] - rows[0]]
+        return [rows[0] / self._duration], [min_pace(self._is_paused)[instants] - rows[0]]
 
 
-def least_pace(held: BoolArray) -> FloatArray:
+def min_pace(held: BoolArray) -> FloatArray:
     """Return the lower bound of the pace, (instants,): the commanded pace where the motion pauses."""
-    return np.where(held, 1.0, FASTEST)
+    return np.where(held, 1.0, MIN_PACE)
 
 
 class PacedJoint:
@@ -187,19 +193,19 @@ class PacedJoint:
         self._clearance = CLEARANCE + reserve
         self._joint = motion.robot.joints[index]
         self.name = self._joint.name
-        self._carrying = (
-            made_to_carry(self._joint, PACE_ORDERS + STIFFNESS.orders * varied, moving_corridor=True)
+        self._seeded_joint = (
+            with_seeded_stiffness(self._joint, PACE_ORDERS + STIFFNESS.orders * varied, moving_corridor=True)
             if self._joint.actuator.sprung
             else with_copied_actuator(self._joint)
         )
-        fixed = NOT_OF_THE_PACE if varied else (*NOT_OF_THE_PACE, STIFFNESS.key)
-        self._checks = [check for check in limit_checks(self._joint) if check.variable not in fixed]
-        self._chosen = STIFFNESS.key in self._joint.actuator.commanded
+        fixed_variables = INDEPENDENT_VARIABLES if varied else (*INDEPENDENT_VARIABLES, STIFFNESS.key)
+        self._checks = [check for check in limit_checks(self._joint) if check.variable not in fixed_variables]
+        self._has_stiffness = STIFFNESS.key in self._joint.actuator.commanded
 
     @property
     def bound_names(self) -> list[str]:
         """Names of the first bounds; the bounds after these belong to levels."""
-        return [*(ENDS_OF_CORRIDOR if self._chosen else ()), *limit_names(self._checks)]
+        return [*(ENDS_OF_CORRIDOR if self._has_stiffness else ()), *limit_names(self._checks)]
 
     @property
     def bound_count(self) -> int:
@@ -214,38 +220,44 @@ class PacedJoint:
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
         """Return the integrands of the cost over the path, and the bounds; see `Functions`."""
-        behind = len(rows) - self.criterion.levels
-        pace, stiffness, level = list(rows[:PACE_ORDERS]), list(rows[PACE_ORDERS:behind]), rows[behind:]
+        level_start = len(rows) - self.criterion.levels
+        pace, stiffness, level = (
+            list(rows[:PACE_ORDERS]),
+            list(rows[PACE_ORDERS:level_start]),
+            rows[level_start:],
+        )
         with np.errstate(all="ignore"):  # a step of the search may leave the attainable range
             command = self._motion.commands(pace, instants)[self._index]
             if len(stiffness):
                 rates = Speeds.of(pace).rates(stiffness)
-                asked = dict(zip(STIFFNESS.names, rates, strict=True))
-                command = command._replace(commanded={**command.commanded, **asked})
-            joint = self._carrying if isinstance(pace[0], Dual) else self._joint
-            driven = drive_without_limits(joint, command, self._min_margin)
-            excess = limit_bounds(self._checks, driven.by_name(), self._clearance)
-            bounds = [*self._corridor(driven), *excess]
-            costed = (self._joint, driven, level[0] if len(level) else None, self.scale)
-            integrands = list(self.criterion.integrands(*costed))
+                stiffness_commands = dict(zip(STIFFNESS.names, rates, strict=True))
+                command = command._replace(commanded={**command.commanded, **stiffness_commands})
+            joint = self._seeded_joint if isinstance(pace[0], Dual) else self._joint
+            drive_variables = drive_without_limits(joint, command, self._min_margin)
+            excess = limit_bounds(self._checks, drive_variables.by_name(), self._clearance)
+            bounds = [*self._attainable_range_bounds(drive_variables), *excess]
+            cost_arguments = (self._joint, drive_variables, level[0] if len(level) else None, self.scale)
+            integrands = list(self.criterion.integrands(*cost_arguments))
             for index in self.criterion.over_time:  # dt = pace ds
                 integrands[index] = integrands[index] * pace[0]
-        return integrands, [*bounds, *self.criterion.bounds(*costed)]
+        return integrands, [*bounds, *self.criterion.bounds(*cost_arguments)]
 
-    def _corridor(self, driven: JointVariables) -> Iterator[Any]:
-        if self._chosen:
+    def _attainable_range_bounds(self, drive_variables: JointVariables) -> Iterator[Any]:
+        if self._has_stiffness:
             min_margin = self._min_margin
-            yield driven.stiffness_min / ((1 - min_margin) * driven.stiffness) - 1 + CLEARANCE
-            unbounded = np.isinf(driven.stiffness_max)
-            required = (1 + min_margin) * driven.stiffness
-            upper = np.where(unbounded, 1.0, driven.stiffness_max) / required
-            yield np.where(unbounded, -1.0, 1 + CLEARANCE - upper)
+            yield (
+                drive_variables.stiffness_min / ((1 - min_margin) * drive_variables.stiffness) - 1 + CLEARANCE
+            )
+            is_unbounded = np.isinf(drive_variables.stiffness_max)
+            required = (1 + min_margin) * drive_variables.stiffness
+            relative_max = np.where(is_unbounded, 1.0, drive_variables.stiffness_max) / required
+            yield np.where(is_unbounded, -1.0, 1 + CLEARANCE - relative_max)
 
 
 NEWTON_STEPS = 6
 """Newton steps that find s at a time down to rounding, from a linear interpolation."""
 
-FIRST_LOOK = 4000
+GRID_POINTS = 4000
 """Points of that interpolation."""
 
 
@@ -254,7 +266,7 @@ def retimed(
     pace: BSpline[np.float64],
     stiffness: Mapping[int, BSpline[np.float64]],
     name: str,
-    refined: int = 1,
+    refinement: int = 1,
 ) -> Trajectory:
     """Return the motion along the path of a trajectory at a pace dt/ds, at about the same sample rate.
 
@@ -263,12 +275,12 @@ def retimed(
         pace: pace as a function of s.
         stiffness: new stiffness as a function of s, by joint index.
         name: name of the result.
-        refined: factor by which the sample rate is increased.
+        refinement: factor by which the sample rate is increased.
     """
     elapsed = pace.antiderivative()
     duration = float(elapsed(trajectory.duration) - elapsed(0.0))
     rate = (trajectory.samples - 1) / trajectory.duration
-    time = np.linspace(0.0, duration, refined * max(1, round(duration * rate)) + 1)
+    time = np.linspace(0.0, duration, refinement * max(1, round(duration * rate)) + 1)
     s = path_at(time, pace, trajectory.duration)
     speeds = Speeds.of([pace(s, nu=order) for order in range(PACE_ORDERS)])
     motion = trajectory.at(trajectory.start + s)
@@ -291,8 +303,8 @@ def retimed(
 def path_at(time: FloatArray, pace: BSpline[np.float64], end: float) -> FloatArray:
     """Return s at times since the start, (samples,), by Newton's method."""
     elapsed = pace.antiderivative()
-    known = np.linspace(0.0, end, FIRST_LOOK)
-    s = np.interp(time, elapsed(known) - elapsed(0.0), known)
+    grid = np.linspace(0.0, end, GRID_POINTS)
+    s = np.interp(time, elapsed(grid) - elapsed(0.0), grid)
     for _ in range(NEWTON_STEPS):
         s = np.clip(s - (elapsed(s) - elapsed(0.0) - time) / pace(s), 0.0, end)
     return s

@@ -26,23 +26,23 @@ from vsacli.studies.search.paced_motion import (
     PacedJoint,
     PacedMotion,
 )
-from vsacli.studies.search.separable import Group, SeparableProblem, interior, missed_instants
-from vsacli.studies.search.splines import PacedSpaces, Pacing, of_rows
+from vsacli.studies.search.separable import Group, SeparableProblem, interior, violated_instants
+from vsacli.studies.search.splines import PacedSpaces, Pacing, group_of_rows
 
 INSTANTS_PER_PIECE = 12
 """Smallest number of instants per piece at which bounds are kept."""
 
-MOST_ROUNDS = 12
+MAX_ROUNDS = 12
 """Limit on rounds that add instants of violated bounds: a motion with two dwells, bounded only by the ends of
 its attainable ranges, required seven."""
 
-WORTH_COMPLETING = 1e-4
+MIN_COST_ADVANTAGE = 1e-4
 """Share of the best cost by which a start must be lower while bounds are kept at some instants only."""
 
-ACTIVE = 1e-2
+ACTIVE_TOLERANCE = 1e-2
 """Relative distance from a bound below which it is active; barriers keep a motion a thousandth away."""
 
-DRAWN, LEVELS = 2, 6
+RANDOM_PACES, LEVELS = 2, 6
 """Number of random paces among the starts, and of the random levels that each of them interpolates."""
 
 Start = tuple[FloatArray, FloatArray | None]
@@ -119,42 +119,45 @@ class PacedSearch(ABC):
         Raises:
             ImpossibleError: nothing was found.
         """
-        pieces, *further = self.pieces
+        pieces, *finer_pieces = self.pieces
         spaces = self._spaces(pieces)
         starts = self._starts(spaces)
-        best, agreeing = self._best_of(spaces, self._instants(pieces), starts)
-        for pieces in further:
+        best, agreeing = self._best_minimum(spaces, self._instants(pieces), starts)
+        for pieces in finer_pieces:
             finer = self._spaces(pieces)
             start = self._refined_start(finer, self._rows(spaces, best))
             try:
-                refined, _ = self._best_of(finer, self._instants(pieces), [start])
+                refined, _ = self._best_minimum(finer, self._instants(pieces), [start])
             except ImpossibleError:
                 break
             if refined.cost > best.cost:
                 break
-            gained, spaces, best = best.cost - refined.cost, finer, refined
-            if gained <= self.worth * abs(best.cost):
+            cost_decrease, spaces, best = best.cost - refined.cost, finer, refined
+            if cost_decrease <= self.worth * abs(best.cost):
                 break
         return self._pacing(spaces, best, len(starts), agreeing)
 
-    def _rows(self, spaces: PacedSpaces, found: Minimum) -> dict[int | None, FloatArray]:
+    def _rows(self, spaces: PacedSpaces, minimum: Minimum) -> dict[int | None, FloatArray]:
         """Return the pace (key None) and the stiffness of joints (key: index) at every instant."""
         return {
-            key: space.offset + space.basis(self._s, 1)[0] @ found.unknowns[own]
-            for key, (space, own) in spaces.parts().items()
+            key: space.offset + space.basis(self._s, 1)[0] @ minimum.unknowns[unknown_indices]
+            for key, (space, unknown_indices) in spaces.parts().items()
         }
 
-    def _drawn(self, least: float, most: float) -> list[FloatArray]:
+    def _random_paces(self, min_pace: float, max_pace: float) -> list[FloatArray]:
         """Return random paces between two values, each (instants,)."""
         generator = np.random.default_rng(self._seed)
-        places = np.linspace(*self._span, LEVELS)
-        return [np.interp(self._s, places, generator.uniform(least, most, LEVELS)) for _ in range(DRAWN)]
+        level_instants = np.linspace(*self._span, LEVELS)
+        return [
+            np.interp(self._s, level_instants, generator.uniform(min_pace, max_pace, LEVELS))
+            for _ in range(RANDOM_PACES)
+        ]
 
     def _instants(self, pieces: int) -> IndexArray:
         """Return the instants at which bounds of splines with this many pieces are kept at first."""
         return evenly(len(self._s), INSTANTS_PER_PIECE * pieces + 1)
 
-    def _best_of(
+    def _best_minimum(
         self, spaces: PacedSpaces, instants: IndexArray, starts: Sequence[Start]
     ) -> tuple[Minimum, int]:
         """Return the best minimum that keeps all bounds, and the number of starts that reached it.
@@ -166,38 +169,44 @@ class PacedSearch(ABC):
             ImpossibleError: no start led to any.
         """
         problem, best = SeparableProblem(self._groups(spaces, instants)), None
-        begun = [(interior(problem, wanted, inside), inside) for wanted, inside in starts]
-        inner = [(unknowns, inside) for unknowns, inside in begun if unknowns is not None]
-        roughly = self._minima(problem, [unknowns for unknowns, _ in inner], FIRST_GAP) if inner else []
+        starts_inside = [(interior(problem, wanted, inside), inside) for wanted, inside in starts]
+        valid_starts = [(unknowns, inside) for unknowns, inside in starts_inside if unknowns is not None]
+        minima = (
+            self._minima(problem, [unknowns for unknowns, _ in valid_starts], FIRST_GAP)
+            if valid_starts
+            else []
+        )
         self._progress()
-        pairs = zip(roughly, (inside for _, inside in inner), strict=True)
-        for rough, inside in sorted(pairs, key=lambda pair: pair[0].cost):
-            if best is not None and rough.cost > best[0].cost - WORTH_COMPLETING * abs(best[0].cost):
+        pairs = zip(minima, (inside for _, inside in valid_starts), strict=True)
+        for minimum, inside in sorted(pairs, key=lambda pair: pair[0].cost):
+            if best is not None and minimum.cost > best[0].cost - MIN_COST_ADVANTAGE * abs(best[0].cost):
                 break
-            kept = self._completed(spaces, instants, rough, inside)
-            if kept is not None and (best is None or kept.cost < best[0].cost):
-                best = kept, rough.cost
+            full_minimum = self._full_minimum(spaces, instants, minimum, inside)
+            if full_minimum is not None and (best is None or full_minimum.cost < best[0].cost):
+                best = full_minimum, minimum.cost
         if best is None:
             raise ImpossibleError(self.nothing_kept)
-        found, least = best
-        return found, sum(each.cost <= least + self.same_cost * abs(least) for each in roughly)
+        best_minimum, rough_cost = best
+        return best_minimum, sum(
+            each.cost <= rough_cost + self.same_cost * abs(rough_cost) for each in minima
+        )
 
-    def _completed(
-        self, spaces: PacedSpaces, instants: IndexArray, found: Minimum, inside: FloatArray | None
+    def _full_minimum(
+        self, spaces: PacedSpaces, instants: IndexArray, minimum: Minimum, interior_point: FloatArray | None
     ) -> Minimum | None:
         """Return a minimum after adding the instants at which it violates bounds, or None."""
-        every = self._groups(spaces, np.arange(len(self._s)))
-        for _ in range(MOST_ROUNDS):
-            kept = self._accepted(spaces, every, found)
-            if kept is not None:
-                return kept
-            bounds = np.concatenate([group.bounds(group.rows(found.unknowns)) for group in every])
-            instants = np.union1d(instants, missed_instants(bounds - CLEARANCE / 2))
+        full_groups = self._groups(spaces, np.arange(len(self._s)))
+        for _ in range(MAX_ROUNDS):
+            accepted = self._accepted(spaces, full_groups, minimum)
+            if accepted is not None:
+                return accepted
+            bounds = np.concatenate([group.bounds(group.rows(minimum.unknowns)) for group in full_groups])
+            instants = np.union1d(instants, violated_instants(bounds - CLEARANCE / 2))
             problem = SeparableProblem(self._groups(spaces, instants))
-            begun = interior(problem, found.unknowns, inside)
-            if begun is None:
+            interior_start = interior(problem, minimum.unknowns, interior_point)
+            if interior_start is None:
                 return None
-            (found,) = self._minima(problem, [begun], WARM_GAP)
+            (minimum,) = self._minima(problem, [interior_start], WARM_GAP)
             self._progress()
         return None
 
@@ -205,48 +214,55 @@ class PacedSearch(ABC):
         """Return the groups of the problem at some instants: the pace alone, and each joint."""
         s = self._s[instants]
         pace = spaces.rows(None, s, PACE_ORDERS)
-        of_pace = Pace(self._motion.resting, self._scale)
-        groups = [of_rows(of_pace, instants, pace.first(), trapezoidal_weights(s)[None] * self.timed, 1)]
+        pace_functions = Pace(self._motion.resting, self._scale)
+        groups = [
+            group_of_rows(
+                pace_functions, instants, pace.first(), trapezoidal_weights(s)[None] * self.timed, 1
+            )
+        ]
         for index, joint in enumerate(self._joints):
             rows = pace
             if index in spaces.stiffness:
-                size = float(np.median(self._motion.stiffness(index)))
-                rows = rows.beside(spaces.rows(index, s, STIFFNESS.orders, size))
+                stiffness_scale = float(np.median(self._motion.stiffness(index)))
+                rows = rows.beside(spaces.rows(index, s, STIFFNESS.orders, stiffness_scale))
             if joint.criterion.levels:
                 rows = rows.beside(spaces.level(s))
-            groups.append(of_rows(joint, instants, rows, joint.weights(s), joint.bound_count))
+            groups.append(group_of_rows(joint, instants, rows, joint.weights(s), joint.bound_count))
         return groups
 
     def _pacing(self, spaces: PacedSpaces, best: Minimum, starts: int, agreeing: int) -> Pacing:
         parts = spaces.parts()
         return Pacing(
-            splines={key: (space, best.unknowns[own]) for key, (space, own) in parts.items()},
+            splines={
+                key: (space, best.unknowns[unknown_indices])
+                for key, (space, unknown_indices) in parts.items()
+            },
             found=best.found,
             starts=starts,
             agreeing=agreeing,
-            bounding=self._bounding(spaces, best.unknowns),
+            bounding=self._active_bound_shares(spaces, best.unknowns),
         )
 
-    def _bounding(self, spaces: PacedSpaces, unknowns: FloatArray) -> dict[str, dict[str, float]]:
+    def _active_bound_shares(self, spaces: PacedSpaces, unknowns: FloatArray) -> dict[str, dict[str, float]]:
         """Return the share of the path on which each bound is active, by joint and name of the bound."""
         _, *groups = self._groups(spaces, np.arange(len(self._s)))
         shares_of_path = trapezoidal_weights(self._s) / self._span[1]
-        found: dict[str, dict[str, float]] = {}
+        shares_by_joint: dict[str, dict[str, float]] = {}
         for joint, group in zip(self._joints, groups, strict=True):
-            along = (group.bounds(group.rows(unknowns)) > -ACTIVE) @ shares_of_path
+            path_shares = (group.bounds(group.rows(unknowns)) > -ACTIVE_TOLERANCE) @ shares_of_path
             shares: dict[str, float] = {}
-            for name, share in zip(joint.bound_names, along.tolist(), strict=False):
+            for name, share in zip(joint.bound_names, path_shares.tolist(), strict=False):
                 if share:
                     shares[name] = shares.get(name, 0.0) + share
             if shares:
-                found[joint.name] = shares
-        return found
+                shares_by_joint[joint.name] = shares
+        return shares_by_joint
 
 
-STIFFER = 1.0, 1.5, 2.0
+STIFFNESS_FACTORS = 1.0, 1.5, 2.0
 """Multiples of the first stiffness for further starts."""
 
-DRAWN_PACES = 0.6, 1.6
+RANDOM_PACE_RANGE = 0.6, 1.6
 """Range of the random paces before they are scaled to the duration."""
 
 LIFTED = 1.1
@@ -288,53 +304,57 @@ class CheapestPaceSearch(PacedSearch):
         near: Pacing | None = None,
     ) -> None:
         super().__init__(motion, joints, varied, seed, progress)
-        self._ends, self._near = ends, near
+        self._ends, self._near_pacing = ends, near
 
     def _spaces(self, pieces: int) -> PacedSpaces:
         return PacedSpaces.of(self._span, pieces, self._varied, self._ends).lasting_as_commanded()
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
         """Return the commanded pace with several stiffnesses, and random paces with the first of these."""
-        asked = {joint: LIFTED * self._motion.stiffness(joint) for joint in self._varied}
-        even = np.ones_like(self._s)
-        if self._near is not None:
-            even, asked = self._lasting(self._near.pace()(self._s)), self._near.stiffness_at(self._s)
-        first = self._levelled(spaces, spaces.fitted(self._s, even, asked))
-        inside = first if self._kept(spaces, first) else None
-        stiffer = [
-            {joint: multiple * row for joint, row in asked.items()}
-            for multiple in (STIFFER if self._varied else (1.0,))
+        start_stiffness = {joint: LIFTED * self._motion.stiffness(joint) for joint in self._varied}
+        pace = np.ones_like(self._s)
+        if self._near_pacing is not None:
+            pace, start_stiffness = (
+                self._scaled_to_duration(self._near_pacing.pace()(self._s)),
+                self._near_pacing.stiffness_at(self._s),
+            )
+        first_start = self._append_level(spaces, spaces.fitted(self._s, pace, start_stiffness))
+        interior_point = first_start if self._keeps_bounds(spaces, first_start) else None
+        stiffness_choices = [
+            {joint: multiple * row for joint, row in start_stiffness.items()}
+            for multiple in (STIFFNESS_FACTORS if self._varied else (1.0,))
         ]
-        wanted = [spaces.fitted(self._s, even, stiffness) for stiffness in stiffer]
-        wanted += [
-            spaces.fitted(self._s, self._lasting(even * drawn), asked) for drawn in self._drawn(*DRAWN_PACES)
+        starts = [spaces.fitted(self._s, pace, stiffness) for stiffness in stiffness_choices]
+        starts += [
+            spaces.fitted(self._s, self._scaled_to_duration(pace * random_pace), start_stiffness)
+            for random_pace in self._random_paces(*RANDOM_PACE_RANGE)
         ]
-        return [(self._levelled(spaces, unknowns), inside) for unknowns in wanted]
+        return [(self._append_level(spaces, unknowns), interior_point) for unknowns in starts]
 
-    def _lasting(self, pace: FloatArray) -> FloatArray:
+    def _scaled_to_duration(self, pace: FloatArray) -> FloatArray:
         """Return a pace scaled to the commanded duration, (instants,)."""
         return pace * (self._span[1] / np.trapezoid(pace, self._s))
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
         stiffness = {key: LIFTED * row for key, row in rows.items() if key is not None}
-        return self._levelled(spaces, spaces.fitted(self._s, rows[None], stiffness)), None
+        return self._append_level(spaces, spaces.fitted(self._s, rows[None], stiffness)), None
 
-    def _kept(self, spaces: PacedSpaces, unknowns: FloatArray) -> bool:
-        every = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
-        ((_, bounds),) = every.values([unknowns])
+    def _keeps_bounds(self, spaces: PacedSpaces, unknowns: FloatArray) -> bool:
+        problem = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
+        ((_, bounds),) = problem.values([unknowns])
         return bool(np.all(bounds < 0))
 
-    def _levelled(self, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
+    def _append_level(self, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
         """Return unknowns with a level appended that bounds its values, if the cost is a level."""
         if not self._joints[0].criterion.levels:
             return unknowns
-        without = np.append(unknowns, 0.0)
+        unknowns_at_zero = np.append(unknowns, 0.0)
         _, *groups = self._groups(spaces, np.arange(len(self._s)))
-        over = [
-            group.bounds(group.rows(without))[len(joint.bound_names) :]
+        level_bounds = [
+            group.bounds(group.rows(unknowns_at_zero))[len(joint.bound_names) :]
             for joint, group in zip(self._joints, groups, strict=True)
         ]
-        return np.append(unknowns, FIRST_LEVEL * float(np.nan_to_num(np.concatenate(over)).max()))
+        return np.append(unknowns, FIRST_LEVEL * float(np.nan_to_num(np.concatenate(level_bounds)).max()))
 
     def _minima(
         self, problem: SeparableProblem, starts: Sequence[FloatArray], gap: float

@@ -39,7 +39,7 @@ class Speeds(NamedTuple):
     fourth: Row
 
     @classmethod
-    def even(cls, factor: FloatArray) -> Speeds:
+    def uniform(cls, factor: FloatArray) -> Speeds:
         """Return the speeds along a path that is uniformly slowed down by factors, (instants,)."""
         zero = np.zeros_like(factor)
         return cls(1 / factor, zero, zero, zero)
@@ -52,15 +52,15 @@ class Speeds(NamedTuple):
         """
         p, p_s, p_ss, p_sss = pace
         v = 1 / p
-        squared = v * v
-        v_s = -p_s * squared
-        v_ss = -p_ss * squared - 2 * p_s * v * v_s
-        v_sss = -p_sss * squared - 4 * p_ss * v * v_s - 2 * p_s * (v_s * v_s + v * v_ss)
+        v_squared = v * v
+        v_s = -p_s * v_squared
+        v_ss = -p_ss * v_squared - 2 * p_s * v * v_s
+        v_sss = -p_sss * v_squared - 4 * p_ss * v * v_s - 2 * p_s * (v_s * v_s + v * v_ss)
         return cls(
             v,
             v * v_s,
             v * (v_s * v_s + v * v_ss),
-            v * (v_s * v_s * v_s + 4 * v * v_s * v_ss + squared * v_sss),
+            v * (v_s * v_s * v_s + 4 * v * v_s * v_ss + v_squared * v_sss),
         )
 
     def rates(self, by_s: Sequence[Row]) -> list[Row]:
@@ -70,10 +70,13 @@ class Speeds(NamedTuple):
         rates = [f, slopes[0] * s1, slopes[1] * (s1 * s1) + slopes[0] * s2]
         if len(slopes) > 2:
             f1, f2, f3, f4 = slopes
-            square = s1 * s1
+            s1_squared = s1 * s1
             rates += [
-                f3 * (square * s1) + f2 * (3 * s1 * s2) + f1 * s3,
-                f4 * (square * square) + f3 * (6 * square * s2) + f2 * (3 * s2 * s2 + 4 * s1 * s3) + f1 * s4,
+                f3 * (s1_squared * s1) + f2 * (3 * s1 * s2) + f1 * s3,
+                f4 * (s1_squared * s1_squared)
+                + f3 * (6 * s1_squared * s2)
+                + f2 * (3 * s2 * s2 + 4 * s1 * s3)
+                + f1 * s4,
             ]
         return rates
 
@@ -96,35 +99,35 @@ class PathCommands:
 
     def at(self, speeds: Speeds, instants: IndexArray | slice = slice(None)) -> list[Command]:
         """Return the command of each joint at some instants; speeds may carry derivatives."""
-        along = {name: by_s[:, instants] for name, by_s in self.by_s.items()}
-        rows = _rates(along, speeds) | self._torques(speeds, instants)
+        path_derivatives = {name: by_s[:, instants] for name, by_s in self.by_s.items()}
+        rows = _time_derivatives(path_derivatives, speeds) | self._torques(speeds, instants)
         commands = []
         for index, joint in enumerate(self._robot.joints):
-            own = {name: row[index] for name, row in rows.items() if name not in WRENCH_NAMES}
-            _, *rates = (own[name] for name in POSITION.names)
-            resistance = link_resistance(joint, rates, [own.get(name, 0) for name in DAMPING.names])
+            joint_rows = {name: row[index] for name, row in rows.items() if name not in WRENCH_NAMES}
+            _, *rates = (joint_rows[name] for name in POSITION.names)
+            resistance = link_resistance(joint, rates, [joint_rows.get(name, 0) for name in DAMPING.names])
             viscous = [mul(exact(joint.damping), rate) for rate in rates[: len(TORQUES)]]
             for name, *parts in zip(TORQUES, viscous, resistance, strict=True):
-                own[name] = add(own[name], add(*parts))
-            commands.append(Command.of(own))
+                joint_rows[name] = add(joint_rows[name], add(*parts))
+            commands.append(Command.of(joint_rows))
         return commands
 
     def _torques(self, speeds: Speeds, instants: IndexArray | slice) -> dict[str, Row]:
         """Return tau_e and its derivatives by time without friction and dampers, each (joints, instants)."""
         s1, s2, s3, s4 = speeds
-        square, product = s1 * s1, s1 * s2
+        s1_squared, s1_s2 = s1 * s1, s1 * s2
         powers = (
-            (np.ones_like(s1), square, s2),
-            (s1, square * s1, product, s3),
-            (square, s2, square * square, square * s2, s2 * s2, s1 * s3, s4),
+            (np.ones_like(s1), s1_squared, s2),
+            (s1, s1_squared * s1, s1_s2, s3),
+            (s1_squared, s2, s1_squared * s1_squared, s1_squared * s2, s2 * s2, s1 * s3, s4),
         )
         return {
             name: np.sum(factors[..., instants] * np.stack(each)[:, None], axis=0)
-            for name, factors, each in zip(TORQUES, self._factors, powers, strict=True)
+            for name, factors, each in zip(TORQUES, self._power_coefficients, powers, strict=True)
         }
 
     @cached_property
-    def _factors(self) -> tuple[FloatArray, ...]:
+    def _power_coefficients(self) -> tuple[FloatArray, ...]:
         """Coefficients of the powers of the speed in tau_e, tau_e', tau_e'', each (powers, joints, instants).
 
         With k = a_s + 2 b: tau' = g_s v + b_s v^3 + k v v' + a v'', and tau'' = g_ss v^2 + g_s v' + b_ss v^4
@@ -136,24 +139,24 @@ class PathCommands:
         g_s, g_ss = once_1 - b_s, once_2 - b_ss
         accelerated = self._recursion(0.0, 1.0)
         a, k = accelerated[0] - g, accelerated[2] - g_s
-        mixed = self._recursion(1.0, 1.0)[2] - (g_ss + g_s + b_ss + k)  # k_s + 3 b_s
+        k_s_plus_3_b_s = self._recursion(1.0, 1.0)[2] - (g_ss + g_s + b_ss + k)  # k_s + 3 b_s
         return (
             np.stack([g, b, a]),
             np.stack([g_s, b_s, k, a]),
-            np.stack([g_ss, g_s, b_ss, mixed, k, 2 * (k - b), a]),
+            np.stack([g_ss, g_s, b_ss, k_s_plus_3_b_s, k, 2 * (k - b), a]),
         )
 
     def _recursion(self, speed: float, acceleration: float) -> list[FloatArray]:
         """Return tau_e, tau_e' and tau_e'' at v and v', each (joints, instants)."""
         joints = [replace(joint, damping=0.0, friction=None, damper=None) for joint in self._robot.joints]
         kernel = LinkTorques(replace(self._robot, joints=tuple(joints)), self._frame)
-        rows = _rates(self.by_s, Speeds(speed, acceleration, 0.0, 0.0))
+        rows = _time_derivatives(self.by_s, Speeds(speed, acceleration, 0.0, 0.0))
         torques = kernel.results.unpack(kernel(kernel.arguments.pack(rows)))
-        like = rows["q"][0]  # the recursion returns a plain zero for joints that move nothing
-        return [np.stack([np.broadcast_to(row, like.shape) for row in torques[name]]) for name in TORQUES]
+        template = rows["q"][0]  # the recursion returns a plain zero for joints that move nothing
+        return [np.stack([np.broadcast_to(row, template.shape) for row in torques[name]]) for name in TORQUES]
 
 
-def _rates(by_s: Mapping[str, FloatArray], speeds: Speeds) -> dict[str, Row]:
+def _time_derivatives(by_s: Mapping[str, FloatArray], speeds: Speeds) -> dict[str, Row]:
     """Return signals and their derivatives by time from those by s, each (components, instants), by name."""
     signals = [each for each in (POSITION, *COMMANDED.values(), WRENCH) if each.names[0] in by_s]
     return {

@@ -24,7 +24,7 @@ from vsacli.trajectory.trajectory import Trajectory
 SAME_STIFFNESS = 1e-9
 """Relative difference up to which stiffnesses are equal but for rounding."""
 
-KEPT = 128
+CACHE_SIZE = 128
 """Sets of deviations that are kept. Successively stricter searches ask for the same ones again and again:
 without this, fixes of a recorded 7R beyond a torque limit take 1.25 times as long."""
 
@@ -60,12 +60,14 @@ class RecordedLimits:
         flags: FlagArray = np.array(values["flags"])
         if not self.estimates:
             return flags
-        steps = np.flatnonzero(undecided_samples(joint, values))
-        if steps.size:
-            rows = {name: np.asarray(array)[..., steps] for name, array in values.items()}
-            uncertain = self._deviations(robot, joint, rows.get(STIFFNESS.key), instants.at(steps))
-            flags[steps] &= ~FLAG_TYPE(LIMITS)
-            flags[steps] = limit_flags(joint, {**rows, **uncertain}, flags[steps])
+        indices = np.flatnonzero(undecided_samples(joint, values))
+        if indices.size:
+            values_at_indices = {name: np.asarray(array)[..., indices] for name, array in values.items()}
+            deviations = self._deviations(
+                robot, joint, values_at_indices.get(STIFFNESS.key), instants.at(indices)
+            )
+            flags[indices] &= ~FLAG_TYPE(LIMITS)
+            flags[indices] = limit_flags(joint, {**values_at_indices, **deviations}, flags[indices])
         return flags
 
     @cached_property
@@ -74,13 +76,13 @@ class RecordedLimits:
         return self.trajectory.estimates
 
     @cached_property
-    def _probed(self) -> FloatArray:
+    def _probed_times(self) -> FloatArray:
         return probe_times(self.trajectory)
 
     @cached_property
-    def _known(self) -> Callable[[Robot, int, Joint, bytes], Mapping[str, AnyArray]]:
-        """Function `_known_at` of this task, with its latest results."""
-        return lru_cache(KEPT)(partial(_known_at, self))
+    def _cached_deviations(self) -> Callable[[Robot, int, Joint, bytes], Mapping[str, AnyArray]]:
+        """Function `_probe_deviations` of this task, with its latest results."""
+        return lru_cache(CACHE_SIZE)(partial(_probe_deviations, self))
 
     def _deviations(
         self, robot: Robot, joint: Joint, stiffness: FloatArray | None, instants: Instants
@@ -90,28 +92,38 @@ class RecordedLimits:
         They are NaN where the uncertainty cannot be stated.
         """
         elapsed = instants.time - self.trajectory.start
-        before = np.clip(np.searchsorted(self._probed, elapsed) - 1, 0, len(self._probed) - 2)
-        first, last = self._probed[before], self._probed[before + 1]
-        share = (elapsed - first) / (last - first)
+        probe_indices = np.clip(
+            np.searchsorted(self._probed_times, elapsed) - 1, 0, len(self._probed_times) - 2
+        )
+        start_times, end_times = self._probed_times[probe_indices], self._probed_times[probe_indices + 1]
+        share = (elapsed - start_times) / (end_times - start_times)
         index = robot.joint_names.index(joint.name)
-        change = self._change(index, joint, stiffness, instants)
-        ends = np.hstack([[time, instants.factor, change] for time in (first, last)])
-        probes, places = np.unique(ends, axis=1, return_inverse=True)  # instants between samples share them
-        known = self._known(robot, index, joint, probes.tobytes())
-        between = {name: np.split(array[..., places], 2, axis=-1) for name, array in known.items()}
-        return {name: (1 - share) * begin + share * end for name, (begin, end) in between.items()}
+        change = self._stiffness_change(index, joint, stiffness, instants)
+        probe_ends = np.hstack([[time, instants.factor, change] for time in (start_times, end_times)])
+        probes, probe_columns = np.unique(
+            probe_ends, axis=1, return_inverse=True
+        )  # instants between samples share them
+        probe_deviations = self._cached_deviations(robot, index, joint, probes.tobytes())
+        deviations_at_ends = {
+            name: np.split(array[..., probe_columns], 2, axis=-1) for name, array in probe_deviations.items()
+        }
+        return {name: (1 - share) * begin + share * end for name, (begin, end) in deviations_at_ends.items()}
 
-    def _change(
+    def _stiffness_change(
         self, index: int, joint: Joint, stiffness: FloatArray | None, instants: Instants
     ) -> FloatArray:
         """Return the deviation of a joint's stiffness from the command, (samples,), without rounding."""
         if stiffness is None or STIFFNESS.key not in joint.commanded:
             return np.zeros(len(instants.time))
-        asked = self.trajectory.at(instants.time).commanded[STIFFNESS.key][:, index]
-        return np.where(np.abs(stiffness - asked) > SAME_STIFFNESS * asked, stiffness - asked, 0.0)
+        commanded_stiffness = self.trajectory.at(instants.time).commanded[STIFFNESS.key][:, index]
+        return np.where(
+            np.abs(stiffness - commanded_stiffness) > SAME_STIFFNESS * commanded_stiffness,
+            stiffness - commanded_stiffness,
+            0.0,
+        )
 
 
-def _known_at(
+def _probe_deviations(
     limits: RecordedLimits, robot: Robot, index: int, joint: Joint, probes: bytes
 ) -> Mapping[str, AnyArray]:
     """Return the standard deviations of a joint by name, (probes,) or (2, probes).
@@ -125,16 +137,16 @@ def _known_at(
             change of the joint's stiffness; (3, probes).
     """
     joints = (*robot.joints[:index], joint, *robot.joints[index + 1 :])
-    changed, rows = replace(robot, joints=joints), np.frombuffer(probes).reshape(3, -1)
-    several = times_per_block(robot, limits.estimates)
-    parts = [
-        _probe(limits, changed, index, *rows[:, start : start + several])
-        for start in range(0, rows.shape[1], several)
+    changed_robot, probe_rows = replace(robot, joints=joints), np.frombuffer(probes).reshape(3, -1)
+    batch_size = times_per_block(robot, limits.estimates)
+    batches = [
+        _probe(limits, changed_robot, index, *probe_rows[:, start : start + batch_size])
+        for start in range(0, probe_rows.shape[1], batch_size)
     ]
-    found = Deviations.concatenated(parts, axis=-1)
+    deviations = Deviations.concatenated(batches, axis=-1)
     return {
-        deviation(name): np.where(found.unstated[name][..., None], np.nan, array)
-        for name, array in found.deviations.items()
+        deviation(name): np.where(deviations.unstated[name][..., None], np.nan, array)
+        for name, array in deviations.deviations.items()
     }
 
 

@@ -20,13 +20,13 @@ from vsacli.studies.search.nearest_profile import peaks
 DIFFERENCE = 1e-6
 """Step for differencing exact gradients, relative to the scale of a row: half of the digits remain."""
 
-LEAST_CLEARANCE = 1e-5
+MIN_CLEARANCE = 1e-5
 """Clearance of all bounds that a start should have, since the path out of a corner is long."""
 
-LEAST_RELIEF = 1e-3
+MIN_RELIEF = 1e-3
 """Clearance at which relieving the bounds ends; the relief begins as much above the largest bound."""
 
-PULLS = (0.0, 1e-3, 1e-2, 0.1, 0.3, 0.6, 1.0)
+INTERIOR_SHARES = (0.0, 1e-3, 1e-2, 0.1, 0.3, 0.6, 1.0)
 """Shares of the way to an interior point that are tried, until one leads inside."""
 
 TETHER = 1e-3
@@ -73,7 +73,7 @@ class Group:
         basis: rows per unit of each unknown, (rows, instants, own unknowns).
         unknowns: indices of the group's unknowns among all, (own unknowns,).
         weights: weight of each integrand at each instant, (integrands, instants).
-        there: mask of the bounds that exist, (bounds, instants).
+        bound_mask: mask of the bounds that exist, (bounds, instants).
         scales: sizes of the rows, (rows,).
         offsets: values of the rows if all unknowns are zero, (rows,); zero if None.
     """
@@ -83,7 +83,7 @@ class Group:
     basis: FloatArray
     unknowns: IndexArray
     weights: FloatArray
-    there: BoolArray
+    bound_mask: BoolArray
     scales: FloatArray
     offsets: FloatArray | None = None
 
@@ -97,19 +97,19 @@ class Group:
         """Basis with the axes (instants, rows, own unknowns)."""
         return np.ascontiguousarray(self.basis.transpose(1, 0, 2))
 
-    def values(self, places: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
+    def values(self, points: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
         """Return the cost and the existing bounds at each of several unknowns."""
-        rows = np.concatenate([self.rows(unknowns) for unknowns in places], axis=1)
-        integrands, bounds = self.functions(rows, np.tile(self.instants, len(places)))
-        parts = (np.split(_stacked(each, rows), len(places), axis=1) for each in (integrands, bounds))
+        rows = np.concatenate([self.rows(unknowns) for unknowns in points], axis=1)
+        integrands, bounds = self.functions(rows, np.tile(self.instants, len(points)))
+        parts = (np.split(_stack_values(each, rows), len(points), axis=1) for each in (integrands, bounds))
         return [
-            (float(np.sum(self.weights * costs)), limited[self.there])
-            for costs, limited in zip(*parts, strict=True)
+            (float(np.sum(self.weights * costs)), bounds_at_point[self.bound_mask])
+            for costs, bounds_at_point in zip(*parts, strict=True)
         ]
 
     def bounds(self, rows: FloatArray) -> FloatArray:
         """Return all bounds, (bounds, instants)."""
-        return _stacked(self.functions(rows, self.instants)[1], rows)
+        return _stack_values(self.functions(rows, self.instants)[1], rows)
 
     def sampled(self, rows: FloatArray, instants: IndexArray) -> tuple[Sampled, Sampled]:
         """Return integrands and bounds with their gradients."""
@@ -117,7 +117,7 @@ class Group:
         return _sample_functions(integrands, rows), _sample_functions(bounds, rows)
 
 
-def _stacked(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> FloatArray:
+def _stack_values(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> FloatArray:
     shape = rows.shape[1:]
     values = [np.broadcast_to(value_of(each), shape) for each in functions]
     return np.stack(values) if values else np.zeros((0, *shape))
@@ -125,97 +125,107 @@ def _stacked(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> FloatA
 
 def _sample_functions(functions: Sequence[Dual | FloatArray], rows: FloatArray) -> Sampled:
     gradients = [tangent_of(each, len(rows), rows.shape[1:]) for each in functions]
-    stacked = np.stack(gradients) if gradients else np.zeros((0, *rows.shape))
-    return Sampled(_stacked(functions, rows), stacked)
+    stacked_gradients = np.stack(gradients) if gradients else np.zeros((0, *rows.shape))
+    return Sampled(_stack_values(functions, rows), stacked_gradients)
 
 
-class _Expanded:
+class _ExpandedGroup:
     """A group at given unknowns: functions and gradients there, and with each row displaced a little."""
 
     def __init__(self, group: Group, integrands: Sampled, bounds: Sampled, steps: FloatArray) -> None:
         self.group, self._steps = group, steps
-        self.integrands, *self._moved_integrands = (integrands.part(each) for each in range(len(steps) + 1))
-        here, *self._moved_bounds = (bounds.part(each) for each in range(len(steps) + 1))
-        self.bounds = here._replace(gradients=np.where(group.there[:, None], here.gradients, 0.0))
+        self.integrands, *self._displaced_integrands = (
+            integrands.part(each) for each in range(len(steps) + 1)
+        )
+        base_bounds, *self._displaced_bounds = (bounds.part(each) for each in range(len(steps) + 1))
+        self.bounds = base_bounds._replace(
+            gradients=np.where(group.bound_mask[:, None], base_bounds.gradients, 0.0)
+        )
 
     @classmethod
-    def each(cls, group: Group, places: Sequence[FloatArray]) -> list[_Expanded]:
+    def each(cls, group: Group, points: Sequence[FloatArray]) -> list[_ExpandedGroup]:
         """Return the group at each of several unknowns.
 
         One call computes all of them, and all displacements, since a call costs more than many instants.
         """
         steps = DIFFERENCE * group.scales
-        rows = np.stack([group.rows(unknowns) for unknowns in places], axis=1)
-        moved = rows[:, :, None] + np.diag(steps)[:, None, :, None]
-        everywhere = np.concatenate([rows[:, :, None], moved], axis=2)
-        at = np.tile(group.instants, len(places) * (len(steps) + 1))
-        found = group.sampled(everywhere.reshape(len(rows), -1), at)
-        integrands, bounds = (each.shaped(everywhere.shape[1:]) for each in found)
-        return [cls(group, integrands.part(place), bounds.part(place), steps) for place in range(len(places))]
+        rows = np.stack([group.rows(unknowns) for unknowns in points], axis=1)
+        displaced_rows = rows[:, :, None] + np.diag(steps)[:, None, :, None]
+        all_rows = np.concatenate([rows[:, :, None], displaced_rows], axis=2)
+        instants = np.tile(group.instants, len(points) * (len(steps) + 1))
+        samples = group.sampled(all_rows.reshape(len(rows), -1), instants)
+        integrands, bounds = (each.shaped(all_rows.shape[1:]) for each in samples)
+        return [cls(group, integrands.part(index), bounds.part(index), steps) for index in range(len(points))]
 
     def gradient(self) -> FloatArray:
         """Return the gradient of the cost by the own unknowns."""
-        return self._by_unknowns(_weighted_gradient(self.group.weights, self.integrands.gradients))
+        return self._gradient_by_unknowns(_weighted_gradient(self.group.weights, self.integrands.gradients))
 
     def pull(self, weights: FloatArray) -> FloatArray:
         """Return the weighted sum of the bounds' gradients, (own unknowns,)."""
-        return self._by_unknowns(_weighted_gradient(self._of_all(weights), self.bounds.gradients))
+        return self._gradient_by_unknowns(
+            _weighted_gradient(self._for_all_bounds(weights), self.bounds.gradients)
+        )
 
     def changes(self, step: FloatArray) -> FloatArray:
         """Return the first-order changes of the existing bounds with a step."""
-        moved = self.group.basis @ step[self.group.unknowns]
-        return np.asarray(np.sum(self.bounds.gradients * moved, axis=1)[self.group.there])
+        row_changes = self.group.basis @ step[self.group.unknowns]
+        return np.asarray(np.sum(self.bounds.gradients * row_changes, axis=1)[self.group.bound_mask])
 
     def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
         """See `Point.newton_matrix`; (own unknowns, own unknowns)."""
-        curved = self._curvature(self._of_all(multipliers))
+        curved = self._curvature(self._for_all_bounds(multipliers))
         if convex:
             values, vectors = np.linalg.eigh(curved)
             curved = np.einsum("iab,ib,icb->iac", vectors, np.maximum(values, 0.0), vectors)
         slopes = self.bounds.gradients.transpose(2, 1, 0)
-        weighted = slopes * self._of_all(stiffening).T[:, None]
+        weighted = slopes * self._for_all_bounds(stiffening).T[:, None]
         joined = (curved + weighted @ slopes.swapaxes(1, 2)) @ self.group.by_instant
         size = joined.shape[2]
         return self.group.by_instant.reshape(-1, size).T @ joined.reshape(-1, size)
 
     def _curvature(self, multipliers: FloatArray) -> FloatArray:
         """Return the Hessian of the Lagrangian by rows, (instants, rows, rows), by finite differences."""
-        moved = [
-            _weighted_gradient(self.group.weights, here.gradients)
-            + _weighted_gradient(multipliers, of_bounds.gradients)
-            for here, of_bounds in zip(self._moved_integrands, self._moved_bounds, strict=True)
+        displaced_gradients = [
+            _weighted_gradient(self.group.weights, gradient.gradients)
+            + _weighted_gradient(multipliers, displaced_bounds.gradients)
+            for gradient, displaced_bounds in zip(
+                self._displaced_integrands, self._displaced_bounds, strict=True
+            )
         ]
-        here = _weighted_gradient(self.group.weights, self.integrands.gradients)
-        here = here + _weighted_gradient(multipliers, self.bounds.gradients)
-        second = (np.stack(moved, axis=1) - here[:, None, :]) / self._steps[None, :, None]
-        return (second + second.swapaxes(0, 1)).transpose(2, 0, 1) / 2
+        gradient = _weighted_gradient(self.group.weights, self.integrands.gradients)
+        gradient = gradient + _weighted_gradient(multipliers, self.bounds.gradients)
+        second_differences = (np.stack(displaced_gradients, axis=1) - gradient[:, None, :]) / self._steps[
+            None, :, None
+        ]
+        return (second_differences + second_differences.swapaxes(0, 1)).transpose(2, 0, 1) / 2
 
-    def _of_all(self, of_bounds: FloatArray) -> FloatArray:
+    def _for_all_bounds(self, existing_values: FloatArray) -> FloatArray:
         """Return values of the existing bounds with zeros for the others, (bounds, instants)."""
-        spread = np.zeros(self.group.there.shape)
-        spread[self.group.there] = of_bounds
-        return spread
+        all_values = np.zeros(self.group.bound_mask.shape)
+        all_values[self.group.bound_mask] = existing_values
+        return all_values
 
-    def _by_unknowns(self, by_rows: FloatArray) -> FloatArray:
-        return by_rows.T.ravel() @ self.group.by_instant.reshape(by_rows.size, -1)
+    def _gradient_by_unknowns(self, row_gradient: FloatArray) -> FloatArray:
+        return row_gradient.T.ravel() @ self.group.by_instant.reshape(row_gradient.size, -1)
 
 
 def _weighted_gradient(weights: FloatArray, gradients: FloatArray) -> FloatArray:
     """Return the weighted sum of gradients, (rows, instants); gradients with zero weight may be NaN."""
-    kept = np.where(weights[:, None, :] != 0, gradients, 0.0)
-    return np.asarray(np.sum(weights[:, None, :] * kept, axis=0))
+    finite_gradients = np.where(weights[:, None, :] != 0, gradients, 0.0)
+    return np.asarray(np.sum(weights[:, None, :] * finite_gradients, axis=0))
 
 
 class SeparablePoint:
     """Cost and bounds of a separable problem at unknowns, with their derivatives; a `Point`."""
 
-    def __init__(self, parts: Sequence[_Expanded], size: int) -> None:
-        self._parts, self._size = parts, size
+    def __init__(self, parts: Sequence[_ExpandedGroup], unknown_count: int) -> None:
+        self._parts, self._size = parts, unknown_count
         self.cost = sum(float(np.sum(part.group.weights * part.integrands.values)) for part in self._parts)
-        of_parts = [part.bounds.values[part.group.there] for part in self._parts]
-        self.bounds = np.concatenate(of_parts)
-        self._ends = np.cumsum([len(bounds) for bounds in of_parts])[:-1]
-        self.gradient = self._spread([part.gradient() for part in self._parts])
+        bounds_of_parts = [part.bounds.values[part.group.bound_mask] for part in self._parts]
+        self.bounds = np.concatenate(bounds_of_parts)
+        self._ends = np.cumsum([len(bounds) for bounds in bounds_of_parts])[:-1]
+        self.gradient = self._sum_over_parts([part.gradient() for part in self._parts])
 
     def changes(self, step: FloatArray) -> FloatArray:
         """See `Point`."""
@@ -223,8 +233,11 @@ class SeparablePoint:
 
     def pull(self, weights: FloatArray) -> FloatArray:
         """See `Point`."""
-        return self._spread(
-            [part.pull(own) for part, own in zip(self._parts, np.split(weights, self._ends), strict=True)]
+        return self._sum_over_parts(
+            [
+                part.pull(part_weights)
+                for part, part_weights in zip(self._parts, np.split(weights, self._ends), strict=True)
+            ]
         )
 
     def newton_matrix(self, multipliers: FloatArray, stiffening: FloatArray, convex: bool) -> FloatArray:
@@ -236,10 +249,10 @@ class SeparablePoint:
             matrix[np.ix_(own, own)] += part.newton_matrix(*of_bounds, convex)
         return matrix
 
-    def _spread(self, of_parts: Sequence[FloatArray]) -> FloatArray:
+    def _sum_over_parts(self, part_gradients: Sequence[FloatArray]) -> FloatArray:
         total = np.zeros(self._size)
-        for part, own in zip(self._parts, of_parts, strict=True):
-            total[part.group.unknowns] += own
+        for part, part_gradient in zip(self._parts, part_gradients, strict=True):
+            total[part.group.unknowns] += part_gradient
         return total
 
 
@@ -249,51 +262,51 @@ class SeparableProblem:
 
     groups: Sequence[Group]
 
-    def values(self, places: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
+    def values(self, points: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
         """See `Problem.values`."""
-        by_group = [group.values(places) for group in self.groups]
+        by_group = [group.values(points) for group in self.groups]
         return [
             (sum(cost for cost, _ in found), np.concatenate([bounds for _, bounds in found]))
             for found in zip(*by_group, strict=True)
         ]
 
-    def at(self, places: Sequence[FloatArray]) -> list[SeparablePoint]:
+    def at(self, points: Sequence[FloatArray]) -> list[SeparablePoint]:
         """See `Problem.at`."""
-        by_group = [_Expanded.each(group, places) for group in self.groups]
-        pairs = zip(zip(*by_group, strict=True), places, strict=True)
+        by_group = [_ExpandedGroup.each(group, points) for group in self.groups]
+        pairs = zip(zip(*by_group, strict=True), points, strict=True)
         return [SeparablePoint(parts, len(unknowns)) for parts, unknowns in pairs]
 
 
 def interior(
-    problem: SeparableProblem, wanted: FloatArray, inside: FloatArray | None = None
+    problem: SeparableProblem, target: FloatArray, interior_point: FloatArray | None = None
 ) -> FloatArray | None:
     """Return unknowns near the wanted ones that keep all bounds, or None.
 
     They lie on the way to an interior point, if one is known; otherwise the largest bound is minimized until
     it is negative.
     """
-    kept = None
-    for share in PULLS:
-        pulled = wanted if inside is None else wanted + share * (inside - wanted)
-        ((_, bounds),) = problem.values([pulled])
-        nearest = bounds.max(initial=-1.0) if np.isfinite(bounds).all() else np.inf
-        kept = pulled if nearest < 0 else kept
-        if nearest < -LEAST_CLEARANCE:
+    feasible = None
+    for share in INTERIOR_SHARES:
+        shifted = target if interior_point is None else target + share * (interior_point - target)
+        ((_, bounds),) = problem.values([shifted])
+        largest_bound = bounds.max(initial=-1.0) if np.isfinite(bounds).all() else np.inf
+        feasible = shifted if largest_bound < 0 else feasible
+        if largest_bound < -MIN_CLEARANCE:
             break
-    if kept is not None:
-        return kept
+    if feasible is not None:
+        return feasible
     if not np.isfinite(bounds).all():
         return None
-    relieved = SeparableProblem([_relieved(group, pulled) for group in problem.groups])
-    start = np.append(pulled, bounds.max() + LEAST_RELIEF)
-    found = minimize(relieved, start, enough=lambda unknowns: bool(unknowns[-1] < -LEAST_RELIEF))
-    return found.unknowns[:-1] if found.unknowns[-1] < 0 else None
+    relieved = SeparableProblem([_relieved(group, shifted) for group in problem.groups])
+    start = np.append(shifted, bounds.max() + MIN_RELIEF)
+    minimum = minimize(relieved, start, enough=lambda unknowns: bool(unknowns[-1] < -MIN_RELIEF))
+    return minimum.unknowns[:-1] if minimum.unknowns[-1] < 0 else None
 
 
 def _relieved(group: Group, start: FloatArray) -> Group:
     """Return the bounds of a group minus a further unknown, the relief, whose mean is the cost."""
-    rows, instants, own = group.basis.shape
-    basis = np.zeros((rows + 1, instants, own + 1))
+    rows, instants, own_unknowns = group.basis.shape
+    basis = np.zeros((rows + 1, instants, own_unknowns + 1))
     basis[:-1, :, :-1], basis[-1, :, -1] = group.basis, 1.0
     return Group(
         functions=_Relieved(group, group.rows(start)),
@@ -301,7 +314,7 @@ def _relieved(group: Group, start: FloatArray) -> Group:
         basis=basis,
         unknowns=np.append(group.unknowns, len(start)),
         weights=np.full((1, instants), 1 / instants),
-        there=group.there,
+        bound_mask=group.bound_mask,
         scales=np.append(group.scales, 1.0),
         offsets=None if group.offsets is None else np.append(group.offsets, 0.0),
     )
@@ -317,19 +330,21 @@ class _Relieved:
         self, rows: Sequence[Dual] | FloatArray, instants: IndexArray
     ) -> tuple[list[Any], list[Any]]:
         """Return the cost, and the bounds minus the relief; see `Functions`."""
-        *own, relief = rows
-        _, bounds = self._group.functions(own, self._group.instants[instants])
-        sizes = zip(own, self._start[:, instants], self._group.scales, strict=True)
-        away = [(row - begun) / size for row, begun, size in sizes]
-        return [relief + TETHER * sum(each * each for each in away)], [bound - relief for bound in bounds]
+        *own_rows, relief = rows
+        _, bounds = self._group.functions(own_rows, self._group.instants[instants])
+        row_scales = zip(own_rows, self._start[:, instants], self._group.scales, strict=True)
+        displacements = [(row - start_row) / scale for row, start_row, scale in row_scales]
+        return [relief + TETHER * sum(displacement * displacement for displacement in displacements)], [
+            bound - relief for bound in bounds
+        ]
 
 
-def missed_instants(missed: FloatArray) -> IndexArray:
+def violated_instants(violations: FloatArray) -> IndexArray:
     """Return the instants to add where bounds, (bounds, instants), are positive and so violated.
 
     They are the worst instant of each violated stretch and its neighbors: with the worst alone, the next
     minimum would violate the bound at a neighbor, and the search would follow it from instant to instant.
     """
-    worst = np.concatenate([peaks(row) for row in missed])
-    around = worst[:, None] + np.array([-1, 0, 1])
-    return np.unique(np.clip(around, 0, missed.shape[1] - 1))
+    peak_instants = np.concatenate([peaks(row) for row in violations])
+    around = peak_instants[:, None] + np.array([-1, 0, 1])
+    return np.unique(np.clip(around, 0, violations.shape[1] - 1))

@@ -56,8 +56,8 @@ class SplineSpace:
         ends = _piece_ends(span, pieces, allowed)
         knots = np.concatenate([[ends[0]] * DEGREE, ends, [ends[-1]] * DEGREE])
         coefficients = len(ends) - 1 + DEGREE
-        shape_of = np.clip(np.arange(coefficients) - FLAT_ENDS, 0, coefficients - 1 - 2 * FLAT_ENDS)
-        return cls(knots, np.eye(shape_of[-1] + 1)[shape_of])
+        shape_indices = np.clip(np.arange(coefficients) - FLAT_ENDS, 0, coefficients - 1 - 2 * FLAT_ENDS)
+        return cls(knots, np.eye(shape_indices[-1] + 1)[shape_indices])
 
     @classmethod
     def free(cls, span: tuple[float, float], pieces: int) -> SplineSpace:
@@ -72,14 +72,14 @@ class SplineSpace:
         """Return the periodic splines of this many equal pieces; see `at_rest`."""
         ends = _piece_ends(span, pieces, allowed)
         pieces, period = len(ends) - 1, span[1] - span[0]
-        turns, places = np.divmod(np.arange(-DEGREE, pieces + DEGREE + 1), pieces)
-        return cls(ends[places] + turns * period, np.eye(pieces)[np.arange(pieces + DEGREE) % pieces])
+        turns, end_indices = np.divmod(np.arange(-DEGREE, pieces + DEGREE + 1), pieces)
+        return cls(ends[end_indices] + turns * period, np.eye(pieces)[np.arange(pieces + DEGREE) % pieces])
 
     @classmethod
     def constant(cls, span: tuple[float, float]) -> SplineSpace:
         """Return the constants over a span."""
-        whole = cls.at_rest(span, 1)
-        return cls(whole.knots, np.ones((len(whole.shapes), 1)))
+        rest_space = cls.at_rest(span, 1)
+        return cls(rest_space.knots, np.ones((len(rest_space.shapes), 1)))
 
     def one_at(self, first: bool, last: bool) -> SplineSpace:
         """Return the `free` splines that are 1, with three zero derivatives, at one or both ends."""
@@ -95,12 +95,12 @@ class SplineSpace:
         integrals = scipy.interpolate.BSpline(self.knots, self.shapes, DEGREE).integrate(*ends)
         return replace(self, shapes=self.shapes @ scipy.linalg.null_space(integrals[None]), offset=mean)
 
-    def repeated(self, amounts: FloatArray, count: int) -> BSpline[np.float64]:
+    def repeated(self, coefficients: FloatArray, count: int) -> BSpline[np.float64]:
         """Return a periodic spline over `count` periods."""
         first, last = self.knots[DEGREE], self.knots[-DEGREE - 1]
         pieces = len(self.shapes) - DEGREE
-        whole = self.periodic((first, first + count * (last - first)), count * pieces)
-        return whole.spline(np.tile(self.spline(amounts).c[:pieces], count))
+        repeated_space = self.periodic((first, first + count * (last - first)), count * pieces)
+        return repeated_space.spline(np.tile(self.spline(coefficients).c[:pieces], count))
 
     @property
     def size(self) -> int:
@@ -115,16 +115,16 @@ class SplineSpace:
 
     def basis(self, time: FloatArray, orders: int) -> FloatArray:
         """Return the shapes with their derivatives, (orders, instants, shapes)."""
-        every = scipy.interpolate.BSpline(self.knots, self.shapes, DEGREE)
-        return np.stack([every(time, nu=order) for order in range(orders)])
+        all_shapes = scipy.interpolate.BSpline(self.knots, self.shapes, DEGREE)
+        return np.stack([all_shapes(time, nu=order) for order in range(orders)])
 
     def offsets(self, orders: int) -> FloatArray:
         """Return the offset with its derivatives, which are zero, (orders,)."""
         return np.append(self.offset, np.zeros(orders - 1))
 
-    def spline(self, amounts: FloatArray) -> scipy.interpolate.BSpline[np.float64]:
+    def spline(self, coefficients: FloatArray) -> scipy.interpolate.BSpline[np.float64]:
         """Return the spline with given coefficients of the shapes, (shapes, ...)."""
-        return scipy.interpolate.BSpline(self.knots, self.offset + self.shapes @ amounts, DEGREE)
+        return scipy.interpolate.BSpline(self.knots, self.offset + self.shapes @ coefficients, DEGREE)
 
     def fitted(self, time: FloatArray, values: FloatArray) -> FloatArray:
         """Return the coefficients of the spline nearest to values, (shapes,), by least squares."""
@@ -136,9 +136,9 @@ def _piece_ends(span: tuple[float, float], pieces: int, allowed: FloatArray | No
     ends = np.linspace(*span, pieces + 1)
     if allowed is None:
         return ends
-    after = np.clip(np.searchsorted(allowed, ends), 1, len(allowed) - 1)
-    nearest = after - (ends - allowed[after - 1] < allowed[after] - ends)
-    return allowed[np.unique(nearest)]
+    next_index = np.clip(np.searchsorted(allowed, ends), 1, len(allowed) - 1)
+    nearest_index = next_index - (ends - allowed[next_index - 1] < allowed[next_index] - ends)
+    return allowed[np.unique(nearest_index)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,37 +172,39 @@ class Pacing:
         return {joint: spline(s) for joint, spline in self.stiffness().items()}
 
     def _spline(self, key: int | None, count: int) -> BSpline[np.float64]:
-        space, amounts = self.splines[key]
-        return space.spline(amounts) if count == 1 else space.repeated(amounts, count)
+        space, coefficients = self.splines[key]
+        return space.spline(coefficients) if count == 1 else space.repeated(coefficients, count)
 
 
 class Rows(NamedTuple):
     """Rows as linear functions of unknowns: the fields of a `Group` for these."""
 
     basis: FloatArray
-    places: IndexArray
+    unknown_indices: IndexArray
     scales: FloatArray
     offsets: FloatArray
 
     def first(self) -> Rows:
         """Return the first row only."""
-        return Rows(self.basis[:1], self.places, self.scales[:1], self.offsets[:1])
+        return Rows(self.basis[:1], self.unknown_indices, self.scales[:1], self.offsets[:1])
 
     def beside(self, other: Rows) -> Rows:
         """Return these rows followed by others, which have their own unknowns."""
-        rows, own = len(self.basis), self.basis.shape[2]
-        joined = np.zeros((rows + len(other.basis), self.basis.shape[1], own + other.basis.shape[2]))
-        joined[:rows, :, :own], joined[rows:, :, own:] = self.basis, other.basis
+        rows, unknown_count = len(self.basis), self.basis.shape[2]
+        basis = np.zeros((rows + len(other.basis), self.basis.shape[1], unknown_count + other.basis.shape[2]))
+        basis[:rows, :, :unknown_count], basis[rows:, :, unknown_count:] = self.basis, other.basis
         pairs = zip(self[1:], other[1:], strict=True)
-        return Rows(joined, *(np.append(mine, others) for mine, others in pairs))
+        return Rows(basis, *(np.append(mine, others) for mine, others in pairs))
 
 
-def of_rows(
+def group_of_rows(
     functions: Functions, instants: IndexArray, rows: Rows, weights: FloatArray, bounds: int
 ) -> Group:
     """Return the group for functions of rows at instants, with `bounds` bounds at each instant."""
-    there = np.ones((bounds, len(instants)), dtype=np.bool_)
-    return Group(functions, instants, rows.basis, rows.places, weights, there, rows.scales, rows.offsets)
+    bound_mask = np.ones((bounds, len(instants)), dtype=np.bool_)
+    return Group(
+        functions, instants, rows.basis, rows.unknown_indices, weights, bound_mask, rows.scales, rows.offsets
+    )
 
 
 class PacedSpaces(NamedTuple):
@@ -232,36 +234,42 @@ class PacedSpaces(NamedTuple):
         """Return space and indices of unknowns of the pace (key None) and of each varied stiffness."""
         spaces: dict[int | None, SplineSpace] = {None: self.pace}
         spaces.update(self.stiffness.items())
-        ends = np.cumsum([space.size for space in spaces.values()])
-        places = np.split(np.arange(ends[-1]), ends[:-1])
-        return {key: (space, own) for (key, space), own in zip(spaces.items(), places, strict=True)}
+        offsets = np.cumsum([space.size for space in spaces.values()])
+        index_groups = np.split(np.arange(offsets[-1]), offsets[:-1])
+        return {
+            key: (space, unknown_indices)
+            for (key, space), unknown_indices in zip(spaces.items(), index_groups, strict=True)
+        }
 
     def fitted(self, s: FloatArray, pace: FloatArray, stiffness: Mapping[int, FloatArray]) -> FloatArray:
         """Return the unknowns nearest to a pace and to the stiffness of joints, each (instants,)."""
-        wanted: dict[int | None, FloatArray] = {None: pace}
-        wanted.update(stiffness.items())
-        return np.concatenate([space.fitted(s, wanted[key]) for key, (space, _) in self.parts().items()])
+        values_by_key: dict[int | None, FloatArray] = {None: pace}
+        values_by_key.update(stiffness.items())
+        return np.concatenate(
+            [space.fitted(s, values_by_key[key]) for key, (space, _) in self.parts().items()]
+        )
 
     def even(self, s: FloatArray, pace: float, stiffness: Mapping[int, FloatArray]) -> FloatArray:
         """Return the unknowns of a constant pace, except at ends where it is prescribed."""
         unknowns = self.fitted(s, np.full_like(s, pace), stiffness)
-        _, own = self.parts()[None]
-        unknowns[own] = pace - self.pace.offset  # shapes of a free pace are B-splines, whose sum is one
+        _, pace_indices = self.parts()[None]
+        # shapes of a free pace are B-splines, whose sum is one
+        unknowns[pace_indices] = pace - self.pace.offset
         return unknowns
 
     def slowed(self, unknowns: FloatArray, share: float) -> FloatArray:
         """Return unknowns with the pace increased by a share, except at ends where it is prescribed."""
-        slower, (_, own) = unknowns.copy(), self.parts()[None]
-        slower[own] += share * (slower[own] + self.pace.offset)
-        return slower
+        slowed_unknowns, (_, pace_indices) = unknowns.copy(), self.parts()[None]
+        slowed_unknowns[pace_indices] += share * (slowed_unknowns[pace_indices] + self.pace.offset)
+        return slowed_unknowns
 
-    def rows(self, key: int | None, s: FloatArray, orders: int, size: float = 1.0) -> Rows:
-        """Return the rows of the pace (key None) or of a joint's stiffness of size `size`, at instants."""
-        space, own = self.parts()[key]
-        scales = size * space.piece ** -np.arange(orders, dtype=np.float64)
-        return Rows(space.basis(s, orders), own, scales, space.offsets(orders))
+    def rows(self, key: int | None, s: FloatArray, orders: int, scale: float = 1.0) -> Rows:
+        """Return the rows of the pace (key None) or of a joint's stiffness of size `scale`, at instants."""
+        space, unknown_indices = self.parts()[key]
+        scales = scale * space.piece ** -np.arange(orders, dtype=np.float64)
+        return Rows(space.basis(s, orders), unknown_indices, scales, space.offsets(orders))
 
     def level(self, s: FloatArray) -> Rows:
         """Return the row of a level: one further unknown after all others, constant over the path."""
-        last = sum(space.size for space, _ in self.parts().values())
-        return Rows(np.ones((1, len(s), 1)), np.array([last]), np.ones(1), np.zeros(1))
+        index = sum(space.size for space, _ in self.parts().values())
+        return Rows(np.ones((1, len(s), 1)), np.array([index]), np.ones(1), np.zeros(1))

@@ -25,7 +25,12 @@ from vsacli.studies.search.changed_motion import (
     with_kept_rate,
     with_raised_stiffness,
 )
-from vsacli.studies.search.cutting_planes import FEW, FewSamples, smallest_offset, smallest_transition
+from vsacli.studies.search.cutting_planes import (
+    FACTOR_SEARCH_SAMPLES,
+    FewSamples,
+    smallest_offset,
+    smallest_transition,
+)
 from vsacli.studies.search.fix_report import (
     Fix,
     JointChange,
@@ -93,8 +98,8 @@ class Task:
     @cached_property
     def few_samples(self) -> FewSamples:
         """Samples with which searches begin."""
-        few = self.acceptance.watched(self.trajectory, FEW)
-        return FewSamples(self.acceptance, few, self.impossible)
+        samples = self.acceptance.watched(self.trajectory, FACTOR_SEARCH_SAMPLES)
+        return FewSamples(self.acceptance, samples, self.impossible)
 
     @cached_property
     def refused_loads(self) -> dict[int, Load]:
@@ -103,13 +108,13 @@ class Task:
 
     def _refused_loads(self, combination: Combination) -> dict[int, Load]:
         """Return the loads, at samples and between, of joints that a slow-down and branches do not fix."""
-        rule, factor = self.acceptance_with(combination), combination.factor
-        slower = self.trajectory if factor == 1 else self.trajectory.stretched(factor)
-        loads = joint_loads(rule.robot, slower, rule.counted, factor, rule.between)
+        acceptance, factor = self.acceptance_with(combination), combination.factor
+        stretched = self.trajectory if factor == 1 else self.trajectory.stretched(factor)
+        loads = joint_loads(acceptance.robot, stretched, acceptance.counted, factor, acceptance.between)
         return {
             index: load
-            for index, load in zip(rule.counted, loads, strict=True)
-            if rule.refused_steps(rule.robot.joints[index], self.judged(load)).any()
+            for index, load in zip(acceptance.counted, loads, strict=True)
+            if acceptance.refused_steps(acceptance.robot.joints[index], self.judged(load)).any()
         }
 
     def judged(self, load: Load) -> Load:
@@ -125,58 +130,64 @@ class Task:
         """Return the rms of additions to the stiffness of a joint, (..., samples), over its rms stiffness."""
         return np.asarray(np.sqrt(np.mean(change**2, axis=-1)) / self._stiffness_rms[index])
 
-    def acceptance_with(self, found: Combination) -> Acceptance:
+    def acceptance_with(self, combination: Combination) -> Acceptance:
         """Return the acceptance rule for the robot with the branches of a combination."""
-        return replace(self.acceptance, robot=found.robot(self.acceptance.robot))
+        return replace(self.acceptance, robot=combination.robot(self.acceptance.robot))
 
-    def with_constants(self, found: Combination) -> Fix:
+    def with_constants(self, combination: Combination) -> Fix:
         """Return the fix by a combination whose changes of stiffness are constant."""
         offsets = tuple(
-            Offset(joint.name, found.constants.get(index, 0.0), units.STIFFNESS.unit(joint.type))
+            Offset(joint.name, combination.constants.get(index, 0.0), units.STIFFNESS.unit(joint.type))
             for index, joint in enumerate(self.acceptance.robot.joints)
             if "stiffness" in joint.actuator.commanded
         )
         stiffness = self.trajectory.commanded[STIFFNESS.key]
-        changed = bool(found.constants) and not isinstance(stiffness, ClosedForm)
-        stretched, factor = self._stretched(found.factor, changed=changed)
-        raised = with_raised_stiffness(stretched, found.constants)
-        declared, factor = self._kept_rate(raised, factor, found)
+        has_sampled_stiffness = bool(combination.constants) and not isinstance(stiffness, ClosedForm)
+        stretched, factor = self._stretched(combination.factor, changed=has_sampled_stiffness)
+        changed_trajectory = with_raised_stiffness(stretched, combination.constants)
+        declared, factor = self._at_task_rate(changed_trajectory, factor, combination)
         return Fix(
-            size=found.size,
-            robot=found.robot(self.acceptance.robot),
+            size=combination.size,
+            robot=combination.robot(self.acceptance.robot),
             declared=declared,
             factor=factor,
             asked=self.trajectory,
-            slow_down=self._slow_down(found),
-            branch=self._branch(found),
-            stiffness_offset=StiffnessOffset(offsets) if found.constants else None,
+            slow_down=self._slow_down(combination),
+            branch=self._branch(combination),
+            stiffness_offset=StiffnessOffset(offsets) if combination.constants else None,
         )
 
-    def with_profiles(self, found: Combination) -> Fix:
+    def with_profiles(self, combination: Combination) -> Fix:
         """Return the fix with the slow-down and branches of a combination and the nearest stiffness profiles.
 
         Raises:
             ImpossibleError: no profile was found for some joint.
         """
-        acceptance = self.acceptance_with(found)
-        loads = self.refused_loads if found is AS_IT_IS else self._refused_loads(found)
-        changes = _of_joints(acceptance, loads, partial(nearest_change, acceptance, judged=self.judged))
+        acceptance = self.acceptance_with(combination)
+        loads = self.refused_loads if combination is AS_IT_IS else self._refused_loads(combination)
+        changes = _changes_by_joint(
+            acceptance, loads, partial(nearest_change, acceptance, judged=self.judged)
+        )
         joints = acceptance.robot.joints
-        summaries = tuple(_summary(joints[index], change) for index, change in changes.items())
-        stretched, factor = self._stretched(found.factor, changed=bool(changes))
-        scale = factor ** np.arange(STIFFNESS.orders)[:, None]
-        at_steps = {index: scale * change.rows[:, loads[index].steps] for index, change in changes.items()}
-        declared, factor = self._kept_rate(with_changed_stiffness(stretched, at_steps), factor, found)
+        joint_changes = tuple(_joint_change(joints[index], change) for index, change in changes.items())
+        stretched, factor = self._stretched(combination.factor, changed=bool(changes))
+        derivative_scales = factor ** np.arange(STIFFNESS.orders)[:, None]
+        sample_changes = {
+            index: derivative_scales * change.rows[:, loads[index].steps] for index, change in changes.items()
+        }
+        declared, factor = self._at_task_rate(
+            with_changed_stiffness(stretched, sample_changes), factor, combination
+        )
         sizes = (change.rms / self._stiffness_rms[index] for index, change in changes.items())
         return Fix(
-            size=math.hypot(found.factor - 1, *sizes),
+            size=math.hypot(combination.factor - 1, *sizes),
             robot=acceptance.robot,
             declared=declared,
             factor=factor,
             asked=self.trajectory,
-            slow_down=self._slow_down(found),
-            branch=self._branch(found),
-            stiffness_profile=StiffnessProfile(summaries) if summaries else None,
+            slow_down=self._slow_down(combination),
+            branch=self._branch(combination),
+            stiffness_profile=StiffnessProfile(joint_changes) if joint_changes else None,
         )
 
     def with_transition(self) -> Fix:
@@ -185,18 +196,24 @@ class Task:
         Raises:
             ImpossibleError: no transition is accepted.
         """
-        before, after, longer = smallest_transition(self.acceptance, self.trajectory)
-        asked, changed = (
-            each.block(0, each.samples).commanded[STIFFNESS.key].T for each in (self.trajectory, longer)
+        commanded_time, transition_time, changed_trajectory = smallest_transition(
+            self.acceptance, self.trajectory
         )
-        changes = [np.nan_to_num(new - old) for old, new in zip(asked, changed, strict=True)]
+        commanded_stiffness, changed_stiffness = (
+            each.block(0, each.samples).commanded[STIFFNESS.key].T
+            for each in (self.trajectory, changed_trajectory)
+        )
+        changes = [
+            np.nan_to_num(changed_row - commanded_row)
+            for commanded_row, changed_row in zip(commanded_stiffness, changed_stiffness, strict=True)
+        ]
         sizes = [float(self.relative_size(i, change)) for i, change in enumerate(changes) if change.any()]
         return Fix(
             size=math.hypot(*sizes),
             robot=self.acceptance.robot,
-            declared=longer,
+            declared=changed_trajectory,
             asked=self.trajectory,
-            transition=LongerTransition(before, after),
+            transition=LongerTransition(commanded_time, transition_time),
         )
 
     def _stretched(self, factor: float, *, changed: bool) -> tuple[Trajectory, float]:
@@ -213,9 +230,11 @@ class Task:
             return self.trajectory, factor
         return self.trajectory.stretched(factor), 1.0
 
-    def _kept_rate(self, declared: Trajectory, factor: float, found: Combination) -> tuple[Trajectory, float]:
+    def _at_task_rate(
+        self, declared: Trajectory, factor: float, combination: Combination
+    ) -> tuple[Trajectory, float]:
         """Return the declared trajectory at the rate of the task if possible, and its remaining factor."""
-        if found.factor == 1 or not self.keeps_rate:
+        if combination.factor == 1 or not self.keeps_rate:
             return declared, factor
         return with_kept_rate(declared, factor, rate_of(self.trajectory))
 
@@ -226,21 +245,23 @@ class Task:
             ImpossibleError: no constant fixes some joint.
         """
         loads = {index: self.judged(load) for index, load in self.refused_loads.items()}
-        constants = _of_joints(self.acceptance, loads, partial(smallest_offset, self.acceptance))
-        sizes = [float(self.relative_size(index, np.array([by]))) for index, by in constants.items()]
+        constants = _changes_by_joint(self.acceptance, loads, partial(smallest_offset, self.acceptance))
+        sizes = [
+            float(self.relative_size(index, np.array([constant]))) for index, constant in constants.items()
+        ]
         return Combination(1.0, constants, {}, math.hypot(*sizes))
 
-    def _slow_down(self, found: Combination) -> SlowDown | None:
-        return SlowDown(found.factor, self.trajectory.duration) if found.factor > 1 else None
+    def _slow_down(self, combination: Combination) -> SlowDown | None:
+        return SlowDown(combination.factor, self.trajectory.duration) if combination.factor > 1 else None
 
-    def _branch(self, found: Combination) -> OtherBranch | None:
+    def _branch(self, combination: Combination) -> OtherBranch | None:
         names = self.acceptance.robot.joint_names
-        branches = {names[index]: branch for index, branch in found.branches.items()}
+        branches = {names[index]: branch for index, branch in combination.branches.items()}
         return OtherBranch(branches) if branches else None
 
 
-def _of_joints(
-    acceptance: Acceptance, loads: Mapping[int, Load], find: Callable[[Joint, Load], _Change]
+def _changes_by_joint(
+    acceptance: Acceptance, loads: Mapping[int, Load], search: Callable[[Joint, Load], _Change]
 ) -> dict[int, _Change]:
     """Search for the change of each joint with a load, by index.
 
@@ -251,7 +272,7 @@ def _of_joints(
     reasons: list[str] = []
     for index, load in loads.items():
         try:
-            changes[index] = find(acceptance.robot.joints[index], load)
+            changes[index] = search(acceptance.robot.joints[index], load)
         except ImpossibleError as error:
             reasons += error.reasons
     if reasons:
@@ -259,12 +280,12 @@ def _of_joints(
     return changes
 
 
-def _summary(joint: Joint, change: Change) -> JointChange:
-    largest = int(np.abs(change.rows[0]).argmax())
+def _joint_change(joint: Joint, change: Change) -> JointChange:
+    largest_index = int(np.abs(change.rows[0]).argmax())
     return JointChange(
         joint=joint.name,
-        largest=float(change.rows[0, largest]),
-        time=float(change.time[largest]),
+        largest=float(change.rows[0, largest_index]),
+        time=float(change.time[largest_index]),
         rms=change.rms,
         unit=units.STIFFNESS.unit(joint.type),
     )

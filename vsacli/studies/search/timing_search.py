@@ -14,33 +14,33 @@ from vsacli.studies.search.interior_point import Minimum, minimize_all
 from vsacli.studies.search.loads import Ends
 from vsacli.studies.search.paced_motion import (
     CLEARANCE,
-    FASTEST,
+    MIN_PACE,
     PacedJoint,
     PacedMotion,
-    instants_of,
-    least_pace,
+    checked_instants,
+    min_pace,
 )
 from vsacli.studies.search.paced_search import PacedSearch, Start
 from vsacli.studies.search.separable import Group, SeparableProblem
 from vsacli.studies.search.splines import PacedSpaces, Pacing
 from vsacli.trajectory.trajectory import Trajectory
 
-STIFFER_STARTS = (1.0, 0.8, 1.5, 2.2)
+START_STIFFNESS_FACTORS = (1.0, 0.8, 1.5, 2.2)
 """Multiples of the commanded stiffness for the starts, if it may vary."""
 
-SLOWEST, STRIDE = 1000.0, 1.1
+MAX_FACTOR, STRIDE = 1000.0, 1.1
 """Largest factor of a uniform slow-down that is tried, and the ratio of successive factors."""
 
 HALVINGS = 16
 """Bisections of the last stride, to 1e-6 of the factor."""
 
-UNBOUNDED = 1.1
+UNBOUNDED_RATIO = 1.1
 """Multiple of the duration at the smallest pace below which no other bound limits the motion."""
 
-SLACK = 1.02
+START_DURATION_RATIO = 1.02
 """Ratio of a start's duration to that of the fastest uniform timing."""
 
-SLOWER = (0.0, 1e-5, 1e-4, 3e-4)
+FINAL_SLOW_DOWNS = (0.0, 1e-5, 1e-4, 3e-4)
 """Relative slow-downs to try so that a motion keeps all bounds between instants as well."""
 
 LAST_TIMING_GAP = 1e-4
@@ -85,8 +85,8 @@ class TimingSearch(PacedSearch):
         seed: int,
         progress: Callable[[], None],
     ) -> None:
-        robot, count = acceptance.robot, max(ends.periods, 1)
-        instants = instants_of(trajectory, trajectory.duration / count, acceptance.between)
+        robot, period_count = acceptance.robot, max(ends.periods, 1)
+        instants = checked_instants(trajectory, trajectory.duration / period_count, acceptance.between)
         motion = PacedMotion(robot, trajectory, instants)
         joints = [
             PacedJoint(
@@ -99,7 +99,7 @@ class TimingSearch(PacedSearch):
             for index in range(len(robot.joints))
         ]
         super().__init__(motion, joints, varied, seed, progress)
-        self._ends, self._count = ends, count
+        self._ends, self._period_count = ends, period_count
         self.uniform = math.nan
 
     def best(self) -> Pacing:
@@ -108,64 +108,77 @@ class TimingSearch(PacedSearch):
         Raises:
             ImpossibleError: none was found, or no limit bounds the speed.
         """
-        found = super().best()
-        shortest = np.trapezoid(least_pace(self._motion.resting), self._s)
-        held = any(self._ends.moving)
-        if not found.bounding if held else found.pace().integrate(*self._span) < UNBOUNDED * shortest:
+        pacing = super().best()
+        min_duration = np.trapezoid(min_pace(self._motion.resting), self._s)
+        has_moving_end = any(self._ends.moving)
+        if (
+            not pacing.bounding
+            if has_moving_end
+            else pacing.pace().integrate(*self._span) < UNBOUNDED_RATIO * min_duration
+        ):
             raise ImpossibleError(
-                f"no limit keeps the motion from being {1 / FASTEST:g} times as fast; give some, such as "
+                f"no limit keeps the motion from being {1 / MIN_PACE:g} times as fast; give some, such as "
                 "max_torque of the motors, or begin with a shorter duration"
             )
-        return found
+        return pacing
 
     def _spaces(self, pieces: int) -> PacedSpaces:
         return PacedSpaces.of(self._span, pieces, self._varied, self._ends)
 
     def _starts(self, spaces: PacedSpaces) -> Sequence[Start]:
-        asked = {joint: self._motion.stiffness(joint) for joint in self._varied}
-        begun: list[Start] = []
-        for multiple in STIFFER_STARTS if self._varied else STIFFER_STARTS[:1]:
-            stiffness = {joint: multiple * row for joint, row in asked.items()}
-            factor = self._uniform(spaces, stiffness)
+        commanded_stiffness = {joint: self._motion.stiffness(joint) for joint in self._varied}
+        starts: list[Start] = []
+        for multiple in START_STIFFNESS_FACTORS if self._varied else START_STIFFNESS_FACTORS[:1]:
+            stiffness = {joint: multiple * row for joint, row in commanded_stiffness.items()}
+            factor = self._min_uniform_pace(spaces, stiffness)
             if factor is None:
                 continue
-            inside = spaces.even(self._s, SLACK * factor, stiffness)
-            begun.append((inside, inside))
+            interior_point = spaces.even(self._s, START_DURATION_RATIO * factor, stiffness)
+            starts.append((interior_point, interior_point))
             if multiple == 1:
                 self._scale = factor * self._span[1]
-                self.uniform = math.nan if any(self._ends.moving) else self._count * self._scale
-                begun += [
-                    (spaces.fitted(self._s, factor * drawn, stiffness), inside)
-                    for drawn in self._drawn(SLACK, 2.0)
+                self.uniform = math.nan if any(self._ends.moving) else self._period_count * self._scale
+                starts += [
+                    (spaces.fitted(self._s, factor * random_pace, stiffness), interior_point)
+                    for random_pace in self._random_paces(START_DURATION_RATIO, 2.0)
                 ]
-        if not begun:
+        if not starts:
             raise NoStartError("no slow-down or speed-up of the whole motion keeps every limit")
-        return begun
+        return starts
 
     def _refined_start(self, spaces: PacedSpaces, rows: Mapping[int | None, FloatArray]) -> Start:
         # a little slower, since the way out of a corner is long
         stiffness = {key: row for key, row in rows.items() if key is not None}
-        slower = spaces.fitted(self._s, SLACK * rows[None], stiffness)
-        return slower, slower
+        slowed_unknowns = spaces.fitted(self._s, START_DURATION_RATIO * rows[None], stiffness)
+        return slowed_unknowns, slowed_unknowns
 
-    def _uniform(self, spaces: PacedSpaces, stiffness: Mapping[int, FloatArray]) -> float | None:
+    def _min_uniform_pace(self, spaces: PacedSpaces, stiffness: Mapping[int, FloatArray]) -> float | None:
         """Return the smallest constant pace that keeps all bounds, or None."""
-        every = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
-        even, pace = spaces.even(self._s, 1.0, stiffness), spaces.even(self._s, 2.0, stiffness)
-        pace -= even  # unknowns that make the pace faster by one
+        problem = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
+        base_unknowns, pace_direction = (
+            spaces.even(self._s, 1.0, stiffness),
+            spaces.even(self._s, 2.0, stiffness),
+        )
+        pace_direction -= base_unknowns  # unknowns that make the pace faster by one
 
         def kept(factor: float) -> bool:
-            ((_, bounds),) = every.values([even + (factor - 1) * pace])
+            ((_, bounds),) = problem.values([base_unknowns + (factor - 1) * pace_direction])
             return bool(np.all(bounds < 0))
 
-        factors = FASTEST * STRIDE ** np.arange(math.ceil(math.log(SLOWEST / FASTEST) / math.log(STRIDE)))
-        factor = next((each for each in factors.tolist() if kept(SLACK * each) and kept(each)), None)
+        factors = MIN_PACE * STRIDE ** np.arange(
+            math.ceil(math.log(MAX_FACTOR / MIN_PACE) / math.log(STRIDE))
+        )
+        factor = next(
+            (each for each in factors.tolist() if kept(START_DURATION_RATIO * each) and kept(each)), None
+        )
         if factor is None:
             return None
-        refused = factor / STRIDE
+        refused_factor = factor / STRIDE
         for _ in range(HALVINGS):
-            middle = math.sqrt(refused * factor)
-            refused, factor = (refused, middle) if kept(middle) else (middle, factor)
+            middle_factor = math.sqrt(refused_factor * factor)
+            refused_factor, factor = (
+                (refused_factor, middle_factor) if kept(middle_factor) else (middle_factor, factor)
+            )
         return float(factor)
 
     def _minima(
@@ -173,11 +186,13 @@ class TimingSearch(PacedSearch):
     ) -> Sequence[Minimum]:
         return minimize_all(problem, starts, gap, LAST_TIMING_GAP, STALLED_TIMING)
 
-    def _accepted(self, spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
-        """Return the minimum, slowed down by a share of `SLOWER` that keeps all bounds, or None."""
-        for share in SLOWER:
-            unknowns = spaces.slowed(found.unknowns, share)
-            ((cost, bounds),) = SeparableProblem(every).values([unknowns])
+    def _accepted(
+        self, spaces: PacedSpaces, full_groups: Sequence[Group], minimum: Minimum
+    ) -> Minimum | None:
+        """Return the minimum, slowed down by a share of `FINAL_SLOW_DOWNS` that keeps all bounds, or None."""
+        for share in FINAL_SLOW_DOWNS:
+            unknowns = spaces.slowed(minimum.unknowns, share)
+            ((cost, bounds),) = SeparableProblem(full_groups).values([unknowns])
             if np.all(bounds <= CLEARANCE / 2):
-                return replace(found, unknowns=unknowns, cost=cost)
+                return replace(minimum, unknowns=unknowns, cost=cost)
         return None

@@ -72,7 +72,7 @@ class Effects:
         shape = (len(steps), joints)
         self._steps = steps
         self._weights = trapezoidal_weights(times)
-        self._done = 0
+        self._sample_count = 0
         self.peak = np.zeros(joints)
         self.largest, self.time, self.spent = np.zeros((3, *shape))
         self.motor = np.ones(shape, dtype=int)
@@ -88,43 +88,49 @@ class Effects:
         self.failed += int(np.count_nonzero(failed))
         self.left_out += int(np.count_nonzero(failed.any(axis=1)))
         self.peak = np.fmax(self.peak, np.fmax.reduce(np.abs(block.tau_motor), axis=(0, 2)))
-        weights = self._weights[self._done : self._done + len(part.time), None, None]
-        spending = weights * (block.motor_power > 0)  # negative work is not subtracted
-        gap = np.where(np.isfinite(part.margin), part.margin, np.inf)
-        worst, joints = gap.argmin(axis=0), np.arange(gap.shape[1])
-        smaller = gap[worst, joints] < self.smallest.value
-        self.smallest.slopes[:, smaller] = 0.0
+        weights = self._weights[self._sample_count : self._sample_count + len(part.time), None, None]
+        work_weights = weights * (block.motor_power > 0)  # negative work is not subtracted
+        margins = np.where(np.isfinite(part.margin), part.margin, np.inf)
+        worst_samples, joints = margins.argmin(axis=0), np.arange(margins.shape[1])
+        is_smaller = margins[worst_samples, joints] < self.smallest.value
+        self.smallest.slopes[:, is_smaller] = 0.0
         for group in part.groups:
             for joint, slopes in enumerate(group.of_joints):
                 if slopes is None or not group.places:
                     continue
                 self._add_torque(part.time, slopes["tau_motor"], group.places, joint)
-                energy = slopes.total("motor_power", spending[:, joint].T)
+                energy = slopes.total("motor_power", work_weights[:, joint].T)
                 self.spent[group.places, joint] += energy * self._steps[group.places]
-                if smaller[joint]:
-                    self.smallest.slopes[group.places, joint] = slopes[MARGIN][:, worst[joint]]
+                if is_smaller[joint]:
+                    self.smallest.slopes[group.places, joint] = slopes[MARGIN][:, worst_samples[joint]]
         self.smallest = self.smallest._replace(
-            value=np.where(smaller, gap[worst, joints], self.smallest.value),
-            time=np.where(smaller, part.time[worst], self.smallest.time),
+            value=np.where(is_smaller, margins[worst_samples, joints], self.smallest.value),
+            time=np.where(is_smaller, part.time[worst_samples], self.smallest.time),
         )
-        self._done += len(part.time)
+        self._sample_count += len(part.time)
 
     @property
     def verdict(self) -> str:
         """Verdict on the run with unchanged parameters."""
-        judged = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "over_limit": LIMITS}
-        return next((verdict for verdict, bits in judged.items() if has_flag(self._flags, bits).any()), "ok")
+        bits_by_verdict = {"infeasible": Flag.INFEASIBLE, "singular": Flag.SINGULAR, "over_limit": LIMITS}
+        return next(
+            (verdict for verdict, bits in bits_by_verdict.items() if has_flag(self._flags, bits).any()), "ok"
+        )
 
-    def _add_torque(self, time: FloatArray, slopes: FloatArray, places: Sequence[int], joint: int) -> None:
-        changes = np.abs(slopes).reshape(len(places), -1)
+    def _add_torque(
+        self, time: FloatArray, slopes: FloatArray, parameter_indices: Sequence[int], joint: int
+    ) -> None:
+        changes = np.abs(slopes).reshape(len(parameter_indices), -1)
         np.copyto(changes, 0.0, where=np.isnan(changes))
-        worst = changes.argmax(axis=1)
-        found = changes[np.arange(len(places)), worst] * self._steps[places]
-        larger = found > self.largest[places, joint]
-        at = np.asarray(places)[larger]
-        self.largest[at, joint] = found[larger]
-        self.time[at, joint] = time[worst[larger] % len(time)]
-        self.motor[at, joint] = 1 + worst[larger] // len(time)
+        worst_indices = changes.argmax(axis=1)
+        largest_changes = (
+            changes[np.arange(len(parameter_indices)), worst_indices] * self._steps[parameter_indices]
+        )
+        is_larger = largest_changes > self.largest[parameter_indices, joint]
+        index_array = np.asarray(parameter_indices)[is_larger]
+        self.largest[index_array, joint] = largest_changes[is_larger]
+        self.time[index_array, joint] = time[worst_indices[is_larger] % len(time)]
+        self.motor[index_array, joint] = 1 + worst_indices[is_larger] // len(time)
 
 
 def sensitivity(
@@ -179,23 +185,38 @@ def analyzed(
     Raises:
         InputError: a tolerance is invalid.
     """
-    robot, given = run.robot, None if tolerances is None else tolerances_of(tolerances, run.parameters)
+    robot, parameter_tolerances = (
+        run.robot,
+        None if tolerances is None else tolerances_of(tolerances, run.parameters),
+    )
     steps = np.array([step_of(each) for each in run.parameters])
     effects = Effects(steps, run.trajectory.times.block(0, run.trajectory.samples), len(robot.joints))
-    sizes = np.zeros(len(run.parameters)) if given is None else tolerance_deviations(given)
-    band = None if given is None else Band(sizes, robot.actuators)
+    deviations = (
+        np.zeros(len(run.parameters))
+        if parameter_tolerances is None
+        else tolerance_deviations(parameter_tolerances)
+    )
+    band = None if parameter_tolerances is None else Band(deviations, robot.actuators)
     for part in run:
         effects.add(part)
         if band is not None:
             band.add(part)
         keep(part)
         progress(len(part.time))
-    drawn = None
-    if given is not None and runs:
-        drawn = monte_carlo(robot, run.trajectory, run.parameters, given, runs, seed=seed, progress=progress)
-    found = [
-        _effect(robot, parameter, place, effects, None if given is None else float(sizes[place]))
-        for place, parameter in enumerate(run.parameters)
+    monte_carlo_results = None
+    if parameter_tolerances is not None and runs:
+        monte_carlo_results = monte_carlo(
+            robot, run.trajectory, run.parameters, parameter_tolerances, runs, seed=seed, progress=progress
+        )
+    parameter_effects = [
+        _effect(
+            robot,
+            parameter,
+            index,
+            effects,
+            None if parameter_tolerances is None else float(deviations[index]),
+        )
+        for index, parameter in enumerate(run.parameters)
     ]
     return Sensitivity(
         robot=robot.name,
@@ -209,36 +230,38 @@ def analyzed(
             *run.trajectory.warnings,
             *([unjudged_tools_text(robot.limited_tools)] if robot.limited_tools else []),
         ),
-        parameters=tuple(sorted(found, key=lambda each: -each.share)),
+        parameters=tuple(sorted(parameter_effects, key=lambda each: -each.share)),
         band={} if band is None else dict(zip(robot.joint_names, band.joints(), strict=True)),
-        monte_carlo=drawn,
+        monte_carlo=monte_carlo_results,
         curves=None if band is None else band.curves(),
         units={joint.name: TORQUE.unit(joint.type) for joint in robot.joints},
     )
 
 
 def _effect(
-    robot: Robot, parameter: Parameter, place: int, effects: Effects, tolerance: float | None
+    robot: Robot, parameter: Parameter, index: int, effects: Effects, tolerance: float | None
 ) -> ParameterEffect:
-    step = step_of(parameter)
-    margins = np.where(np.isfinite(effects.smallest.value), step * effects.smallest.slopes[place], math.nan)
+    parameter_change = step_of(parameter)
+    margins = np.where(
+        np.isfinite(effects.smallest.value), parameter_change * effects.smallest.slopes[index], math.nan
+    )
     joints = {
         name: JointEffect(
-            torque=float(effects.largest[place, joint]),
-            share=share_of_peak(float(effects.largest[place, joint]), float(effects.peak[joint])),
-            time=float(effects.time[place, joint]),
-            motor=int(effects.motor[place, joint]),
+            torque=float(effects.largest[index, joint]),
+            share=share_of_peak(float(effects.largest[index, joint]), float(effects.peak[joint])),
+            time=float(effects.time[index, joint]),
+            motor=int(effects.motor[index, joint]),
             margin=float(margins[joint]),
-            spent=float(effects.spent[place, joint]),
+            spent=float(effects.spent[index, joint]),
         )
         for joint, name in enumerate(robot.joint_names)
-        if effects.largest[place, joint] > 0 or effects.smallest.slopes[place, joint] != 0
+        if effects.largest[index, joint] > 0 or effects.smallest.slopes[index, joint] != 0
     }
     return ParameterEffect(
         path=str(parameter),
         value=parameter.value,
         unit=parameter.unit,
-        step=step,
+        step=parameter_change,
         words=words_of(parameter),
         joints=joints,
         tolerance=tolerance,

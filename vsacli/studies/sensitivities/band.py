@@ -25,7 +25,7 @@ from vsacli.base.json_records import Published
 from vsacli.studies.sensitivities.joint_derivatives import MARGIN, SPEED
 from vsacli.studies.sensitivities.slopes import Derivatives
 
-NEAR = 5.0
+REVERSAL_DEVIATIONS = 5.0
 """Speed in standard deviations below which the direction is uncertain. In a normal distribution, one motor in
 three million runs the other way, but near the ends of the attainable stiffness speeds grow without bound and
 their distributions have longer tails."""
@@ -63,17 +63,26 @@ class Reversals:
         """
         uncertain = deviation > 0
         scale = np.where(uncertain, deviation, 1.0)
-        above, below = (speed - REST) / scale, (-speed - REST) / scale
+        forward_limit, backward_limit = (speed - REST) / scale, (-speed - REST) / scale
         forward, backward = self._forward, self._backward
-        up, down = scipy.special.ndtr(above), scipy.special.ndtr(below)
-        spread = forward**2 * up + backward**2 * down - (forward * up - backward * down) ** 2
-        slope = (forward * np.exp(-(above**2) / 2) + backward * np.exp(-(below**2) / 2)) / np.sqrt(2 * np.pi)
-        return np.where(uncertain, spread + 2 * covariance / scale * slope, 0.0)
+        forward_probability, backward_probability = (
+            scipy.special.ndtr(forward_limit),
+            scipy.special.ndtr(backward_limit),
+        )
+        friction_variance = (
+            forward**2 * forward_probability
+            + backward**2 * backward_probability
+            - (forward * forward_probability - backward * backward_probability) ** 2
+        )
+        mean_derivative = (
+            forward * np.exp(-(forward_limit**2) / 2) + backward * np.exp(-(backward_limit**2) / 2)
+        ) / np.sqrt(2 * np.pi)
+        return np.where(uncertain, friction_variance + 2 * covariance / scale * mean_derivative, 0.0)
 
     def uncertain(self, speed: FloatArray, deviation: FloatArray) -> BoolArray:
         """Return a mask of joints with a motor of uncertain direction, (samples, joints); see `variance`."""
-        near = (deviation > 0) & (np.abs(speed) < NEAR * deviation)
-        return np.asarray(np.any(near & (self._forward + self._backward > 0), axis=-1))
+        is_near_rest = (deviation > 0) & (np.abs(speed) < REVERSAL_DEVIATIONS * deviation)
+        return np.asarray(np.any(is_near_rest & (self._forward + self._backward > 0), axis=-1))
 
 
 @dataclass(frozen=True)
@@ -123,9 +132,9 @@ class _BandBlock(NamedTuple):
     time: FloatArray
     tau_motor: FloatArray
     margin: FloatArray
-    of_torque: FloatArray
-    of_margin: FloatArray
-    by_reversals: FloatArray
+    torque_deviation: FloatArray
+    margin_deviation: FloatArray
+    reversal_variance: FloatArray
     uncertain: BoolArray
 
 
@@ -145,89 +154,101 @@ class Band:
     def add(self, part: Derivatives) -> None:
         """Include the next block."""
         block = part.block
-        of_torque, of_speed, of_both = np.zeros((3, *block.tau_motor.shape))
-        of_margin = np.zeros_like(part.margin)
-        for joint, slopes, variances in self._of_joints(part):
-            torque, of_gap = slopes["tau_motor"], slopes[MARGIN]
-            of_torque[:, joint] += np.einsum("pms,p->sm", torque**2, variances)
-            of_margin[:, joint] += np.einsum("ps,p->s", of_gap**2, variances)
+        torque_variance, speed_variance, covariance = np.zeros((3, *block.tau_motor.shape))
+        margin_variance = np.zeros_like(part.margin)
+        for joint, slopes, variances in self._uncertain_slopes(part):
+            torque, margin_slopes = slopes["tau_motor"], slopes[MARGIN]
+            torque_variance[:, joint] += np.einsum("pms,p->sm", torque**2, variances)
+            margin_variance[:, joint] += np.einsum("ps,p->s", margin_slopes**2, variances)
             if self._reversals.possible:
                 speed = slopes[SPEED]
-                of_speed[:, joint] += np.einsum("pms,p->sm", speed**2, variances)
-                of_both[:, joint] += np.einsum("pms,pms,p->sm", torque, speed, variances)
-        by_reversals, uncertain = np.zeros_like(of_torque), np.zeros(of_margin.shape, dtype=bool)
+                speed_variance[:, joint] += np.einsum("pms,p->sm", speed**2, variances)
+                covariance[:, joint] += np.einsum("pms,pms,p->sm", torque, speed, variances)
+        reversal_variance, uncertain = (
+            np.zeros_like(torque_variance),
+            np.zeros(margin_variance.shape, dtype=bool),
+        )
         if self._reversals.possible:
-            of_speed = np.sqrt(of_speed)
-            by_reversals = self._reversals.variance(block.dtheta, of_speed, of_both)
-            uncertain = self._reversals.uncertain(block.dtheta, of_speed)
-        of_torque = np.sqrt(np.maximum(of_torque + by_reversals, 0.0))
-        of_run = (part.time, block.tau_motor, part.margin, of_torque, np.sqrt(of_margin))
-        self._parts.append(_BandBlock(*of_run, by_reversals, uncertain))
+            speed_deviation = np.sqrt(speed_variance)
+            reversal_variance = self._reversals.variance(block.dtheta, speed_deviation, covariance)
+            uncertain = self._reversals.uncertain(block.dtheta, speed_deviation)
+        torque_deviation = np.sqrt(np.maximum(torque_variance + reversal_variance, 0.0))
+        run_arrays = (part.time, block.tau_motor, part.margin, torque_deviation, np.sqrt(margin_variance))
+        self._parts.append(_BandBlock(*run_arrays, reversal_variance, uncertain))
 
-    def _of_joints(self, part: Derivatives) -> Iterator[tuple[int, dict[str, FloatArray], FloatArray]]:
+    def _uncertain_slopes(self, part: Derivatives) -> Iterator[tuple[int, dict[str, FloatArray], FloatArray]]:
         """Yield joint, slopes by uncertain parameters, and the variances of these parameters."""
         names = ("tau_motor", SPEED, MARGIN) if self._reversals.possible else ("tau_motor", MARGIN)
         for group in part.groups:
             variances = self._variances[group.places]
-            known = np.flatnonzero(variances)
-            for joint, slopes in enumerate(group.of_joints if known.size else ()):
+            uncertain_indices = np.flatnonzero(variances)
+            for joint, slopes in enumerate(group.of_joints if uncertain_indices.size else ()):
                 if slopes is not None:
-                    yield joint, {name: slopes[name][known] for name in names}, variances[known]
+                    yield (
+                        joint,
+                        {name: slopes[name][uncertain_indices] for name in names},
+                        variances[uncertain_indices],
+                    )
 
     def curves(self) -> TorqueCurves:
         """Return the torques and their standard deviations so far."""
-        run = self._together()
-        return TorqueCurves(run.time, run.tau_motor, run.of_torque)
+        run = self._concatenated_blocks()
+        return TorqueCurves(run.time, run.tau_motor, run.torque_deviation)
 
     def joints(self) -> list[JointBand]:
         """Return the band of each joint."""
-        run = self._together()
+        run = self._concatenated_blocks()
         return [
             _joint_band(
                 _BandBlock(
                     time=run.time,
                     tau_motor=run.tau_motor[:, joint],
                     margin=run.margin[:, joint],
-                    of_torque=run.of_torque[:, joint],
-                    of_margin=run.of_margin[:, joint],
-                    by_reversals=run.by_reversals[:, joint],
+                    torque_deviation=run.torque_deviation[:, joint],
+                    margin_deviation=run.margin_deviation[:, joint],
+                    reversal_variance=run.reversal_variance[:, joint],
                     uncertain=run.uncertain[:, joint],
                 )
             )
             for joint in range(run.margin.shape[1])
         ]
 
-    def _together(self) -> _BandBlock:
+    def _concatenated_blocks(self) -> _BandBlock:
         return _BandBlock(*map(np.concatenate, zip(*self._parts, strict=True)))
 
 
 def _joint_band(run: _BandBlock) -> JointBand:
-    spread = np.nan_to_num(np.fmax(*run.of_torque.T))
-    worst = int(spread.argmax())
-    deviation, motor = float(spread[worst]), int(np.nan_to_num(run.of_torque[worst]).argmax())
+    deviations = np.nan_to_num(np.fmax(*run.torque_deviation.T))
+    worst_sample = int(deviations.argmax())
+    deviation, motor = (
+        float(deviations[worst_sample]),
+        int(np.nan_to_num(run.torque_deviation[worst_sample]).argmax()),
+    )
     peak = float(np.nanmax(np.abs(run.tau_motor), initial=0.0))
-    reversing = float(run.by_reversals[worst, motor]) / deviation**2 if deviation > 0 else 0.0
-    of_torque = (
+    reversal_share = (
+        float(run.reversal_variance[worst_sample, motor]) / deviation**2 if deviation > 0 else 0.0
+    )
+    torque_values = (
         deviation,
         share_of_peak(deviation, peak),
-        float(run.time[worst]),
+        float(run.time[worst_sample]),
         bool(run.uncertain.any()),
-        reversing,
+        reversal_share,
     )
-    known = np.isfinite(run.margin) & (run.of_margin > 0)
-    if not known.any():
-        return JointBand(*of_torque, math.nan, math.nan, math.nan, 0.0)
-    distance = np.where(known, run.margin / np.where(known, run.of_margin, 1.0), np.inf)
-    near = int(distance.argmin())
+    has_margin = np.isfinite(run.margin) & (run.margin_deviation > 0)
+    if not has_margin.any():
+        return JointBand(*torque_values, math.nan, math.nan, math.nan, 0.0)
+    distance = np.where(has_margin, run.margin / np.where(has_margin, run.margin_deviation, 1.0), np.inf)
+    nearest_sample = int(distance.argmin())
     return JointBand(
-        *of_torque,
-        float(run.margin[near]),
-        float(run.of_margin[near]),
-        float(run.time[near]),
-        math.erfc(float(distance[near]) / math.sqrt(2)) / 2,
+        *torque_values,
+        float(run.margin[nearest_sample]),
+        float(run.margin_deviation[nearest_sample]),
+        float(run.time[nearest_sample]),
+        math.erfc(float(distance[nearest_sample]) / math.sqrt(2)) / 2,
     )
 
 
-def share_of_peak(size: float, peak: float) -> float:
+def share_of_peak(magnitude: float, peak: float) -> float:
     """Return the ratio of a size to a peak; NaN without one."""
-    return size / peak if peak > 0 else math.nan
+    return magnitude / peak if peak > 0 else math.nan

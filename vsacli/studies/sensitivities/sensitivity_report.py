@@ -14,7 +14,7 @@ from vsacli.base.units import in_header
 from vsacli.studies.sensitivities.band import JointBand, TorqueCurves
 from vsacli.studies.sensitivities.tolerances import MonteCarlo
 
-SHOWN = 15
+MAX_TABLE_ROWS = 15
 """Number of parameters in the table, the most important first."""
 
 
@@ -116,15 +116,18 @@ class Sensitivity(Published, TextReport):
     @property
     def title(self) -> str:
         """Names, and with tolerances the largest uncertainty of a motor torque, else the largest effect."""
-        known = {joint: band for joint, band in self.band.items() if math.isfinite(band.share)}
-        worst = max(known, key=lambda joint: known[joint].share, default=None)
-        if worst is not None:
-            band = known[worst]
-            size = f"{band.torque:.3g} {self.units[worst]} ({_percent(band.share)} of its peak, {worst})"
-            answer = f"motor torque +- {size}"
+        finite_bands = {joint: band for joint, band in self.band.items() if math.isfinite(band.share)}
+        worst_joint = max(finite_bands, key=lambda joint: finite_bands[joint].share, default=None)
+        if worst_joint is not None:
+            band = finite_bands[worst_joint]
+            uncertainty = (
+                f"{band.torque:.3g} {self.units[worst_joint]} ({_percent(band.share)} of its peak, "
+                f"{worst_joint})"
+            )
+            answer = f"motor torque +- {uncertainty}"
         elif self.top and self.top[0].most is not None:
-            (joint, effect), first = self.top[0].most, self.top[0]
-            change = f"{first.words} of {first.path} changes motor torque"
+            (joint, effect), top_effect = self.top[0].most, self.top[0]
+            change = f"{top_effect.words} of {top_effect.path} changes motor torque"
             answer = f"{change} by {_percent(effect.share)} of its peak ({joint})"
         else:
             answer = "no parameter changes a motor torque"
@@ -133,8 +136,8 @@ class Sensitivity(Published, TextReport):
     def as_text(self) -> ReportText:
         """Return the report in parts; the first table is that of tolerances, if there are any."""
         tables = [self._band_rows(), self._rows() if self.top else []]
-        first = headline(self.verdict, self.title) if self.left_out else self.title
-        return ReportText(first, list(self._findings()), tables, list(self._lines()))
+        first_line = headline(self.verdict, self.title) if self.left_out else self.title
+        return ReportText(first_line, list(self._findings()), tables, list(self._lines()))
 
     def _findings(self) -> Iterator[str]:
         if self.left_out:
@@ -144,17 +147,18 @@ class Sensitivity(Published, TextReport):
                 "check-feasibility says why"
             )
         yield from warnings_and_notes(self.warnings, ())
-        reversing = [joint for joint, band in self.band.items() if band.reverses]
-        if reversing and self.monte_carlo is None:
+        reversing_joints = [joint for joint, band in self.band.items() if band.reverses]
+        if reversing_joints and self.monte_carlo is None:
             yield (
-                f"{', '.join(reversing)}: dry friction jumps where a motor reverses, at a time known only to "
+                f"{', '.join(reversing_joints)}: dry friction jumps where a motor reverses, at a "
+                "time known only to "
                 "first order; --monte-carlo computes robots drawn from the tolerances"
             )
 
     @property
     def top(self) -> tuple[ParameterEffect, ...]:
         """Effects of the parameters in the table."""
-        return tuple(each for each in self.parameters[:SHOWN] if each.most is not None)
+        return tuple(each for each in self.parameters[:MAX_TABLE_ROWS] if each.most is not None)
 
     def _rows(self) -> list[tuple[str, ...]]:
         units = in_header(self.units[each.most[0]] for each in self.top if each.most)
@@ -190,27 +194,30 @@ class Sensitivity(Published, TextReport):
 
     def _lines(self) -> Iterator[str]:
         """Yield what the table of parameters leaves out."""
-        rest = sum(each.most is not None for each in self.parameters[SHOWN:])
-        without = sum(each.most is None for each in self.parameters)
-        if rest:
-            others = counted(rest, "other parameter")
-            effect = _percent(self.parameters[SHOWN].share)
-            yield f"{others} {'has' if rest == 1 else 'have'} an effect of {effect} or less; --json lists all"
-        if without:
-            yield f"{counted(without, 'parameter')} without effect on motor torques, or zero"
-        if self.monte_carlo is not None:
-            drawn = self.monte_carlo
-            refused = (
-                f", of which {counted(drawn.refused, 'draw')} made no valid robot" if drawn.refused else ""
+        other_count = sum(each.most is not None for each in self.parameters[MAX_TABLE_ROWS:])
+        without_effect = sum(each.most is None for each in self.parameters)
+        if other_count:
+            others = counted(other_count, "other parameter")
+            effect = _percent(self.parameters[MAX_TABLE_ROWS].share)
+            yield (
+                f"{others} {'has' if other_count == 1 else 'have'} an effect of {effect} or less; "
+                "--json lists all"
             )
-            yield f"Monte Carlo: {counted(drawn.drawn, 'robot')} drawn{refused}"
+        if without_effect:
+            yield f"{counted(without_effect, 'parameter')} without effect on motor torques, or zero"
+        if self.monte_carlo is not None:
+            draws = self.monte_carlo
+            refused_clause = (
+                f", of which {counted(draws.refused, 'draw')} made no valid robot" if draws.refused else ""
+            )
+            yield f"Monte Carlo: {counted(draws.drawn, 'robot')} drawn{refused_clause}"
 
     def _band_rows(self) -> list[tuple[str, ...]]:
         """Return the table of the effects of tolerances on each joint; empty without tolerances."""
         if not self.band:
             return []
         units = in_header(self.units[joint] for joint in self.band)
-        drawn = self.monte_carlo
+        draws = self.monte_carlo
         header = (
             "joint",
             f"torque +-\n{units}",
@@ -219,18 +226,18 @@ class Sensitivity(Published, TextReport):
             "margin\n%",
             "at\ns",
             "P(infeasible)\n%",
-            *([] if drawn is None else [f"drawn +-\n{units}", "infeasible\n% of draws"]),
-            *(["mostly by"] if any(_by_friction(band) for band in self.band.values()) else []),
+            *([] if draws is None else [f"drawn +-\n{units}", "infeasible\n% of draws"]),
+            *(["mostly by"] if any(_is_mostly_friction(band) for band in self.band.values()) else []),
         )
         rows = [header]
         for joint, band in self.band.items():
             has_torque, has_margin = math.isfinite(band.share), math.isfinite(band.margin)
-            torque = (
+            torque_cells = (
                 (f"{band.torque:.3g}", _percentage_points(band.share), f"{band.time:.3f}")
                 if has_torque
                 else ["-"] * 3
             )
-            margin = (
+            margin_cells = (
                 (
                     f"{100 * band.margin:.2f} +- {_percentage_points(band.margin_deviation)}",
                     f"{band.margin_time:.3f}",
@@ -239,19 +246,21 @@ class Sensitivity(Published, TextReport):
                 if has_margin
                 else ["-"] * 3
             )
-            of_draws: list[str] = []
-            if drawn is not None:
-                of_draws = ["-", "-"]
-                if joint in drawn.lost:
-                    deviation = drawn.torque[joint]
-                    spread = "-" if math.isnan(deviation) else f"{deviation:.3g}"
-                    of_draws = [spread, _probability(drawn.lost[joint])]
-            friction = ["reversal" if _by_friction(band) else "-"] if header[-1] == "mostly by" else []
-            rows.append((joint, *torque, *margin, *of_draws, *friction))
+            draw_cells: list[str] = []
+            if draws is not None:
+                draw_cells = ["-", "-"]
+                if joint in draws.lost:
+                    deviation = draws.torque[joint]
+                    deviation_text = "-" if math.isnan(deviation) else f"{deviation:.3g}"
+                    draw_cells = [deviation_text, _probability(draws.lost[joint])]
+            friction_cells = (
+                ["reversal" if _is_mostly_friction(band) else "-"] if header[-1] == "mostly by" else []
+            )
+            rows.append((joint, *torque_cells, *margin_cells, *draw_cells, *friction_cells))
         return rows
 
 
-def _by_friction(band: JointBand) -> bool:
+def _is_mostly_friction(band: JointBand) -> bool:
     """Return whether most of the uncertainty is that of the time at which dry friction reverses."""
     return band.reversals > 1 / 2
 

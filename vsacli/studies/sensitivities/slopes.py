@@ -42,54 +42,63 @@ class TorqueSlopes(NamedTuple):
     of_joints: Sequence[FloatArray | None]
 
 
-def torque_slopes(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> Iterator[TorqueSlopes]:
+def torque_slopes(
+    robot: Robot, motion: Motion, parameters_of_run: Sequence[Parameter]
+) -> Iterator[TorqueSlopes]:
     """Differentiate (58)-(60) by parameters of a robot; yield the derivatives joint by joint.
 
     Args:
         robot: robot that executes the motion.
         motion: samples of the motion, and the wrench if there is one.
-        chosen: parameters; link torques do not depend on those of actuators.
+        parameters_of_run: parameters; link torques do not depend on those of actuators.
     """
     # by joint, since derivatives of the whole tree by all parameters would not fit into the caches: at once,
     # the sensitivity of a 7R takes 1.2 times as long
-    frame, given = None if motion.wrench is None else motion.wrench.frame, motion.variables()
+    frame, motion_variables = None if motion.wrench is None else motion.wrench.frame, motion.variables()
     arguments = LinkTorques(robot, frame).arguments
     samples = len(motion.time)
-    rows = arguments.pack({name: by_joint(given[name]) for name in arguments.shapes})
-    plain, carrying = (
-        LinkTorques(each, frame).recursion_inputs(rows) for each in (robot, seeded(robot, chosen))
+    argument_rows = arguments.pack({name: by_joint(motion_variables[name]) for name in arguments.shapes})
+    inputs, seeded_inputs = (
+        LinkTorques(each, frame).recursion_inputs(argument_rows)
+        for each in (robot, seeded(robot, parameters_of_run))
     )
-    for joint, places in _parameter_indices(chosen).items():
-        torques = recursion(_mixed_inputs(plain, carrying, joint))
-        yield TorqueSlopes(places, [_derivatives(each, places, samples) for each in torques])
+    for joint, parameter_indices in _parameter_indices_by_joint(parameters_of_run).items():
+        torques = recursion(_inputs_seeded_at(inputs, seeded_inputs, joint))
+        yield TorqueSlopes(
+            parameter_indices, [_torque_derivatives(each, parameter_indices, samples) for each in torques]
+        )
 
 
-def _parameter_indices(chosen: Sequence[Parameter]) -> dict[int | None, list[int]]:
+def _parameter_indices_by_joint(parameters_of_run: Sequence[Parameter]) -> dict[int | None, list[int]]:
     """Return indices of the parameters of each joint, and (key None) of the robot as a whole."""
-    places: dict[int | None, list[int]] = {}
-    for place, parameter in enumerate(chosen):
-        places.setdefault(parameter.joint, []).append(place)
-    return places
+    indices: dict[int | None, list[int]] = {}
+    for index, parameter in enumerate(parameters_of_run):
+        indices.setdefault(parameter.joint, []).append(index)
+    return indices
 
 
-def _mixed_inputs(plain: RecursionInputs, carrying: RecursionInputs, joint: int | None) -> RecursionInputs:
+def _inputs_seeded_at(
+    inputs: RecursionInputs, seeded_inputs: RecursionInputs, joint: int | None
+) -> RecursionInputs:
     """Return the tree with derivatives by the parameters of one joint, or of the robot as a whole."""
     if joint is None:
-        return plain._replace(gravity=carrying.gravity, loads=carrying.loads)
-    links, states, carriers = list(plain.links), list(plain.states), list(plain.carriers)
-    links[joint], states[joint] = carrying.links[joint], carrying.states[joint]
-    carriers[joint] = carrying.carriers[joint]
-    return plain._replace(links=links, states=states, carriers=carriers)
+        return inputs._replace(gravity=seeded_inputs.gravity, loads=seeded_inputs.loads)
+    links, states, carriers = list(inputs.links), list(inputs.states), list(inputs.carriers)
+    links[joint], states[joint] = seeded_inputs.links[joint], seeded_inputs.states[joint]
+    carriers[joint] = seeded_inputs.carriers[joint]
+    return inputs._replace(links=links, states=states, carriers=carriers)
 
 
-def _derivatives(torques: Sequence[Scalar], places: Sequence[int], samples: int) -> FloatArray | None:
+def _torque_derivatives(
+    torques: Sequence[Scalar], parameter_indices: Sequence[int], samples: int
+) -> FloatArray | None:
     tangents = [tangents_of(torque) for torque in torques]
     if not any(tangents):
         return None
-    derivatives = np.zeros((len(places), len(torques), samples))
-    for order, by_place in enumerate(tangents):
-        for row, place in enumerate(places):
-            derivatives[row, order] = by_place.get(place, 0.0)
+    derivatives = np.zeros((len(parameter_indices), len(torques), samples))
+    for order, torque_tangents in enumerate(tangents):
+        for row, index in enumerate(parameter_indices):
+            derivatives[row, order] = torque_tangents.get(index, 0.0)
     return derivatives
 
 
@@ -190,12 +199,12 @@ class Derivatives:
     def over_time(self, name: str) -> FloatArray:
         """Return derivatives of a variable by all parameters, (samples, parameters, joints[, 2])."""
         variable = self.margin if name == MARGIN else self.block.arrays()[name]
-        nothing = np.where(np.isnan(variable), np.nan, 0.0)
-        slopes = np.repeat(nothing[:, None], self.numbers, axis=1)
-        for places, of_joints in self.groups:
+        zero_or_nan = np.where(np.isnan(variable), np.nan, 0.0)
+        slopes = np.repeat(zero_or_nan[:, None], self.numbers, axis=1)
+        for parameter_indices, of_joints in self.groups:
             for joint, of_joint in enumerate(of_joints):
                 if of_joint is not None:
-                    slopes[:, places, joint] = np.moveaxis(of_joint[name], -1, 0)
+                    slopes[:, parameter_indices, joint] = np.moveaxis(of_joint[name], -1, 0)
         return slopes
 
 
@@ -237,35 +246,47 @@ class SensitivityRun:
         self.parameters: tuple[Parameter, ...] = parameters(robot, patterns)
 
     def __iter__(self) -> Iterator[Derivatives]:
-        most = BLOCK_SLOPES // (len(self.parameters) * len(self.robot.joints))
-        steps = max(1, min(BLOCK_SAMPLES, most))
-        for start in range(0, self.trajectory.samples, steps):
-            motion = self.trajectory.block(start, start + steps)
+        max_block_samples = BLOCK_SLOPES // (len(self.parameters) * len(self.robot.joints))
+        block_samples = max(1, min(BLOCK_SAMPLES, max_block_samples))
+        for start in range(0, self.trajectory.samples, block_samples):
+            motion = self.trajectory.block(start, start + block_samples)
             yield derivatives_of(self.robot, motion, self.parameters)
 
 
-def derivatives_of(robot: Robot, motion: Motion, chosen: Sequence[Parameter]) -> Derivatives:
+def derivatives_of(robot: Robot, motion: Motion, parameters_of_run: Sequence[Parameter]) -> Derivatives:
     """Differentiate a block of samples by parameters of the robot.
 
     Args:
         robot: robot that executes the motion.
         motion: samples of the motion, which fits the robot.
-        chosen: parameters in the order of the derivatives.
+        parameters_of_run: parameters in the order of the derivatives.
     """
     block, joints = compute_block(robot, motion), range(len(robot.joints))
     groups, by_torques = [], []
     for index in joints:
-        own = [place for place, each in enumerate(chosen) if each.joint == index and each.part == ACTUATOR]
-        command = command_of(index, block.arrays())
-        derived = drive_derivatives(robot, index, command, [chosen[at] for at in own])
-        by_torques.append(derived.by_torques)
-        known = Known(derived.by_numbers)
-        groups.append(ParameterGroup(own, [known if joint == index else None for joint in joints]))
-    of_links = [place for place, each in enumerate(chosen) if each.part != ACTUATOR]
-    for places, of_torques in torque_slopes(robot, motion, [chosen[at] for at in of_links]):
-        of_joints = [
-            None if each is None else Chained(each, slopes)
-            for each, slopes in zip(of_torques, by_torques, strict=True)
+        actuator_indices = [
+            place
+            for place, each in enumerate(parameters_of_run)
+            if each.joint == index and each.part == ACTUATOR
         ]
-        groups.append(ParameterGroup([of_links[at] for at in places], of_joints))
-    return Derivatives(block, len(chosen), groups)
+        command = command_of(index, block.arrays())
+        drive_slopes = drive_derivatives(
+            robot, index, command, [parameters_of_run[at] for at in actuator_indices]
+        )
+        by_torques.append(drive_slopes.by_torques)
+        actuator_slopes = Known(drive_slopes.by_numbers)
+        groups.append(
+            ParameterGroup(
+                actuator_indices, [actuator_slopes if joint == index else None for joint in joints]
+            )
+        )
+    link_indices = [place for place, each in enumerate(parameters_of_run) if each.part != ACTUATOR]
+    for index_group, link_torque_slopes in torque_slopes(
+        robot, motion, [parameters_of_run[at] for at in link_indices]
+    ):
+        joint_slopes = [
+            None if each is None else Chained(each, slopes)
+            for each, slopes in zip(link_torque_slopes, by_torques, strict=True)
+        ]
+        groups.append(ParameterGroup([link_indices[at] for at in index_group], joint_slopes))
+    return Derivatives(block, len(parameters_of_run), groups)

@@ -93,33 +93,33 @@ class Tolerance(NamedTuple):
 SHAPES = ("normal", "uniform")
 
 
-def tolerances_of(text: str, chosen: Sequence[Parameter]) -> tuple[Tolerance | None, ...]:
+def tolerances_of(text: str, parameters: Sequence[Parameter]) -> tuple[Tolerance | None, ...]:
     """Return the tolerance of each parameter; None for exact ones.
 
     Args:
         text: share such as `5 %` or `0.05`, or path of a YAML file that maps parameter paths to
             distributions; `*` in a path matches anything, and the last matching entry counts.
-        chosen: parameters. A share does not apply to angles and lengths of links, which are often zero; these
-            remain exact.
+        parameters: parameters. A share does not apply to angles and lengths of links, which are often zero;
+            these remain exact.
 
     Raises:
         InputError: an entry is not a distribution, or matches no parameter; with file and line.
     """
-    written = text.strip()
-    if share := PER_CENT.fullmatch(written):
-        size = _share_of_percent(share["number"], written)
-    elif _PLAIN.fullmatch(written):
-        size = _tolerance_number(written, written)
-        if size > 1:  # more likely percent than a multiple
+    share_text = text.strip()
+    if share := PER_CENT.fullmatch(share_text):
+        relative_size = _share_of_percent(share["number"], share_text)
+    elif _PLAIN.fullmatch(share_text):
+        relative_size = _tolerance_number(share_text, share_text)
+        if relative_size > 1:  # more likely percent than a multiple
             raise InputError.one(
-                f"{written!r} has no unit; write {written}% for all parameters, or name a YAML file"
+                f"{share_text!r} has no unit; write {share_text}% for all parameters, or name a YAML file"
             )
     else:
-        return _from_file(text, chosen)
-    exact = [each.quantity in SMALL_CHANGES or each.value == 0 for each in chosen]
+        return _read_tolerances(text, parameters)
+    is_exact = [each.quantity in SMALL_CHANGES or each.value == 0 for each in parameters]
     return tuple(
-        None if known else Tolerance("normal", size * abs(each.value))
-        for each, known in zip(chosen, exact, strict=True)
+        None if known else Tolerance("normal", relative_size * abs(each.value))
+        for each, known in zip(parameters, is_exact, strict=True)
     )
 
 
@@ -128,30 +128,32 @@ def tolerance_deviations(tolerances: Sequence[Tolerance | None]) -> FloatArray:
     return np.array([0.0 if each is None else each.deviation for each in tolerances])
 
 
-def _from_file(path: str | os.PathLike[str], chosen: Sequence[Parameter]) -> tuple[Tolerance | None, ...]:
+def _read_tolerances(
+    path: str | os.PathLike[str], parameters: Sequence[Parameter]
+) -> tuple[Tolerance | None, ...]:
     source, text = read_source(path)
     problems = Problems(source.path)
     root = parse_yaml(text, problems)
     if not isinstance(root, MapNode):
         problems.fail(root.line, f"expected {CONTENT}, found {root}")
-    stated = root.entries.get("format")
-    if isinstance(stated, TextNode):
-        kind = stated.text.removeprefix("vsacli-").partition("/")[0]
+    format_node = root.entries.get("format")
+    if isinstance(format_node, TextNode):
+        kind = format_node.text.removeprefix("vsacli-").partition("/")[0]
         raise InputError.one(f"is a {kind}; expected {CONTENT}", source.path)
-    found: list[Tolerance | None] = [None] * len(chosen)
+    tolerances: list[Tolerance | None] = [None] * len(parameters)
     for pattern, node in root.entries.items():
         line = root.key_lines[pattern]
-        fitting = [place for place, each in enumerate(chosen) if fnmatchcase(str(each), pattern)]
-        if not fitting:
-            problems.add(line, no_match(pattern, chosen))
-        for place in fitting:
+        matching_indices = [index for index, each in enumerate(parameters) if fnmatchcase(str(each), pattern)]
+        if not matching_indices:
+            problems.add(line, no_match(pattern, parameters))
+        for index in matching_indices:
             try:
-                found[place] = distribution(node, chosen[place].value, chosen[place].unit)
+                tolerances[index] = distribution(node, parameters[index].value, parameters[index].unit)
             except InputError as error:
                 problems.add(node.line, f"{pattern}: {error}")
                 break
     problems.check()
-    return tuple(found)
+    return tuple(tolerances)
 
 
 def distribution(node: Node, value: float, unit: str) -> Tolerance:
@@ -176,11 +178,11 @@ def distribution(node: Node, value: float, unit: str) -> Tolerance:
     return Tolerance(shape, _share_of_percent(share["number"], size.text) * abs(value))
 
 
-def _share_of_percent(percent: str, whole: str) -> float:
+def _share_of_percent(percent: str, text: str) -> float:
     """Return a share given in percent."""
-    share = _tolerance_number(percent, whole) / 100
+    share = _tolerance_number(percent, text) / 100
     if share > 1:
-        raise InputError.one(f"must be at most 100 %, not {whole}")
+        raise InputError.one(f"must be at most 100 %, not {text}")
     return share
 
 
@@ -239,15 +241,21 @@ def monte_carlo(
         InputError: the tolerances are so large that every drawn robot is invalid.
     """
     trajectory, random = adapt_trajectory(robot, trajectory), np.random.default_rng(seed)
-    uncertain = [(each, of_it) for each, of_it in zip(chosen, tolerances, strict=True) if of_it is not None]
-    varied = numbers_as_rows(robot, trajectory, [parameter for parameter, _ in uncertain])
+    uncertain_parameters = [
+        (each, of_it) for each, of_it in zip(chosen, tolerances, strict=True) if of_it is not None
+    ]
+    varied_parameters = numbers_as_rows(
+        robot, trajectory, [parameter for parameter, _ in uncertain_parameters]
+    )
     kernel_samples = runs * trajectory.samples
-    together = max(1, BATCH_SAMPLES // trajectory.samples)
-    sums, refused = _Sums(trajectory.samples, len(robot.joints)), 0
-    for first in range(0, runs, together):
+    batch_size = max(1, BATCH_SAMPLES // trajectory.samples)
+    statistics, refused = _TorqueStatistics(trajectory.samples, len(robot.joints)), 0
+    for first in range(0, runs, batch_size):
         robots = list[Robot]()
-        for _ in range(first, min(first + together, runs)):
-            values = {str(each): each.value + tolerance.drawn(random) for each, tolerance in uncertain}
+        for _ in range(first, min(first + batch_size, runs)):
+            values = {
+                str(each): each.value + tolerance.drawn(random) for each, tolerance in uncertain_parameters
+            }
             try:
                 robots.append(robot.replace(values))
             except InputError as error:
@@ -255,14 +263,16 @@ def monte_carlo(
                 if refused == runs:
                     advice = f"none of {runs} drawn robots is valid; choose smaller tolerances"
                     raise InputError.one(f"{advice}: {error}") from None
-        for torque, lost in _torques_of_robots(robots, trajectory, varied, kernel_samples):
-            sums.add(torque, lost)
-        progress(min(together, runs - first))
+        for torque, failed_joints in _torques_of_robots(
+            robots, trajectory, varied_parameters, kernel_samples
+        ):
+            statistics.add(torque, failed_joints)
+        progress(min(batch_size, runs - first))
     return MonteCarlo(
         drawn=runs,
         refused=refused,
-        lost=dict(zip(robot.joint_names, sums.lost.tolist(), strict=True)),
-        torque=dict(zip(robot.joint_names, sums.deviation.tolist(), strict=True)),
+        lost=dict(zip(robot.joint_names, statistics.lost.tolist(), strict=True)),
+        torque=dict(zip(robot.joint_names, statistics.deviation.tolist(), strict=True)),
     )
 
 
@@ -290,41 +300,41 @@ def _failed_joints(block: Block) -> BoolArray:
 
 def _run_torques(robot: Robot, trajectory: Trajectory) -> tuple[FloatArray, BoolArray]:
     """Return tau_motor, (samples, joints, 2), and a mask of joints with a failed sample, (joints,)."""
-    size = usual_block(len(robot.joints))
+    block_samples = usual_block(len(robot.joints))
     blocks = [
-        compute_block(robot, trajectory.block(start, start + size))
-        for start in range(0, trajectory.samples, size)
+        compute_block(robot, trajectory.block(start, start + block_samples))
+        for start in range(0, trajectory.samples, block_samples)
     ]
-    lost = np.any([_failed_joints(block) for block in blocks], axis=0)
-    return np.concatenate([block.tau_motor for block in blocks]), lost
+    failed_joints = np.any([_failed_joints(block) for block in blocks], axis=0)
+    return np.concatenate([block.tau_motor for block in blocks]), failed_joints
 
 
-class _Sums:
+class _TorqueStatistics:
     """Means and variances of motor torques over robots, by Welford's recurrence."""
 
     def __init__(self, samples: int, joints: int) -> None:
-        self._lost = np.zeros(joints)
+        self._failed_runs = np.zeros(joints)
         self._runs, self._count = 0, np.zeros(joints)
-        self._mean, self._squares = np.zeros((2, samples, joints, 2))
+        self._mean, self._squared_deviation_sums = np.zeros((2, samples, joints, 2))
 
-    def add(self, torque: FloatArray, lost: BoolArray) -> None:
+    def add(self, torque: FloatArray, failed_joints: BoolArray) -> None:
         """Include a robot; its joints with a failed sample do not count."""
         self._runs += 1
-        self._lost += lost
-        self._count += ~lost
-        kept = ~lost[None, :, None] & np.isfinite(torque)
-        change = np.where(kept, torque - self._mean, 0.0)
-        self._mean += change / np.maximum(self._count, 1)[:, None]
-        self._squares += change * np.where(kept, torque - self._mean, 0.0)
+        self._failed_runs += failed_joints
+        self._count += ~failed_joints
+        counted = ~failed_joints[None, :, None] & np.isfinite(torque)
+        deviation = np.where(counted, torque - self._mean, 0.0)
+        self._mean += deviation / np.maximum(self._count, 1)[:, None]
+        self._squared_deviation_sums += deviation * np.where(counted, torque - self._mean, 0.0)
 
     @property
     def lost(self) -> FloatArray:
         """Share of the robots with a failed sample, (joints,)."""
-        return self._lost / max(self._runs, 1)
+        return self._failed_runs / max(self._runs, 1)
 
     @property
     def deviation(self) -> FloatArray:
         """Largest standard deviation over samples and motors, (joints,); NaN for fewer than two robots."""
-        variance = self._squares / np.maximum(self._count - 1, 1)[:, None]
-        largest = np.sqrt(variance.max(axis=(0, 2), initial=0.0))
-        return np.asarray(np.where(self._count > 1, largest, np.nan))
+        variance = self._squared_deviation_sums / np.maximum(self._count - 1, 1)[:, None]
+        max_deviation = np.sqrt(variance.max(axis=(0, 2), initial=0.0))
+        return np.asarray(np.where(self._count > 1, max_deviation, np.nan))

@@ -79,8 +79,8 @@ class Shaft(NamedTuple):
         """Return the shaft of a robot's own motor, on the joint side if its gear is unknown."""
         ratio = abs(motor.gear_ratio or 1.0)
         friction = motor.friction or NO_FRICTION
-        constant = math.nan if motor.torque_constant is None else abs(motor.torque_constant) / ratio
-        by_current = math.inf if motor.max_current is None else motor.max_current * constant
+        torque_constant = math.nan if motor.torque_constant is None else abs(motor.torque_constant) / ratio
+        by_current = math.inf if motor.max_current is None else motor.max_current * torque_constant
         return cls(
             inertia=motor.inertia / ratio**2,
             damping=motor.damping / ratio**2,
@@ -91,7 +91,7 @@ class Shaft(NamedTuple):
             continuous_torque=math.inf,
             max_velocity=motor.max_velocity * ratio,
             max_voltage=math.inf if motor.max_voltage is None else motor.max_voltage,
-            torque_constant=constant,
+            torque_constant=torque_constant,
             resistance=math.nan if motor.resistance is None else motor.resistance,
             efficiency=1.0,
         )
@@ -148,8 +148,8 @@ class Shaft(NamedTuple):
 
     def coefficients(self, ratio: FloatArray) -> FloatArray:
         """Return the coefficients of the torque on the shaft, (motors, 7), for ratios (motors,)."""
-        over = np.asarray(ratio)[..., None]
-        return over * self.inertial + self.frictional + self.loaded / over
+        ratio_column = np.asarray(ratio)[..., None]
+        return ratio_column * self.inertial + self.frictional + self.loaded / ratio_column
 
 
 def shaft_signals(velocity: FloatArray, acceleration: FloatArray, load: FloatArray) -> FloatArray:
@@ -177,9 +177,9 @@ _TORQUE, _VELOCITY, _DAMPING = (
     units.constant(quantity.revolute) for quantity in (units.TORQUE, units.VELOCITY, units.DAMPING)
 )
 """Units of a rotating shaft, also at prismatic joints."""
-_SHARE = Check(lambda value: 0 < value <= 1, "above 0 and at most 1")
-_BEARING = ("continuous_torque", "max_torque", "continuous_current", "max_current")
-_NEEDED = {
+_EFFICIENCY_CHECK = Check(lambda value: 0 < value <= 1, "above 0 and at most 1")
+_TORQUE_LIMITS = ("continuous_torque", "max_torque", "continuous_current", "max_current")
+_REQUIRED_COLUMNS = {
     "resistance": ("torque_constant",),
     "continuous_current": ("torque_constant",),
     "max_current": ("torque_constant",),
@@ -238,29 +238,29 @@ class CatalogMotor(DeclaredRecord):
     gear_efficiency: float = number(
         units.DIMENSIONLESS,
         "efficiency of the gear, the same in both directions",
-        check=_SHARE,
+        check=_EFFICIENCY_CHECK,
         default=1.0,
     )
     mass: float | None = number(units.MASS, "mass of the motor with its gear", check=POSITIVE, default=None)
 
     def _problems(self) -> Iterator[FieldProblem]:
-        yield from (*self._missing(), *self._stuck())
+        yield from (*self._missing_columns(), *self._stall_problems())
 
-    def _missing(self) -> Iterator[FieldProblem]:
+    def _missing_columns(self) -> Iterator[FieldProblem]:
         """Yield the columns that others require."""
-        for name, needed in _NEEDED.items():
-            missing = [key for key in needed if getattr(self, key) is None]
+        for name, required_columns in _REQUIRED_COLUMNS.items():
+            missing = [key for key in required_columns if getattr(self, key) is None]
             if getattr(self, name) is not None and missing:
                 yield FieldProblem((name,), f"needs {' and '.join(missing)}, too")
-        if all(getattr(self, name) is None for name in _BEARING):
-            columns = f"{', '.join(_BEARING[:-1])} or {_BEARING[-1]}"
+        if all(getattr(self, name) is None for name in _TORQUE_LIMITS):
+            columns = f"{', '.join(_TORQUE_LIMITS[:-1])} or {_TORQUE_LIMITS[-1]}"
             yield FieldProblem((), f"motor {self.name!r} has no torque limit; give {columns}")
 
-    def _stuck(self) -> Iterator[FieldProblem]:
+    def _stall_problems(self) -> Iterator[FieldProblem]:
         """Yield a problem if the motor cannot overcome its friction, by torque or voltage."""
-        if self.coulomb and not list(self._missing()) and self.coulomb >= self.shaft.stall_torque:
-            reason = f"must be below the {self.shaft.stall_torque:.4g} N m that the motor can give at all"
-            yield FieldProblem(("coulomb",), reason)
+        if self.coulomb and not list(self._missing_columns()) and self.coulomb >= self.shaft.stall_torque:
+            message = f"must be below the {self.shaft.stall_torque:.4g} N m that the motor can give at all"
+            yield FieldProblem(("coulomb",), message)
 
     @property
     def shaft(self) -> Shaft:
@@ -272,10 +272,12 @@ class CatalogMotor(DeclaredRecord):
             backward=self.coulomb,
             forward=self.coulomb,
             offset=0.0,
-            max_torque=_smallest(self.max_torque, self.max_current, constant),
-            continuous_torque=_smallest(self.continuous_torque, self.continuous_current, constant),
-            max_velocity=_or_infinite(self.max_velocity),
-            max_voltage=_or_infinite(self.max_voltage),
+            max_torque=_effective_torque_limit(self.max_torque, self.max_current, constant),
+            continuous_torque=_effective_torque_limit(
+                self.continuous_torque, self.continuous_current, constant
+            ),
+            max_velocity=_infinite_if_none(self.max_velocity),
+            max_voltage=_infinite_if_none(self.max_voltage),
             torque_constant=constant,
             resistance=math.nan if self.resistance is None else self.resistance,
             efficiency=self.gear_efficiency,
@@ -291,11 +293,11 @@ def read_catalog(path: str | os.PathLike[str]) -> RecordTable[CatalogMotor]:
     return read_records(path, CatalogMotor, "name")
 
 
-def _or_infinite(bound: float | None) -> float:
+def _infinite_if_none(bound: float | None) -> float:
     return math.inf if bound is None else bound
 
 
-def _smallest(torque: float | None, current: float | None, constant: float) -> float:
+def _effective_torque_limit(torque: float | None, current: float | None, constant: float) -> float:
     """Return the smaller of a torque limit and the torque at a current limit."""
     by_current = math.inf if current is None else current * constant
-    return min(_or_infinite(torque), by_current)
+    return min(_infinite_if_none(torque), by_current)

@@ -78,11 +78,11 @@ class Choice(Published):
 
 def usual_criterion(motors: Sequence[CatalogMotor]) -> str:
     """Return the default criterion: "copper_loss" if all resistances are known, otherwise "utilization"."""
-    known = all(motor.resistance is not None for motor in motors)
-    return "copper_loss" if known else "utilization"
+    has_resistances = all(motor.resistance is not None for motor in motors)
+    return "copper_loss" if has_resistances else "utilization"
 
 
-MOST_NAMED = 5
+MAX_LISTED_MOTORS = 5
 """Largest number of motors that a message lists."""
 
 
@@ -92,11 +92,18 @@ def check_criterion(criterion: str, motors: Sequence[CatalogMotor], path: str) -
     Raises:
         InputError: some motors lack it; the error names them.
     """
-    needed = {"copper_loss": "resistance", "mass": "mass"}.get(criterion)
-    lacking = [motor.name for motor in motors if needed and getattr(motor, needed) is None]
-    if lacking:
-        several = f"{counted(len(lacking), 'motor')} {'lacks' if len(lacking) == 1 else 'lack'}"
-        reason = f"needs the column {needed} in {path}, which {several} ({listed(lacking, MOST_NAMED)})"
+    required_value = {"copper_loss": "resistance", "mass": "mass"}.get(criterion)
+    incomplete_names = [
+        motor.name for motor in motors if required_value and getattr(motor, required_value) is None
+    ]
+    if incomplete_names:
+        several = (
+            f"{counted(len(incomplete_names), 'motor')} {'lacks' if len(incomplete_names) == 1 else 'lack'}"
+        )
+        reason = (
+            f"needs the column {required_value} in {path}, which {several} "
+            f"({listed(incomplete_names, MAX_LISTED_MOTORS)})"
+        )
         raise InputError.one(f"minimizing {criterion} {reason}")
 
 
@@ -112,17 +119,17 @@ def choices(
         criterion: one of `CRITERIA`.
     """
     shafts = Shaft.of(motor.shaft for motor in motors)
-    possible = ratios_within(demand, shafts)
-    trials = _trials(demand, motors, shafts, possible, gears, criterion)
+    possible_ratios = ratios_within(demand, shafts)
+    trials = _trials(demand, motors, shafts, possible_ratios, gears, criterion)
     cost = trials.largest if criterion == "utilization" else trials.rms
-    ranked = np.where(trials.does.any(axis=0), np.where(trials.does, cost, np.inf), trials.largest)
-    best = ranked.argmin(axis=0)
-    found = [
-        _best_choice(motor, trials, (int(best[index]), index), possible, bool(gears.listed))
+    ranking = np.where(trials.does.any(axis=0), np.where(trials.does, cost, np.inf), trials.largest)
+    best_trials = ranking.argmin(axis=0)
+    best_choices = [
+        _best_choice(motor, trials, (int(best_trials[index]), index), possible_ratios, bool(gears.listed))
         for index, motor in enumerate(motors)
     ]
-    found.sort(key=lambda choice: (not choice.does, cost_of(choice, criterion), choice.motor))
-    return tuple(found)
+    best_choices.sort(key=lambda choice: (not choice.does, cost_of(choice, criterion), choice.motor))
+    return tuple(best_choices)
 
 
 class _Trials(NamedTuple):
@@ -147,58 +154,68 @@ def _trials(
     demand: MotorDemand,
     motors: Sequence[CatalogMotor],
     shafts: Shaft,
-    possible: Ratios,
+    possible_ratios: Ratios,
     gears: Gears,
     criterion: str,
 ) -> _Trials:
     """Return trials with the listed ratios, or the best of a range; motors keep their own gears."""
-    fixed = np.array([math.nan if motor.gear_ratio is None else motor.gear_ratio for motor in motors])
-    listed = [np.full_like(fixed, ratio) for ratio in gears.listed]
-    free = listed or [_best_of_range(demand, shafts, possible, gears, criterion)]
-    tried = [np.where(np.isnan(fixed), ratios, fixed) for ratios in free]
-    used = np.stack([shares(demand, shafts, ratios) for ratios in tried])
-    largest = used.max(axis=-1)
-    rms = np.stack([rms_torque(demand, shafts, ratios) for ratios in tried])
-    return _Trials(np.stack(tried), used, largest, largest <= 1 + LIMIT_ROUNDING, rms)
+    own_ratios = np.array([math.nan if motor.gear_ratio is None else motor.gear_ratio for motor in motors])
+    listed_ratios = [np.full_like(own_ratios, ratio) for ratio in gears.listed]
+    free_ratios = listed_ratios or [_best_of_range(demand, shafts, possible_ratios, gears, criterion)]
+    ratio_trials = [np.where(np.isnan(own_ratios), ratios, own_ratios) for ratios in free_ratios]
+    used_shares = np.stack([shares(demand, shafts, ratios) for ratios in ratio_trials])
+    largest = used_shares.max(axis=-1)
+    rms = np.stack([rms_torque(demand, shafts, ratios) for ratios in ratio_trials])
+    return _Trials(np.stack(ratio_trials), used_shares, largest, largest <= 1 + LIMIT_ROUNDING, rms)
 
 
 def _best_of_range(
-    demand: MotorDemand, shafts: Shaft, possible: Ratios, gears: Gears, criterion: str
+    demand: MotorDemand, shafts: Shaft, possible_ratios: Ratios, gears: Gears, criterion: str
 ) -> FloatArray:
     """Return the best ratio of each motor, (motors,); if none suffices, the one with the least violation."""
-    ends = Ratios(np.full_like(possible.low, gears.low), np.full_like(possible.high, gears.high))
-    within = possible.within(ends)
-    wanted = least_rms(demand, shafts)
-    if criterion == "utilization" or within.empty.any():
-        balance = balanced(demand, shafts, ends)
-        wanted = balance if criterion == "utilization" else np.where(within.empty, balance, wanted)
-    found = np.where(within.empty, ends.nearest(wanted), within.nearest(wanted))
-    return _rounded_ratios(found, within)
+    gear_range = Ratios(
+        np.full_like(possible_ratios.low, gears.low), np.full_like(possible_ratios.high, gears.high)
+    )
+    allowed_ratios = possible_ratios.within(gear_range)
+    best_ratios = least_rms(demand, shafts)
+    if criterion == "utilization" or allowed_ratios.empty.any():
+        balanced_ratios = balanced(demand, shafts, gear_range)
+        best_ratios = (
+            balanced_ratios
+            if criterion == "utilization"
+            else np.where(allowed_ratios.empty, balanced_ratios, best_ratios)
+        )
+    nearest_ratios = np.where(
+        allowed_ratios.empty, gear_range.nearest(best_ratios), allowed_ratios.nearest(best_ratios)
+    )
+    return _rounded_ratios(nearest_ratios, allowed_ratios)
 
 
-def _rounded_ratios(ratios: FloatArray, within: Ratios) -> FloatArray:
+def _rounded_ratios(ratios: FloatArray, allowed_ratios: Ratios) -> FloatArray:
     """Return ratios rounded to `DIGITS`, unless rounding leaves the range."""
-    short = np.array([float(f"{ratio:.{DIGITS}g}") for ratio in ratios])
-    return np.where((short >= within.low) & (short <= within.high), short, ratios)
+    rounded = np.array([float(f"{ratio:.{DIGITS}g}") for ratio in ratios])
+    return np.where((rounded >= allowed_ratios.low) & (rounded <= allowed_ratios.high), rounded, ratios)
 
 
 def _best_choice(
-    motor: CatalogMotor, trials: _Trials, place: tuple[int, int], possible: Ratios, listed: bool
+    motor: CatalogMotor, trials: _Trials, trial_index: tuple[int, int], possible_ratios: Ratios, listed: bool
 ) -> Choice:
     """Return the choice of a motor from its best trial."""
-    _, index = place
-    ends = (float(possible.low[index]), float(possible.high[index]))
-    low, high = (math.nan, math.nan) if possible.empty[index] else ends
-    rms, shaft = float(trials.rms[place]), motor.shaft
-    doing = trials.ratio[trials.does[:, index], index] if listed and motor.gear_ratio is None else []
+    _, index = trial_index
+    ratio_range = (float(possible_ratios.low[index]), float(possible_ratios.high[index]))
+    low, high = (math.nan, math.nan) if possible_ratios.empty[index] else ratio_range
+    rms, shaft = float(trials.rms[trial_index]), motor.shaft
+    sufficient_ratios = (
+        trials.ratio[trials.does[:, index], index] if listed and motor.gear_ratio is None else []
+    )
     return Choice(
         motor=motor.name,
-        ratio=float(trials.ratio[place]),
-        does=bool(trials.does[place]),
+        ratio=float(trials.ratio[trial_index]),
+        does=bool(trials.does[trial_index]),
         low=low,
         high=high,
-        ratios=tuple(map(float, doing)),
-        shares={name: float(trials.used[place][LIMITS.index(name)]) for name in shaft.limited},
+        ratios=tuple(map(float, sufficient_ratios)),
+        shares={name: float(trials.used[trial_index][LIMITS.index(name)]) for name in shaft.limited},
         rms_torque=rms,
         copper_loss=float(shaft.heat_per_torque * rms**2),
         mass=motor.mass,
@@ -207,9 +224,13 @@ def _best_choice(
 
 def cost_of(choice: Choice, criterion: str) -> float:
     """Return the value of the criterion; for an insufficient choice, its largest share of a limit."""
-    _, largest = choice.largest
-    wanted = {"copper_loss": choice.copper_loss, "utilization": largest, "mass": choice.mass or math.inf}
-    return wanted[criterion] if choice.does else largest
+    _, max_share = choice.largest
+    cost_by_criterion = {
+        "copper_loss": choice.copper_loss,
+        "utilization": max_share,
+        "mass": choice.mass or math.inf,
+    }
+    return cost_by_criterion[criterion] if choice.does else max_share
 
 
 def coupled_choices(
@@ -235,35 +256,36 @@ def coupled_choices(
         InputError: no two rotors are heavy enough.
     """
     inertias = [[motors[each.motor].inertia * each.ratio**2 for each in some] for some in (first, second)]
-    possible = _buildable(joint, *inertias)
-    lacking, cost = (
+    is_buildable = _buildable_pairs(joint, *inertias)
+    insufficient_counts, cost = (
         np.add.outer([not each.does for each in first], [not each.does for each in second]).astype(float),
         _pair_costs(first, second, criterion),
     )
     ranks = np.add.outer(np.arange(len(first)), np.arange(len(second)))
-    order = np.lexsort([each.ravel() for each in (ranks, cost, lacking, ~possible)])
-    one, other = np.unravel_index(order[0], possible.shape)
+    order = np.lexsort([each.ravel() for each in (ranks, cost, insufficient_counts, ~is_buildable)])
+    best_first, best_second = np.unravel_index(order[0], is_buildable.shape)
     return (
-        tuple(each for each, fits in zip(first, possible[:, other], strict=True) if fits),
-        tuple(each for each, fits in zip(second, possible[one], strict=True) if fits),
+        tuple(each for each, fits in zip(first, is_buildable[:, best_second], strict=True) if fits),
+        tuple(each for each, fits in zip(second, is_buildable[best_first], strict=True) if fits),
     )
 
 
-def _buildable(joint: Joint, first: Sequence[float], second: Sequence[float]) -> BoolArray:
+def _buildable_pairs(joint: Joint, first: Sequence[float], second: Sequence[float]) -> BoolArray:
     """Return a mask of the pairs of joint-side rotor inertias that allow the coupled inertia."""
-    coupled = joint.actuator.coupled_rotors
-    largest = np.array([[largest_coupling(one, other) for other in second] for one in first])
-    possible: BoolArray = abs(coupled) < largest
-    if not possible.any():
+    coupled_inertia = joint.actuator.coupled_rotors
+    max_coupling = np.array([[largest_coupling(one, other) for other in second] for one in first])
+    is_buildable: BoolArray = abs(coupled_inertia) < max_coupling
+    if not is_buildable.any():
         raise InputError.one(
-            f"joint {joint.name}: coupled_inertia is {coupled:g} on the joint's side, that of rotors of the "
-            f"catalog, with their best gears, must be below {largest.max():.4g}; correct it, or offer "
+            f"joint {joint.name}: coupled_inertia is {coupled_inertia:g} on the joint's side, "
+            "that of rotors of the "
+            f"catalog, with their best gears, must be below {max_coupling.max():.4g}; correct it, or offer "
             "heavier rotors or larger gears, and size again"
         )
-    return possible
+    return is_buildable
 
 
 def _pair_costs(first: Sequence[Choice], second: Sequence[Choice], criterion: str) -> FloatArray:
     costs = [[cost_of(each, criterion) for each in some] for some in (first, second)]
-    together = np.maximum if criterion == "utilization" else np.add
-    return np.asarray(together.outer(*costs), dtype=np.float64)
+    combine = np.maximum if criterion == "utilization" else np.add
+    return np.asarray(combine.outer(*costs), dtype=np.float64)

@@ -42,9 +42,11 @@ class Peak(Published):
     @classmethod
     def of(cls, values: FloatArray, time: FloatArray, trajectory: str) -> Self:
         """Return the peak of the finite values, (samples,)."""
-        sizes = np.where(np.isfinite(values), np.abs(values), -1.0)
-        step = int(sizes.argmax())
-        return cls(float(sizes[step]), trajectory, float(time[step])) if sizes[step] >= 0 else cls()
+        magnitudes = np.where(np.isfinite(values), np.abs(values), -1.0)
+        index = int(magnitudes.argmax())
+        return (
+            cls(float(magnitudes[index]), trajectory, float(time[index])) if magnitudes[index] >= 0 else cls()
+        )
 
     def or_larger(self, other: Self) -> Self:
         """Return the larger of two peaks."""
@@ -86,8 +88,10 @@ class MotorDemand:
 
     def peak(self, values: FloatArray) -> Peak:
         """Return the largest absolute value of values, (samples,)."""
-        step = int(np.abs(values).argmax())
-        return Peak(float(abs(values[step])), self.trajectories[int(self.run[step])], float(self.time[step]))
+        index = int(np.abs(values).argmax())
+        return Peak(
+            float(abs(values[index])), self.trajectories[int(self.run[index])], float(self.time[index])
+        )
 
     def rms(self, values: FloatArray) -> float:
         """Return the rms over time of values, (samples,)."""
@@ -166,7 +170,7 @@ class SpringPeaks:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
-        self._found: dict[tuple[str, str], SpringDemand] = {}
+        self._demands: dict[tuple[str, str], SpringDemand] = {}
 
     def add(self, block: Block, trajectory: str) -> None:
         """Include a block of a trajectory."""
@@ -175,14 +179,14 @@ class SpringPeaks:
                 energy, torque, deflection = (Peak.of(values, block.time, trajectory) for values in load)
                 new = SpringDemand(joint.name, joint.type, name, energy, torque, deflection, limit)
                 key = joint.name, name
-                self._found[key] = _larger(self._found.get(key, new), new)
+                self._demands[key] = _with_larger_peaks(self._demands.get(key, new), new)
 
     def report(self) -> tuple[SpringDemand, ...]:
         """Return the demand on each spring."""
-        return tuple(self._found.values())
+        return tuple(self._demands.values())
 
 
-def _larger(one: SpringDemand, other: SpringDemand) -> SpringDemand:
+def _with_larger_peaks(one: SpringDemand, other: SpringDemand) -> SpringDemand:
     """Return the demand with the larger of each peak."""
     return replace(
         one,

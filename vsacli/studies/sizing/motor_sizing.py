@@ -86,8 +86,8 @@ class WorkingPoints(Published):
     def shares(self, shaft: Shaft) -> dict[str, float]:
         """Return the used share of each finite limit, by name."""
         values = (self.torque.value, self.rms_torque, self.velocity.value, self.voltage)
-        used = dict(zip(LIMITS, values, strict=True))
-        return {name: used[name] / shaft.bounds[name] for name in shaft.limited}
+        used_values = dict(zip(LIMITS, values, strict=True))
+        return {name: used_values[name] / shaft.bounds[name] for name in shaft.limited}
 
 
 @dataclass(frozen=True)
@@ -183,8 +183,8 @@ class MotorSizing(Published):
     @property
     def units(self) -> tuple[str, str]:
         """Units of the torques and velocities of `points`."""
-        known = self.best is not None or self.gear_ratio is not None
-        joint_type = "revolute" if known else self.demand.joint_type
+        has_ratio = self.best is not None or self.gear_ratio is not None
+        joint_type = "revolute" if has_ratio else self.demand.joint_type
         return TORQUE.unit(joint_type), VELOCITY.unit(joint_type)
 
     @property
@@ -195,8 +195,8 @@ class MotorSizing(Published):
     @property
     def does(self) -> bool:
         """Whether a motor of the catalog suffices; without a catalog, the robot's own."""
-        judged = self.best or self.own
-        return judged is not None and judged.does
+        judged_motor = self.best or self.own
+        return judged_motor is not None and judged_motor.does
 
     @property
     def chosen(self) -> WorkingPoints | None:

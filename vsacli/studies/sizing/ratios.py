@@ -47,8 +47,8 @@ class Gears(NamedTuple):
         Raises:
             InputError: the text is neither.
         """
-        ends = _RANGE.fullmatch(text.strip())
-        words = text.split(",") if ends is None else [ends["low"], ends["high"]]
+        range_match = _RANGE.fullmatch(text.strip())
+        words = text.split(",") if range_match is None else [range_match["low"], range_match["high"]]
         try:
             numbers = [float(word) for word in words]
         except ValueError:
@@ -58,12 +58,12 @@ class Gears(NamedTuple):
         for word, number in zip(words, numbers, strict=True):
             if not 0 < number < math.inf:
                 raise InputError.one(f"gear ratios must be positive and finite, not {word.strip()}")
-        if ends is None:
+        if range_match is None:
             return cls(listed=tuple(sorted(set(numbers))))
         low, high = numbers
         if low > high:
-            upward = "..".join(word.strip() for word in reversed(words))
-            raise InputError.one(f"{text!r} runs downward; write {upward}")
+            ascending = "..".join(word.strip() for word in reversed(words))
+            raise InputError.one(f"{text!r} runs downward; write {ascending}")
         return cls(low=low, high=high)
 
 
@@ -77,20 +77,20 @@ def gears_of_joints(texts: Sequence[str], joints: Sequence[str]) -> dict[str, Ge
     Raises:
         InputError: a text is invalid, names an unknown joint, or gives gears a second time.
     """
-    common: Gears | None = None
-    found: dict[str, Gears] = {}
+    common_gears: Gears | None = None
+    gears_by_joint: dict[str, Gears] = {}
     for text in texts:
         name, equals, ratios = (part.strip() for part in text.rpartition("="))
         gears = Gears.read(ratios)
         if equals and name not in joints:
             raise InputError.one(f"{text}: there is no joint {name!r}{did_you_mean(name, joints)}")
-        if name in found or (not equals and common is not None):
+        if name in gears_by_joint or (not equals and common_gears is not None):
             raise InputError.one(f"{text}: the gears of {name or 'all joints'} were given already")
         if equals:
-            found[name] = gears
+            gears_by_joint[name] = gears
         else:
-            common = gears
-    return {joint: found.get(joint, common or Gears()) for joint in joints}
+            common_gears = gears
+    return {joint: gears_by_joint.get(joint, common_gears or Gears()) for joint in joints}
 
 
 LOWEST, HIGHEST = 1e-9, 1e9
@@ -124,8 +124,10 @@ class Ratios(NamedTuple):
 
     def nearest(self, ratio: FloatArray) -> FloatArray:
         """Return the nearest ratio in each range; zero and infinity become an end of the range, or 1."""
-        inside = np.minimum(np.maximum(ratio, self.low), self.high)
-        finite = np.where((inside > 0) & (inside < math.inf), inside, np.where(self.low > 0, self.low, 1.0))
+        clipped = np.minimum(np.maximum(ratio, self.low), self.high)
+        finite = np.where(
+            (clipped > 0) & (clipped < math.inf), clipped, np.where(self.low > 0, self.low, 1.0)
+        )
         return np.minimum(finite, self.high)
 
 
@@ -138,9 +140,9 @@ def shares(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
         ratio: gear ratios, (motors,).
     """
     torque, voltage = _peak_torque_and_voltage(demand, shafts, ratio)
-    used = (torque, rms_torque(demand, shafts, ratio), demand.top_speed * ratio, voltage)
+    used_values = (torque, rms_torque(demand, shafts, ratio), demand.top_speed * ratio, voltage)
     bounds = shafts.bounds.values()
-    return np.stack([each / bound for each, bound in zip(used, bounds, strict=True)], axis=-1)
+    return np.stack([each / bound for each, bound in zip(used_values, bounds, strict=True)], axis=-1)
 
 
 def rms_torque(demand: MotorDemand, shafts: Shaft, ratio: FloatArray) -> FloatArray:
@@ -155,13 +157,15 @@ def _peak_torque_and_voltage(
 ) -> tuple[FloatArray, FloatArray]:
     """Return the largest |torque| and |voltage|, each (motors,)."""
     coefficients = shafts.coefficients(ratio)
-    of_voltage = shafts.volts_per_torque[:, None] * coefficients
-    of_voltage[:, 1] += shafts.volts_per_speed * ratio
+    voltage_coefficients = shafts.volts_per_torque[:, None] * coefficients
+    voltage_coefficients[:, 1] += shafts.volts_per_speed * ratio
 
     def of_motors(part: slice) -> tuple[FloatArray, ...]:
-        return tuple(np.abs(each[part] @ demand.signals).max(axis=1) for each in (coefficients, of_voltage))
+        return tuple(
+            np.abs(each[part] @ demand.signals).max(axis=1) for each in (coefficients, voltage_coefficients)
+        )
 
-    torque, voltage = _in_parts(of_motors, len(coefficients), demand)
+    torque, voltage = _computed_in_parts(of_motors, len(coefficients), demand)
     return torque, voltage
 
 
@@ -172,18 +176,18 @@ def _mean_product(one: FloatArray, moments: FloatArray, other: FloatArray) -> Fl
 
 def ratios_within(demand: MotorDemand, shafts: Shaft) -> Ratios:
     """Return the ratios at which motors keep all their limits."""
-    found = Ratios(np.zeros_like(shafts.inertia), np.full_like(shafts.inertia, math.inf))
+    allowed = Ratios(np.zeros_like(shafts.inertia), np.full_like(shafts.inertia, math.inf))
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = found._replace(high=shafts.max_velocity / np.float64(demand.top_speed))
-        found = found._replace(high=np.where(np.isnan(found.high), math.inf, found.high))
+        allowed = allowed._replace(high=shafts.max_velocity / np.float64(demand.top_speed))
+        allowed = allowed._replace(high=np.where(np.isnan(allowed.high), math.inf, allowed.high))
         inertial, frictional, loaded = shafts.inertial, shafts.frictional, shafts.loaded
-        found = found.within(_peak_within(demand, (inertial, frictional, loaded), shafts.max_torque))
+        allowed = allowed.within(_peak_within(demand, (inertial, frictional, loaded), shafts.max_torque))
         inertial, frictional, loaded = (
             shafts.volts_per_torque[:, None] * each for each in (inertial, frictional, loaded)
         )
         inertial[:, 1] += shafts.volts_per_speed
-        found = found.within(_peak_within(demand, (inertial, frictional, loaded), shafts.max_voltage))
-    return found.within(_rms_within(demand, shafts, shafts.continuous_torque))
+        allowed = allowed.within(_peak_within(demand, (inertial, frictional, loaded), shafts.max_voltage))
+    return allowed.within(_rms_within(demand, shafts, shafts.continuous_torque))
 
 
 def _peak_within(
@@ -193,21 +197,23 @@ def _peak_within(
 
     def of_motors(part: slice) -> tuple[FloatArray, FloatArray]:
         a, c, b = (each[part] @ demand.signals for each in coefficients)
-        upper, lower = (_below(sign * a, sign * c - bound[part, None], sign * b) for sign in (1, -1))
-        both = upper.within(lower)
-        return both.low.max(axis=1), both.high.min(axis=1)
+        upper, lower = (
+            _nonpositive_range(sign * a, sign * c - bound[part, None], sign * b) for sign in (1, -1)
+        )
+        intersection = upper.within(lower)
+        return intersection.low.max(axis=1), intersection.high.min(axis=1)
 
-    return Ratios(*_in_parts(of_motors, len(bound), demand))
+    return Ratios(*_computed_in_parts(of_motors, len(bound), demand))
 
 
-def _below(square: FloatArray, linear: FloatArray, constant: FloatArray) -> Ratios:
+def _nonpositive_range(square: FloatArray, linear: FloatArray, constant: FloatArray) -> Ratios:
     """Return the range of n > 0 with square n^2 + linear n + constant <= 0; empty if linear > 0."""
     # the root with the plus sign has no cancellation; the other one follows from the product of both
     discriminant = linear * linear - 4 * square * constant
     numerator = (np.sqrt(discriminant) - linear) / 2
-    nowhere = (linear > 0) | ((discriminant < 0) & (square > 0))
+    is_empty = (linear > 0) | ((discriminant < 0) & (square > 0))
     low = np.where(constant > 0, constant / numerator, 0.0)
-    return Ratios(np.where(nowhere, math.inf, low), np.where(square > 0, numerator / square, math.inf))
+    return Ratios(np.where(is_empty, math.inf, low), np.where(square > 0, numerator / square, math.inf))
 
 
 def least_rms(demand: MotorDemand, shafts: Shaft) -> FloatArray:
@@ -217,45 +223,45 @@ def least_rms(demand: MotorDemand, shafts: Shaft) -> FloatArray:
     """
     moments = demand.moments
     inertial, frictional, loaded = shafts.inertial, shafts.frictional, shafts.loaded
-    fourth, third = (_mean_product(inertial, moments, each) for each in (inertial, frictional))
-    first, last = (_mean_product(each, moments, loaded) for each in (frictional, loaded))
+    quadratic, linear = (_mean_product(inertial, moments, each) for each in (inertial, frictional))
+    inverse, inverse_square = (_mean_product(each, moments, loaded) for each in (frictional, loaded))
 
     def rising(ratio: FloatArray) -> BoolArray:
-        slope = (fourth * ratio + third) * ratio - (first + last / ratio) / ratio
+        slope = (quadratic * ratio + linear) * ratio - (inverse + inverse_square / ratio) / ratio
         return slope > 0
 
-    found = _turning_point(rising, np.full_like(fourth, LOWEST), np.full_like(fourth, HIGHEST))
-    return _unbounded(found)
+    minimum = _bisect_condition(rising, np.full_like(quadratic, LOWEST), np.full_like(quadratic, HIGHEST))
+    return _with_open_ends(minimum)
 
 
-def _unbounded(ratio: FloatArray) -> FloatArray:
+def _with_open_ends(ratio: FloatArray) -> FloatArray:
     """Return ratios, replaced by 0 or infinity at the ends of the searched range."""
     return np.where(ratio <= 2 * LOWEST, 0.0, np.where(ratio >= HIGHEST / 2, math.inf, ratio))
 
 
 def _rms_within(demand: MotorDemand, shafts: Shaft, bound: FloatArray) -> Ratios:
     """Return the ratios at which the rms torque is at most a bound."""
-    best = np.clip(least_rms(demand, shafts), LOWEST, HIGHEST)
+    best_ratios = np.clip(least_rms(demand, shafts), LOWEST, HIGHEST)
 
     def allowed(ratio: FloatArray) -> BoolArray:
         return rms_torque(demand, shafts, ratio) <= bound
 
-    lowest, highest = np.full_like(best, LOWEST), np.full_like(best, HIGHEST)
-    low = np.where(allowed(lowest), 0.0, _turning_point(allowed, lowest, best))
-    above = _turning_point(lambda ratio: ~allowed(ratio), best, highest)
-    high = np.where(allowed(highest), math.inf, above)
-    return Ratios(np.where(allowed(best), low, math.inf), high)
+    min_ratios, max_ratios = np.full_like(best_ratios, LOWEST), np.full_like(best_ratios, HIGHEST)
+    low = np.where(allowed(min_ratios), 0.0, _bisect_condition(allowed, min_ratios, best_ratios))
+    upper_bound = _bisect_condition(lambda ratio: ~allowed(ratio), best_ratios, max_ratios)
+    high = np.where(allowed(max_ratios), math.inf, upper_bound)
+    return Ratios(np.where(allowed(best_ratios), low, math.inf), high)
 
 
-def _turning_point(
-    turned: Callable[[FloatArray], BoolArray], low: FloatArray, high: FloatArray
+def _bisect_condition(
+    condition: Callable[[FloatArray], BoolArray], low: FloatArray, high: FloatArray
 ) -> FloatArray:
     """Return the ratio at which a condition becomes true, between two ratios; it is false at the first."""
     low, high = np.log(low), np.log(high)
     for _ in range(HALVINGS):
-        middle = (low + high) / 2
-        beyond = turned(np.exp(middle))
-        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        midpoint = (low + high) / 2
+        is_true = condition(np.exp(midpoint))
+        low, high = np.where(is_true, low, midpoint), np.where(is_true, midpoint, high)
     return np.exp((low + high) / 2)
 
 
@@ -271,21 +277,24 @@ def balanced(demand: MotorDemand, shafts: Shaft, allowed: Ratios) -> FloatArray:
 
     low, high = (np.log(np.clip(end, LOWEST, HIGHEST)) for end in allowed)
     left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    at_left, at_right = largest(left), largest(right)
+    left_share, right_share = largest(left), largest(right)
     for _ in range(SECTIONS):
-        falls = at_left > at_right
-        low, high = np.where(falls, left, low), np.where(falls, high, right)
-        new = np.where(falls, low + GOLDEN * (high - low), high - GOLDEN * (high - low))
-        at_new = largest(new)
-        left, right = np.where(falls, right, new), np.where(falls, new, left)
-        at_left, at_right = np.where(falls, at_right, at_new), np.where(falls, at_new, at_left)
-    return _unbounded(np.exp((low + high) / 2))
+        is_falling = left_share > right_share
+        low, high = np.where(is_falling, left, low), np.where(is_falling, high, right)
+        next_ratio = np.where(is_falling, low + GOLDEN * (high - low), high - GOLDEN * (high - low))
+        next_share = largest(next_ratio)
+        left, right = np.where(is_falling, right, next_ratio), np.where(is_falling, next_ratio, left)
+        left_share, right_share = (
+            np.where(is_falling, right_share, next_share),
+            np.where(is_falling, next_share, left_share),
+        )
+    return _with_open_ends(np.exp((low + high) / 2))
 
 
-def _in_parts(
+def _computed_in_parts(
     compute: Callable[[slice], tuple[FloatArray, ...]], motors: int, demand: MotorDemand
 ) -> tuple[FloatArray, ...]:
     """Compute values for a part of the motors at a time; return those of all."""
-    size = max(1, SOLUTIONS_AT_A_TIME // demand.signals.shape[1])
-    parts = [compute(slice(start, start + size)) for start in range(0, motors, size)]
+    part_size = max(1, SOLUTIONS_AT_A_TIME // demand.signals.shape[1])
+    parts = [compute(slice(start, start + part_size)) for start in range(0, motors, part_size)]
     return tuple(np.concatenate(each) for each in zip(*parts, strict=True))

@@ -72,22 +72,24 @@ def size_drives(
     check_type("trajectories", trajectories, Sequence, "size_drives(robot, [trajectory]) takes one")
     if not trajectories:
         raise InputError.one("there is no trajectory to size for")
-    by_joint = gears_of_joints(gears, robot.joint_names)
+    gears_by_joint = gears_of_joints(gears, robot.joint_names)
     table = None if catalog is None else read_catalog(catalog)
-    criterion = _criterion(table, gears, minimize)
+    criterion = _checked_criterion(table, gears, minimize)
     demand = demanded(robot, trajectories, progress)
-    own = [motor for joint in robot.joints for motor in joint.actuator.motors]
-    offered = _offered(robot, demand.motors, table, by_joint, criterion)
-    found = [_sized(*each, table) for each in zip(demand.motors, own, offered, strict=True)]
-    of_motions = [warning for motion in trajectories for warning in motion.warnings]
-    warnings = [*robot.warnings, *of_motions, *_repetition_warnings(trajectories)]
+    own_motors = [motor for joint in robot.joints for motor in joint.actuator.motors]
+    offered_choices = _offered_choices(robot, demand.motors, table, gears_by_joint, criterion)
+    motor_sizings = [
+        _motor_sizing(*each, table) for each in zip(demand.motors, own_motors, offered_choices, strict=True)
+    ]
+    trajectory_warnings = [warning for motion in trajectories for warning in motion.warnings]
+    warnings = [*robot.warnings, *trajectory_warnings, *_repetition_warnings(trajectories)]
     return Sizing(
         robot=robot.name,
         outcomes=demand.outcomes,
         catalog=None if table is None else table.source.path,
         candidates=0 if table is None else len(table.records),
         criterion=criterion,
-        motors=tuple(found),
+        motors=tuple(motor_sizings),
         springs=demand.springs,
         warnings=tuple(dict.fromkeys(warnings)),
         notes=tuple(_assumption_notes(robot, table)),
@@ -108,16 +110,16 @@ def _repetition_warnings(trajectories: Sequence[Trajectory]) -> Iterator[str]:
 
     for (path, *_), times in Counter(map(content, trajectories)).items():
         if times > 1:
-            often = "twice" if times == 2 else f"{times} times"
-            yield f"{path} is given {often}; give each trajectory once"
+            count_text = "twice" if times == 2 else f"{times} times"
+            yield f"{path} is given {count_text}; give each trajectory once"
 
 
-def _criterion(
+def _checked_criterion(
     table: RecordTable[CatalogMotor] | None, gears: Sequence[str], minimize: str | None
 ) -> str | None:
     if table is None:
-        for given, words in ((gears, "gears need"), (minimize, "minimize needs")):
-            if given:
+        for option, words in ((gears, "gears need"), (minimize, "minimize needs")):
+            if option:
                 raise InputError.one(f"{words} a catalog of motors; give one")
         return None
     if minimize is None:
@@ -128,7 +130,7 @@ def _criterion(
     return minimize
 
 
-def _offered(
+def _offered_choices(
     robot: Robot,
     demands: Sequence[MotorDemand],
     table: RecordTable[CatalogMotor] | None,
@@ -138,51 +140,59 @@ def _offered(
     """Return the choices from the catalog for each motor of the robot that allow its coupled inertias."""
     if table is None or criterion is None:
         return [()] * len(demands)
-    found = [
+    choices_by_motor = [
         choices(each, table.records, gears[each.joint], criterion) if each.time.size else ()
         for each in demands
     ]
     motors = {each.name: each for each in table.records}
     for joint in robot.joints:
-        places = [place for place, each in enumerate(demands) if each.joint == joint.name]
-        if joint.actuator.coupled_rotors and all(found[place] for place in places):
-            first, second = places
-            found[first], found[second] = coupled_choices(
-                joint, found[first], found[second], motors, criterion
+        motor_indices = [place for place, each in enumerate(demands) if each.joint == joint.name]
+        if joint.actuator.coupled_rotors and all(choices_by_motor[place] for place in motor_indices):
+            first, second = motor_indices
+            choices_by_motor[first], choices_by_motor[second] = coupled_choices(
+                joint, choices_by_motor[first], choices_by_motor[second], motors, criterion
             )
-    return found
+    return choices_by_motor
 
 
-def _sized(
+def _motor_sizing(
     demand: MotorDemand,
     motor: JointMotor,
-    found: tuple[Choice, ...],
+    motor_choices: tuple[Choice, ...],
     table: RecordTable[CatalogMotor] | None,
 ) -> MotorSizing:
     """Return the sizing of one motor of the robot, without results if no sample is feasible."""
     if not demand.time.size:
         return MotorSizing(demand, motor.gear_ratio)
-    own = WorkingPoints.as_it_is(demand, motor)
-    best = next((each for each in table.records if each.name == found[0].motor), None) if table else None
+    own_points = WorkingPoints.as_it_is(demand, motor)
+    best_record = (
+        next((each for each in table.records if each.name == motor_choices[0].motor), None) if table else None
+    )
     return MotorSizing(
         demand,
         motor.gear_ratio,
-        own=_own(demand, motor, own),
-        choices=found,
-        record=best,
-        shaft=Shaft.of_joint_motor(motor) if best is None else best.shaft,
-        points=own if best is None else WorkingPoints.with_gear(demand, best.shaft, found[0].ratio),
+        own=_own_motor(demand, motor, own_points),
+        choices=motor_choices,
+        record=best_record,
+        shaft=Shaft.of_joint_motor(motor) if best_record is None else best_record.shaft,
+        points=own_points
+        if best_record is None
+        else WorkingPoints.with_gear(demand, best_record.shaft, motor_choices[0].ratio),
     )
 
 
-def _own(demand: MotorDemand, motor: JointMotor, points: WorkingPoints) -> OwnMotor:
+def _own_motor(demand: MotorDemand, motor: JointMotor, points: WorkingPoints) -> OwnMotor:
     shaft = Shaft.of_joint_motor(motor)
     shares = points.shares(shaft)
     own = OwnMotor(points, shares, max(shares.values(), default=0.0) <= 1 + LIMIT_ROUNDING)
     if motor.gear_ratio is None or (motor.friction is not None and motor.friction.width):
         return own
-    possible = ratios_within(demand, Shaft.of([shaft]))
-    low, high = (math.nan, math.nan) if possible.empty[0] else (possible.low[0], possible.high[0])
+    possible_ratios = ratios_within(demand, Shaft.of([shaft]))
+    low, high = (
+        (math.nan, math.nan)
+        if possible_ratios.empty[0]
+        else (possible_ratios.low[0], possible_ratios.high[0])
+    )
     return replace(own, low=float(low), high=float(high))
 
 
@@ -197,7 +207,7 @@ def _assumption_notes(robot: Robot, table: RecordTable[CatalogMotor] | None) -> 
         yield f"columns of the catalog that were left out: {', '.join(table.unknown_columns)}"
 
 
-KEPT = ("max_torque", "max_velocity", "torque_constant", "resistance", "max_current", "max_voltage")
+SHARED_COLUMNS = ("max_torque", "max_velocity", "torque_constant", "resistance", "max_current", "max_voltage")
 """Columns of a catalog that a robot file has under the same name."""
 
 
@@ -215,29 +225,29 @@ def sized_text(robot: Robot, sizing: Sizing, folder: str | Path) -> str:
     Raises:
         InputError: the robot was not read from a file.
     """
-    own, home = text_to_change(robot)
+    source_text, source_folder = text_to_change(robot)
     values: dict[str, Any] = {}
     for index, joint in enumerate(robot.joints):
-        places = [motor for motor in sizing.motors if motor.joint == joint.name]
-        place = f"joints.{index}.actuator"
-        motors = [_as_in_robot_file(each) for each in places]
-        values[f"{place}.motor"] = motors[0] if len(motors) == 1 else motors
+        joint_sizings = [motor for motor in sizing.motors if motor.joint == joint.name]
+        actuator_path = f"joints.{index}.actuator"
+        motors = [_as_in_robot_file(each) for each in joint_sizings]
+        values[f"{actuator_path}.motor"] = motors[0] if len(motors) == 1 else motors
         if joint.actuator.coupled_rotors:
             ratios = math.prod(motor["gear_ratio"] for motor in motors)
-            values[f"{place}.coupled_inertia"] = joint.actuator.coupled_rotors / ratios
-    files = dict(moved_files(own, home, Path(folder)))
-    return edited(unaliased(own, values), {**values, **files})
+            values[f"{actuator_path}.coupled_inertia"] = joint.actuator.coupled_rotors / ratios
+    files = dict(moved_files(source_text, source_folder, Path(folder)))
+    return edited(unaliased(source_text, values), {**values, **files})
 
 
-def _as_in_robot_file(place: MotorSizing) -> dict[str, Any]:
+def _as_in_robot_file(sizing: MotorSizing) -> dict[str, Any]:
     """Return the chosen motor with its gear, as `motor:` of an actuator."""
-    motor, choice = place.record, place.best
+    motor, choice = sizing.record, sizing.best
     assert motor is not None, "as of every place"
     assert choice is not None, "likewise"
-    found: dict[str, Any] = {"inertia": motor.inertia, "gear_ratio": choice.ratio, "side": SHAFT}
-    found |= {name: getattr(motor, name) for name in KEPT if getattr(motor, name) is not None}
+    fields: dict[str, Any] = {"inertia": motor.inertia, "gear_ratio": choice.ratio, "side": SHAFT}
+    fields |= {name: getattr(motor, name) for name in SHARED_COLUMNS if getattr(motor, name) is not None}
     if motor.damping:
-        found["damping"] = motor.damping
+        fields["damping"] = motor.damping
     if motor.coulomb:
-        found["friction"] = {"coulomb": motor.coulomb}
-    return found
+        fields["friction"] = {"coulomb": motor.coulomb}
+    return fields

@@ -54,8 +54,8 @@ class Column(NamedTuple):
         """Return the value in the report of a joint, or those of its motors."""
         if self.whole and (joint.samples.get("infeasible") or joint.samples.get("singular")):
             return (math.nan, math.nan) if self.dims == MOTOR else math.nan
-        found: float | tuple[float, float] = (self.of or attrgetter(self.name))(joint)
-        return found
+        value: float | tuple[float, float] = (self.of or attrgetter(self.name))(joint)
+        return value
 
 
 KEPT = {
@@ -128,9 +128,9 @@ def curve_columns(names: Sequence[str]) -> tuple[Column, ...]:
     return tuple(OVER_TIME[name] for name in dict.fromkeys((TIME, *names))) if names else ()
 
 
-def scalars(kept: Sequence[Column], report: Report) -> FloatArray:
+def scalars(columns: Sequence[Column], report: Report) -> FloatArray:
     """Return the concatenated values of a run, (columns,)."""
-    values = ([each.scalar(joint) for joint in report.joints] for each in kept)
+    values = ([each.scalar(joint) for joint in report.joints] for each in columns)
     return np.concatenate([np.array(each, dtype=float).ravel() for each in values])
 
 
@@ -140,28 +140,28 @@ def first_limit(report: Report) -> str:
     Of limits that are exceeded at the same time, the one of the joint nearest to the base comes first, and
     tools come last.
     """
-    places: tuple[JointReport | ToolReport, ...] = (*report.joints, *report.tools)
-    exceeded = [
+    joints_and_tools: tuple[JointReport | ToolReport, ...] = (*report.joints, *report.tools)
+    exceeded_limits = [
         (place.first_time[flag.label], f"{place.name} {flag.label}")
-        for place in places
+        for place in joints_and_tools
         for flag in (*LIMITS, ToolFlag.TOOL_STIFFNESS_LIMIT)
         if flag.label in place.first_time
     ]
-    return min(exceeded, default=(0.0, ""), key=itemgetter(0))[1]
+    return min(exceeded_limits, default=(0.0, ""), key=itemgetter(0))[1]
 
 
-def width(columns: Sequence[Column], joints: int) -> int:
+def row_length(columns: Sequence[Column], joints: int) -> int:
     """Return the number of values in a row."""
     return sum(math.prod(each.shape(joints)) for each in columns)
 
 
 def arrays_of(columns: Sequence[Column], rows: FloatArray, joints: int) -> dict[str, FloatArray]:
     """Return rows (..., width) as arrays (..., joints[, 2]) by name."""
-    ends = np.cumsum([math.prod(each.shape(joints)) for each in columns])
-    parts = np.split(rows, ends[:-1], axis=-1)
+    offsets = np.cumsum([math.prod(each.shape(joints)) for each in columns])
+    column_blocks = np.split(rows, offsets[:-1], axis=-1)
     return {
         each.name: part.reshape(*rows.shape[:-1], *each.shape(joints))
-        for each, part in zip(columns, parts, strict=True)
+        for each, part in zip(columns, column_blocks, strict=True)
     }
 
 
@@ -174,20 +174,20 @@ class Recorder:
     """
 
     def __init__(self, kept: Sequence[Column], every: int) -> None:
-        self._kept, self._every = kept, every
+        self._columns, self._stride = kept, every
         self._step = 0
         self._rows: list[FloatArray] = []
 
     def add(self, block: Block) -> None:
         """Record the next samples."""
-        if self._kept:
-            first, count = -self._step % self._every, len(block.time)
+        if self._columns:
+            first_index, sample_count = -self._step % self._stride, len(block.time)
             columns = [
-                np.reshape(getattr(block, each.name), (count, -1))[first :: self._every]
-                for each in self._kept
+                np.reshape(getattr(block, each.name), (sample_count, -1))[first_index :: self._stride]
+                for each in self._columns
             ]
             self._rows.append(np.concatenate(columns, axis=1))
-            self._step += count
+            self._step += sample_count
 
     @property
     def curves(self) -> FloatArray:
@@ -195,17 +195,17 @@ class Recorder:
         return np.concatenate(self._rows).ravel() if self._rows else np.empty(0)
 
 
-def steps_of(curves: FloatArray, kept: Sequence[Column], joints: int) -> int:
+def steps_of(curves: FloatArray, columns: Sequence[Column], joints: int) -> int:
     """Return the number of recorded samples."""
-    return len(curves) // width(kept, joints) if kept else 0
+    return len(curves) // row_length(columns, joints) if columns else 0
 
 
 def pad_curves(
-    rows: Sequence[FloatArray], kept: Sequence[Column], steps: int, joints: int
+    rows: Sequence[FloatArray], columns: Sequence[Column], steps: int, joints: int
 ) -> dict[str, FloatArray]:
     """Return curves of several runs as arrays (runs, steps, ...) by name, NaN after the end of a run."""
-    table = np.full((len(rows), steps, width(kept, joints)), np.nan)
-    for place, curves in enumerate(rows):
-        count = steps_of(curves, kept, joints)
-        table[place, :count] = curves.reshape(count, -1) if count else np.nan
-    return arrays_of(kept, table, joints)
+    table = np.full((len(rows), steps, row_length(columns, joints)), np.nan)
+    for row_index, curves in enumerate(rows):
+        step_count = steps_of(curves, columns, joints)
+        table[row_index, :step_count] = curves.reshape(step_count, -1) if step_count else np.nan
+    return arrays_of(columns, table, joints)

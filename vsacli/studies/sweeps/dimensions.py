@@ -34,7 +34,7 @@ from vsacli.studies.sweeps.study_file import GRID, Drawn, Linked, Listed, Ranged
 from vsacli.trajectory.changes import divide_changes_by_file
 from vsacli.trajectory.file import read_trajectory
 
-MOST_VALUES = 1_000_000
+MAX_VALUES = 1_000_000
 """Largest number of values of one path: more than any study has runs."""
 
 
@@ -85,53 +85,59 @@ class Dimension(NamedTuple):
 
 
 def dimensions_of(
-    varied: Varied, numbers: Sequence[Parameter], before: Sequence[Dimension]
+    varied: Varied, numbers: Sequence[Parameter], previous_dimensions: Sequence[Dimension]
 ) -> Iterator[Dimension]:
     """Yield the dimensions of a path: one, or one for each parameter of a distribution.
 
     Args:
         varied: entry of the file.
         numbers: numbers of robot and trajectories.
-        before: dimensions of previous entries.
+        previous_dimensions: dimensions of previous entries.
 
     Raises:
         InputError: the variation does not fit the value.
     """
-    fitting = [each for each in numbers if each.matches(varied.path, f"{varied.path}.*")]
-    unit = fitting[0].unit if fitting else ""
+    matching_parameters = [each for each in numbers if each.matches(varied.path, f"{varied.path}.*")]
+    unit = matching_parameters[0].unit if matching_parameters else ""
     match varied.way:
         case Listed(values=values):
             listed = Dimension(varied.path, unit, values)
             yield listed._replace(numeric=None not in map(listed.number, values))
         case Spaced() as spaced:
-            yield Dimension(varied.path, unit, _spaced(spaced, unit))
+            yield Dimension(varied.path, unit, _spaced_values(spaced, unit))
         case Ranged(least=least, largest=largest):
-            low, high = (_dimension_number(text, unit) for text in (least, largest))
-            if not low < high:
+            min_value, max_value = (_dimension_number(text, unit) for text in (least, largest))
+            if not min_value < max_value:
                 raise InputError.one(f"expected uniform: [least, largest], found {least} and {largest}")
-            size = (high - low) / 2
-            yield Dimension(varied.path, unit, (), low + size, Tolerance("uniform", size))
+            half_width = (max_value - min_value) / 2
+            yield Dimension(varied.path, unit, (), min_value + half_width, Tolerance("uniform", half_width))
         case Drawn(node=node):
-            yield from _distributed(varied.path, node, fitting, numbers)
+            yield from _distributed_dimensions(varied.path, node, matching_parameters, numbers)
         case Linked(path=path, factor=factor):
-            origin = next((each for each in before if each.path == path and not each.linked), None)
-            if origin is None:
-                hint = did_you_mean(path, [each.path for each in before if not each.linked])
+            linked_dimension = next(
+                (each for each in previous_dimensions if each.path == path and not each.linked), None
+            )
+            if linked_dimension is None:
+                hint = did_you_mean(path, [each.path for each in previous_dimensions if not each.linked])
                 raise InputError.one(f"linked: no path above it that varies independently is {path!r}{hint}")
             yield Dimension(
-                varied.path, unit, linked=path, factor=_dimension_number(factor, "1"), numeric=origin.numeric
+                varied.path,
+                unit,
+                linked=path,
+                factor=_dimension_number(factor, "1"),
+                numeric=linked_dimension.numeric,
             )
 
 
-def _distributed(
-    path: str, node: tree.Node, fitting: Sequence[Parameter], numbers: Sequence[Parameter]
+def _distributed_dimensions(
+    path: str, node: tree.Node, matching_parameters: Sequence[Parameter], numbers: Sequence[Parameter]
 ) -> Iterator[Dimension]:
-    if not fitting:
+    if not matching_parameters:
         raise InputError.one(
             f"no number of robot or trajectory fits{did_you_mean(path, [*map(str, numbers)])}"
         )
-    for each in dict.fromkeys(fitting):
-        if any(other.path == each.path and other.value != each.value for other in fitting):
+    for each in dict.fromkeys(matching_parameters):
+        if any(other.path == each.path and other.value != each.value for other in matching_parameters):
             raise InputError.one(f"{each} differs between trajectories; list its values, or a range")
         tolerance = distribution(node, each.value, each.unit)
         if tolerance.size == 0:
@@ -139,23 +145,23 @@ def _distributed(
         yield Dimension(str(each), each.unit, (), each.value, tolerance)
 
 
-def _spaced(spaced: Spaced, unit: str) -> tuple[float, ...]:
-    first, last, count = (
+def _spaced_values(spaced: Spaced, unit: str) -> tuple[float, ...]:
+    start, stop, count = (
         _dimension_number(spaced.first, unit),
         _dimension_number(spaced.last, unit),
         _dimension_number(spaced.steps, "1"),
     )
-    if not (count.is_integer() and 1 <= count <= MOST_VALUES):
+    if not (count.is_integer() and 1 <= count <= MAX_VALUES):
         raise InputError.one(
-            f"{spaced.shape}: expected a count from 1 to {MOST_VALUES:,}, found {spaced.steps}"
+            f"{spaced.shape}: expected a count from 1 to {MAX_VALUES:,}, found {spaced.steps}"
         )
     if spaced.shape == "linspace":
-        return tuple(np.linspace(first, last, int(count)).tolist())
-    if not first * last > 0:
+        return tuple(np.linspace(start, stop, int(count)).tolist())
+    if not start * stop > 0:
         raise InputError.one(
             f"logspace: expected two numbers of one sign, found {spaced.first} and {spaced.last}"
         )
-    return tuple(np.geomspace(first, last, int(count)).tolist())
+    return tuple(np.geomspace(start, stop, int(count)).tolist())
 
 
 def _dimension_number(text: str, unit: str) -> float:
@@ -180,15 +186,15 @@ class Entries:
     def __init__(
         self, file: StudyFile, path: str, read: RobotFileWithSource, robot: Robot, trajectories: Sequence[str]
     ) -> None:
-        self._file, self._path, self._read = file, path, read
+        self._file, self._path, self._robot_file = file, path, read
         self._joints = CommandedJoints.of(robot)
         self._documents = [read_trajectory(each, self._joints) for each in trajectories if not is_table(each)]
-        self._tables = len(self._documents) < len(trajectories)
-        self._found: list[tuple[Varied, Dimension]] = []
+        self._has_tables = len(self._documents) < len(trajectories)
+        self._entry_dimensions: list[tuple[Varied, Dimension]] = []
 
     @property
     def _dimensions(self) -> tuple[Dimension, ...]:
-        return tuple(dimension for _, dimension in self._found)
+        return tuple(dimension for _, dimension in self._entry_dimensions)
 
     def dimensions(self) -> tuple[Dimension, ...]:
         """Return the dimensions of all entries.
@@ -196,18 +202,18 @@ class Entries:
         Raises:
             InputError: some entries do not fit the files; with the line of each.
         """
-        problems, held_numbers = Problems(self._path), self._numbers()
+        problems, file_numbers = Problems(self._path), self._numbers()
         for varied in self._file.vary:
-            with _noting(problems, varied):
+            with _collecting_problems(problems, varied):
                 if self._file.method == GRID and isinstance(varied.way, Drawn | Ranged):
                     raise InputError.one(
                         "has a distribution, which the method grid cannot draw; set method: random or "
                         "latin_hypercube, or list values"
                     )
-                further = dimensions_of(varied, held_numbers, self._dimensions)
-                self._found += [(varied, dimension) for dimension in further]
+                entry_dimensions = dimensions_of(varied, file_numbers, self._dimensions)
+                self._entry_dimensions += [(varied, dimension) for dimension in entry_dimensions]
         counts = Counter(dimension.path for dimension in self._dimensions)
-        for varied, dimension in self._found:
+        for varied, dimension in self._entry_dimensions:
             if counts[dimension.path] > 1:
                 problems.add(varied.line, f"{dimension.path} varies twice")
         problems.check()
@@ -220,39 +226,44 @@ class Entries:
             InputError: some changes are not possible.
         """
         problems = Problems(self._path)
-        for varied, dimension in self._found:
-            with _noting(problems, varied):
+        for varied, dimension in self._entry_dimensions:
+            with _collecting_problems(problems, varied):
                 for value in () if dimension.linked else dimension.values or (dimension.center,):
-                    self._change(dimension.path, value)
+                    self._try_change(dimension.path, value)
         problems.check()
 
     def _numbers(self) -> list[Parameter]:
         trajectories = (numbers_in_record(document, self._joints.types) for document, _ in self._documents)
-        every = [*numbers_in_record(self._read.document), *(each for found in trajectories for each in found)]
-        return [Parameter(*each, None, _joint_type(each, self._joints.types)) for each in every]
+        all_numbers = [
+            *numbers_in_record(self._robot_file.document),
+            *(each for numbers in trajectories for each in numbers),
+        ]
+        return [Parameter(*each, None, _joint_type(each, self._joints.types)) for each in all_numbers]
 
-    def _change(self, path: str, value: object) -> None:
+    def _try_change(self, path: str, value: object) -> None:
         changes = divide_changes_by_file({path: value})
-        if changes.trajectory and self._tables:
+        if changes.trajectory and self._has_tables:
             raise ChangeError.one("a trajectory of the study is a table, in which nothing can be set")
         if changes.robot:
-            apply_changes(self._read.document, self._read.source, changes.robot)
+            apply_changes(self._robot_file.document, self._robot_file.source, changes.robot)
         for document, source in self._documents if changes.trajectory else ():
             apply_changes(document, source, changes.trajectory, self._joints.types, self._joints.exempt)
 
 
 @contextmanager
-def _noting(problems: Problems, varied: Varied) -> Iterator[None]:
+def _collecting_problems(problems: Problems, varied: Varied) -> Iterator[None]:
     try:
         yield
     except InputError as error:
         for problem in error.problems:
-            place, colon, fault = problem.message.partition(": ")
-            repeated = colon and fnmatchcase(place, varied.path)  # also with the number of a joint for a *
-            problems.add(varied.line, f"{varied.path}: {fault if repeated else problem.message}")
+            fault_path, colon, fault_text = problem.message.partition(": ")
+            repeated = colon and fnmatchcase(
+                fault_path, varied.path
+            )  # also with the number of a joint for a *
+            problems.add(varied.line, f"{varied.path}: {fault_text if repeated else problem.message}")
 
 
-MOST_RUNS = 1_000_000
+MAX_RUNS = 1_000_000
 """Largest number of runs: at 3 to 10 ms each they take one to three hours, and the table has 300 MB."""
 
 
@@ -267,44 +278,52 @@ class Design:
         """Determine the points.
 
         Raises:
-            InputError: there would be more than `MOST_RUNS` runs.
+            InputError: there would be more than `MAX_RUNS` runs.
         """
         self._dimensions = dimensions
-        self._own = [each for each in dimensions if not each.linked]
-        self._sizes = [len(each.values) for each in self._own]
+        self._independent = [each for each in dimensions if not each.linked]
+        self._sizes = [len(each.values) for each in self._independent]
         self.points = math.prod(self._sizes) if file.method == GRID else file.samples or 0
-        if self.points * trajectories > MOST_RUNS:
+        if self.points * trajectories > MAX_RUNS:
             advice = "take fewer values, or draw some points by `method: latin_hypercube` and `samples:`"
-            total = f"{self.points * trajectories:,} runs"
+            run_count_text = f"{self.points * trajectories:,} runs"
             if file.method == GRID:
-                total += f" ({' x '.join(f'{size:,}' for size in (trajectories, *self._sizes))})"
-            raise InputError.one(f"{total} are more than {MOST_RUNS:,}; {advice}")
-        self._shares = None if file.method == GRID else _quantile_shares(file, self.points, len(self._own))
+                run_count_text += f" ({' x '.join(f'{size:,}' for size in (trajectories, *self._sizes))})"
+            raise InputError.one(f"{run_count_text} are more than {MAX_RUNS:,}; {advice}")
+        self._shares = (
+            None if file.method == GRID else _quantile_shares(file, self.points, len(self._independent))
+        )
 
     def different(self, dimensions: Sequence[Dimension]) -> int:
         """Return the number of different combinations of values of some dimensions."""
-        own = [each for each in dimensions if not each.linked]
-        if self._shares is not None and own:
+        independent = [each for each in dimensions if not each.linked]
+        if self._shares is not None and independent:
             return self.points
-        return math.prod(len(each.values) for each in own)
+        return math.prod(len(each.values) for each in independent)
 
     def values(self, point: int) -> dict[str, Any]:
         """Return the value of each dimension at a point, by path."""
         if self._shares is None:
-            places = np.unravel_index(point, self._sizes) if self._sizes else ()
-            found = {each.path: each.values[place] for each, place in zip(self._own, places, strict=True)}
-        else:
-            found = {
-                each.path: each.drawn(share)
-                for each, share in zip(self._own, self._shares[point], strict=True)
+            value_indices = np.unravel_index(point, self._sizes) if self._sizes else ()
+            values_by_path = {
+                each.path: each.values[value_index]
+                for each, value_index in zip(self._independent, value_indices, strict=True)
             }
-        return {each.path: self._value(each, found) for each in self._dimensions}
+        else:
+            values_by_path = {
+                each.path: each.drawn(share)
+                for each, share in zip(self._independent, self._shares[point], strict=True)
+            }
+        return {each.path: self._value(each, values_by_path) for each in self._dimensions}
 
-    def _value(self, dimension: Dimension, found: dict[str, Any]) -> Any:
+    def _value(self, dimension: Dimension, values_by_path: dict[str, Any]) -> Any:
         if not dimension.linked:
-            return found[dimension.path]
-        origin = next(each for each in self._own if each.path == dimension.linked)
-        value, number = found[origin.path], origin.number(found[origin.path])
+            return values_by_path[dimension.path]
+        linked_dimension = next(each for each in self._independent if each.path == dimension.linked)
+        value, number = (
+            values_by_path[linked_dimension.path],
+            linked_dimension.number(values_by_path[linked_dimension.path]),
+        )
         return value if number is None else number * dimension.factor
 
 

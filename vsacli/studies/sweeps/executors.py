@@ -72,16 +72,16 @@ def executor(
     Raises:
         InputError: the cluster does not answer, or Dask is not installed.
     """
-    short = dask is None and study.file.optimize is None
-    fewest = BATCHED_RUNS_A_PROCESS if study.runs_of_batch > 1 else SINGLE_RUNS_A_PROCESS
-    paying = 1 + runs // fewest if short else runs
-    count = min(processor_count(), paying) if processes is None else min(processes, runs)
+    is_short = dask is None and study.file.optimize is None
+    min_runs = BATCHED_RUNS_A_PROCESS if study.runs_of_batch > 1 else SINGLE_RUNS_A_PROCESS
+    useful_processes = 1 + runs // min_runs if is_short else runs
+    process_count = min(processor_count(), useful_processes) if processes is None else min(processes, runs)
     if dask is not None:
-        with Cluster(study, dask, count, tell) as cluster:
+        with Cluster(study, dask, process_count, tell) as cluster:
             yield cluster.rows
-    elif count > 1:
-        with Processes(study, count) as several:
-            yield several.rows
+    elif process_count > 1:
+        with Processes(study, process_count) as worker_processes:
+            yield worker_processes.rows
     else:
         yield Computer(study).rows
 
@@ -97,7 +97,7 @@ class Executor(ExitStack, ABC):
         super().__init__()
         self._study, self._job = study, Job.of(study)
         self._seconds_a_run = TASK_SECONDS
-        self._apart: set[int] = set()  # runs of lost tasks, of which one may end its process again
+        self._isolated_runs: set[int] = set()  # runs of lost tasks, of which one may end its process again
 
     @abstractmethod
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
@@ -105,7 +105,7 @@ class Executor(ExitStack, ABC):
 
     def take(self, waiting: deque[int], count: int) -> list[int]:
         """Take the next runs from those waiting; one that was lost with others is a task of its own."""
-        count = 1 if waiting[0] in self._apart else min(count, len(waiting))
+        count = 1 if waiting[0] in self._isolated_runs else min(count, len(waiting))
         return [waiting.popleft() for _ in range(count)]
 
     @abstractmethod
@@ -122,28 +122,30 @@ class Executor(ExitStack, ABC):
 
     def rows(self, runs: Sequence[int]) -> Iterator[Row]:
         """Yield the rows of runs in the order in which they finish; see `Rows`."""
-        waiting, given = deque(runs), dict[Future[Answer], list[int]]()
-        while waiting or given:
-            while waiting and (task := self.next_task(waiting, len(given))):
-                given[self.submit(task)] = task
-            for future in wait(given, return_when=FIRST_COMPLETED).done:
-                yield from self._rows_of(future, given.pop(future), waiting)
+        pending_runs, runs_by_task = deque(runs), dict[Future[Answer], list[int]]()
+        while pending_runs or runs_by_task:
+            while pending_runs and (task := self.next_task(pending_runs, len(runs_by_task))):
+                runs_by_task[self.submit(task)] = task
+            for future in wait(runs_by_task, return_when=FIRST_COMPLETED).done:
+                yield from self._rows_of_task(future, runs_by_task.pop(future), pending_runs)
 
-    def _rows_of(self, future: Future[Answer], runs: Sequence[int], waiting: deque[int]) -> Sequence[Row]:
+    def _rows_of_task(
+        self, future: Future[Answer], runs: Sequence[int], pending_runs: deque[int]
+    ) -> Sequence[Row]:
         """Return the rows of a task that has ended; several runs of a lost task wait again, each apart."""
         try:
-            found = future.result()
+            task_answer = future.result()
         except Exception as error:
-            how = self.reason(future, error)
+            end_clause = self.reason(future, error)
             if len(runs) == 1:
-                return [lost(self._study, runs[0], how)]
-            self._apart.update(runs)
-            waiting.extendleft(reversed(runs))
+                return [lost(self._study, runs[0], end_clause)]
+            self._isolated_runs.update(runs)
+            pending_runs.extendleft(reversed(runs))
             return []
-        if found.problems:
-            raise InputError(found.problems)
-        self._seconds_a_run = found.seconds / len(found.rows)
-        return found.rows
+        if task_answer.problems:
+            raise InputError(task_answer.problems)
+        self._seconds_a_run = task_answer.seconds / len(task_answer.rows)
+        return task_answer.rows
 
 
 class Worker:
@@ -176,8 +178,8 @@ class Worker:
         if not self.begun:
             self.begun = self._connection.recv()
         self._connection.send(runs)
-        found: Answer = self._connection.recv()
-        return found
+        task_answer: Answer = self._connection.recv()
+        return task_answer
 
     def end(self) -> None:
         """Kill the process and close the connection."""
@@ -202,17 +204,19 @@ class Processes(Executor):
 
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
         """See `Executor.next_task`."""
-        share = len(waiting) // (TASKS_A_PROCESS * self._count)
-        return self.take(waiting, min(self._study.runs_of_batch, 1 + share)) if given < self._count else []
+        runs_share = len(waiting) // (TASKS_A_PROCESS * self._count)
+        return (
+            self.take(waiting, min(self._study.runs_of_batch, 1 + runs_share)) if given < self._count else []
+        )
 
     def submit(self, runs: Sequence[int]) -> Future[Answer]:
         """See `Executor.submit`; processes start when there are tasks for them."""
-        free = next((worker for worker in self.workers if worker.task.done()), None)
-        if free is None or len(self.workers) < self._count:
-            free = Worker(self._job)
-            self.callback(free.end)
-            self.workers.append(free)
-        return free.compute(runs)
+        free_worker = next((worker for worker in self.workers if worker.task.done()), None)
+        if free_worker is None or len(self.workers) < self._count:
+            free_worker = Worker(self._job)
+            self.callback(free_worker.end)
+            self.workers.append(free_worker)
+        return free_worker.compute(runs)
 
     def reason(self, task: Future[Answer], _error: Exception) -> str:
         """See `Executor.reason`; the process is removed, and another starts for the next task."""
@@ -220,11 +224,11 @@ class Processes(Executor):
         worker.end()
         self.workers.remove(worker)
         code = worker.process.exitcode or 0
-        how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
+        end_clause = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
         if not worker.begun:
-            message = f"a process that was to compute {how} before it had begun"
+            message = f"a process that was to compute {end_clause} before it had begun"
             raise InputError.one(message, self._study.source.path)
-        return how
+        return end_clause
 
 
 def _work(connection: Connection, job: Job) -> None:
@@ -265,14 +269,14 @@ class Cluster(Executor):
         with ExitStack() as opened, warnings.catch_warnings():
             warnings.simplefilter("ignore")  # versions that matter are compared by each task
             opened.enter_context(distributed.utils.silence_logging_cmgr(CRITICAL))
-            self._client = opened.enter_context(self._connected(opened))
+            self._client = opened.enter_context(self._connect(opened))
             self._executor = self._client.get_executor(pure=False)
             self.callback(opened.pop_all().close)
         if not self._client.nthreads():
             self._tell(f"{self._address} has no worker yet; waiting for one")
         return self
 
-    def _connected(self, opened: ExitStack) -> Client:
+    def _connect(self, opened: ExitStack) -> Client:
         import distributed
         from distributed.comm import get_address_host_port
 
@@ -294,12 +298,12 @@ class Cluster(Executor):
     def next_task(self, waiting: deque[int], given: int) -> list[int]:
         """See `Executor.next_task`; about `TASK_SECONDS` of runs, fewer at the end to end together."""
         tasks = TASKS_A_THREAD * max(1, sum(self._client.nthreads().values()))
-        of_seconds = max(self._study.runs_of_batch, int(TASK_SECONDS / self._seconds_a_run))
-        return self.take(waiting, min(1 + len(waiting) // tasks, of_seconds)) if given < tasks else []
+        max_task_runs = max(self._study.runs_of_batch, int(TASK_SECONDS / self._seconds_a_run))
+        return self.take(waiting, min(1 + len(waiting) // tasks, max_task_runs)) if given < tasks else []
 
     def submit(self, runs: Sequence[int]) -> Future[Answer]:
         """See `Executor.submit`."""
-        task: Future[Answer] = self._executor.submit(_compute(), tuple(self._job), runs)
+        task: Future[Answer] = self._executor.submit(_task_function(), tuple(self._job), runs)
         return task
 
     def reason(self, _task: Future[Answer], error: Exception) -> str:
@@ -332,7 +336,7 @@ class Cluster(Executor):
             raise InputError.one(f"the connection to the scheduler {self._address} was lost") from error
 
 
-def _compute() -> Callable[[Sequence[Any], Sequence[int]], Answer]:
+def _task_function() -> Callable[[Sequence[Any], Sequence[int]], Answer]:
     """Return the function of a task, nested so that Dask sends it as code.
 
     A function sent by name would end workers without this module before they could report it.

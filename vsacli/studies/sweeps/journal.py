@@ -56,7 +56,7 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.damaged: list[int] = []
-        self._places: dict[str, tuple[int, int]] = {}
+        self._row_spans: dict[str, tuple[int, int]] = {}
 
     def __enter__(self) -> Self:
         with reporting_storage_errors(self.path):
@@ -66,7 +66,7 @@ class Journal:
         try:
             self._lock()
             with reporting_storage_errors(self.path):
-                self._index()
+                self._index_rows()
         except BaseException:
             os.close(self._file)
             raise
@@ -78,31 +78,31 @@ class Journal:
     ) -> None:
         with contextlib.suppress(OSError):
             os.fsync(self._file)
-        if not self._places:
+        if not self._row_spans:
             self.remove()
         os.close(self._file)
 
     def __contains__(self, key: str) -> bool:
-        return key in self._places
+        return key in self._row_spans
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(self._row_spans)
 
     def _create(self) -> None:
         """Create the journal with its first line."""
-        staged = self.path.with_name(staging_name())
-        file = os.open(staged, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+        staged_path = self.path.with_name(staging_name())
+        file = os.open(staged_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
         try:
             os.write(file, FIRST_LINE)
             try:
-                os.link(staged, self.path)
+                os.link(staged_path, self.path)
             except FileExistsError:
                 pass  # another process was first
             except OSError:
-                staged.rename(self.path)  # a file system without links
+                staged_path.rename(self.path)  # a file system without links
         finally:
             os.close(file)
-            remove(staged)
+            remove(staged_path)
 
     def _open(self) -> int:
         """Open the journal.
@@ -131,7 +131,7 @@ class Journal:
         except (ImportError, OSError):
             pass  # a system or file system without locks
 
-    def _index(self) -> None:
+    def _index_rows(self) -> None:
         """Find the rows, and cut off an incomplete last line.
 
         Raises:
@@ -140,14 +140,14 @@ class Journal:
         with open(self._file, "rb", closefd=False) as file:
             self._check_first_line(file.readline(len(FIRST_LINE)))
             self._end = len(FIRST_LINE)
-            for number, line in enumerate(file, 2):
+            for line_number, line in enumerate(file, 2):
                 if not line.endswith(b"\n"):
                     break
-                start, key = _row_in(line)
+                start, key = _find_row(line)
                 if key:
-                    self._places[key] = (self._end + start, len(line) - start)
+                    self._row_spans[key] = (self._end + start, len(line) - start)
                 if start or not key:
-                    self.damaged.append(number)
+                    self.damaged.append(line_number)
                 self._end += len(line)
         os.ftruncate(self._file, self._end)
 
@@ -173,9 +173,9 @@ class Journal:
         line = _journal_line(row)
         try:
             os.lseek(self._file, self._end, os.SEEK_SET)
-            rest = memoryview(line)
-            while len(rest):
-                rest = rest[os.write(self._file, rest) :]
+            unwritten = memoryview(line)
+            while len(unwritten):
+                unwritten = unwritten[os.write(self._file, unwritten) :]
             if time.monotonic() > self._synced + SYNC_SECONDS:
                 os.fsync(self._file)
                 self._synced = time.monotonic()
@@ -183,9 +183,9 @@ class Journal:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file, self._end)
             rows = "row in it stays" if len(self) == 1 else f"{len(self):,} rows in it stay"
-            kept = f"the {rows}, and the same command goes on from there"
-            raise StorageError(self.path, f"cannot be written: {reason(error)}; {kept}") from error
-        self._places[row.key] = (self._end, len(line))
+            advice = f"the {rows}, and the same command goes on from there"
+            raise StorageError(self.path, f"cannot be written: {reason(error)}; {advice}") from error
+        self._row_spans[row.key] = (self._end, len(line))
         self._end += len(line)
 
     def row(self, run: int, key: str) -> Row:
@@ -194,11 +194,11 @@ class Journal:
         Raises:
             KeyError: the journal does not have it.
         """
-        start, size = self._places[key]
+        start, byte_count = self._row_spans[key]
         os.lseek(self._file, start, os.SEEK_SET)
-        content = json.loads(os.read(self._file, size)[_CHECK + 1 :])
+        content = json.loads(os.read(self._file, byte_count)[CHECKSUM_DIGITS + 1 :])
         texts, arrays = itemgetter(*_TEXTS)(content), itemgetter(*_ARRAYS)(content)
-        return Row(run, key, *texts, *map(_array, arrays))
+        return Row(run, key, *texts, *map(_decode_array, arrays))
 
     def remove(self) -> None:
         """Remove the file."""
@@ -210,41 +210,43 @@ _TEXTS = ("verdict", "first_limit", "error")
 
 _ARRAYS = ("values", "curves")
 
-_CHECK = 8
+CHECKSUM_DIGITS = 8
 """Number of hexadecimal digits of a checksum."""
 
 
-_BEGINNING = re.compile(rb'[0-9a-f]{8} \{"key": ')
+_ROW_START = re.compile(rb'[0-9a-f]{8} \{"key": ')
 
 
 def _journal_line(row: Row) -> bytes:
     arrays = {name: base64.b64encode(getattr(row, name).tobytes()).decode() for name in _ARRAYS}
     content = {"key": row.key, **{name: getattr(row, name) for name in _TEXTS}, **arrays}
-    text = json.dumps(content).encode()
-    return b"%08x %s\n" % (zlib.crc32(text), text)
+    content_bytes = json.dumps(content).encode()
+    return b"%08x %s\n" % (zlib.crc32(content_bytes), content_bytes)
 
 
-def _row_in(line: bytes) -> tuple[int, str]:
+def _find_row(line: bytes) -> tuple[int, str]:
     """Return the start of the row at the end of a line, and its key; "" if the line has no valid row."""
     # if the line break before a row is damaged, the row is intact but does not start its line
-    for start in (0, *(found.start() for found in _BEGINNING.finditer(line, 1))):
-        text = line[start + _CHECK + 1 : -1]
-        if line[start : start + _CHECK] == b"%08x" % zlib.crc32(text) and (key := _key_of_row(text)):
+    for start in (0, *(found.start() for found in _ROW_START.finditer(line, 1))):
+        content_bytes = line[start + CHECKSUM_DIGITS + 1 : -1]
+        if line[start : start + CHECKSUM_DIGITS] == b"%08x" % zlib.crc32(content_bytes) and (
+            key := _key_of_row(content_bytes)
+        ):
             return start, key
     return 0, ""
 
 
-def _key_of_row(text: bytes) -> str:
+def _key_of_row(content_bytes: bytes) -> str:
     """Return the key of a row; "" for text that is none although its checksum is right."""
     try:
-        content = json.loads(text)
-        key, *words = itemgetter("key", *_TEXTS)(content)
+        content = json.loads(content_bytes)
+        key, *texts = itemgetter("key", *_TEXTS)(content)
         for name in _ARRAYS:
-            _array(content[name])
+            _decode_array(content[name])
     except (ValueError, LookupError, TypeError, RecursionError):
         return ""
-    return key if all(isinstance(each, str) for each in (key, *words)) else ""
+    return key if all(isinstance(each, str) for each in (key, *texts)) else ""
 
 
-def _array(text: str) -> FloatArray:
+def _decode_array(text: str) -> FloatArray:
     return np.frombuffer(base64.b64decode(text, validate=True))

@@ -105,7 +105,7 @@ class Computer:
 
     def __init__(self, study: Study) -> None:
         self._study = study
-        self._read: tuple[tuple[int, str], CommandedJoints, Trajectory] | None = None
+        self._latest_trajectory: tuple[tuple[int, str], CommandedJoints, Trajectory] | None = None
 
     def rows(self, runs: Sequence[int]) -> Iterator[Row]:
         """Yield the rows of runs; errors of a run become part of its row.
@@ -113,15 +113,15 @@ class Computer:
         Raises:
             ChangedError: a file of the study has changed.
         """
-        together = self._study.runs_of_batch
-        for first in range(0, len(runs), together):
+        batch_size = self._study.runs_of_batch
+        for first in range(0, len(runs), batch_size):
             prepared = list[_Prepared]()
-            for run in runs[first : first + together]:
-                ready = self._prepare(run)
-                if isinstance(ready, Row):
-                    yield ready
+            for run in runs[first : first + batch_size]:
+                prepared_or_row = self._prepare(run)
+                if isinstance(prepared_or_row, Row):
+                    yield prepared_or_row
                 else:
-                    prepared.append(ready)
+                    prepared.append(prepared_or_row)
             for variants, members in batches([each.inputs for each in prepared], self._study.varied):
                 yield from self._batch_rows(variants, [prepared[index] for index in members])
 
@@ -131,9 +131,9 @@ class Computer:
         try:
             return self._inputs(run, key, point)
         except Exception as error:  # one run must not cost the others
-            return self._failed(run, key, error)
+            return self._failed_row(run, key, error)
 
-    def _failed(self, run: int, key: str, error: Exception) -> Row:
+    def _failed_row(self, run: int, key: str, error: Exception) -> Row:
         """Return the row of a run that an error ended.
 
         Raises:
@@ -168,16 +168,16 @@ class Computer:
     def _batch_rows(self, variants: Variants, prepared: Sequence[_Prepared]) -> list[Row]:
         """Return the rows of a batch; if it fails, each run is computed alone."""
         try:
-            return self._computed(variants, prepared)
+            return self._compute_batch(variants, prepared)
         except Exception as error:
             if len(prepared) == 1:
-                return [self._failed(prepared[0].run, prepared[0].key, error)]
+                return [self._failed_row(prepared[0].run, prepared[0].key, error)]
         rows = list[Row]()
         for robot, run in zip(variants.robots, prepared, strict=True):
             rows += self._batch_rows(replace(variants, robots=(robot,)), [run])
         return rows
 
-    def _computed(self, variants: Variants, prepared: Sequence[_Prepared]) -> list[Row]:
+    def _compute_batch(self, variants: Variants, prepared: Sequence[_Prepared]) -> list[Row]:
         trajectories = [each.inputs.trajectory for each in prepared]
         study = self._study
         batch = Batch(
@@ -206,11 +206,11 @@ class Computer:
         ]
 
     def _trajectory(self, robot: Robot, index: int, changes: ChangesByFile) -> Trajectory:
-        place, joints = (index, json.dumps(changes.trajectory)), CommandedJoints.of(robot)
-        if self._read is None or self._read[:2] != (place, joints):
+        trajectory_key, joints = (index, json.dumps(changes.trajectory)), CommandedJoints.of(robot)
+        if self._latest_trajectory is None or self._latest_trajectory[:2] != (trajectory_key, joints):
             declared = declared_trajectory(self._study.trajectories[index], robot, changes.trajectory)
-            self._read = (place, joints, declared)
-        return self._read[2]
+            self._latest_trajectory = (trajectory_key, joints, declared)
+        return self._latest_trajectory[2]
 
 
 class Job(NamedTuple):
@@ -241,13 +241,15 @@ class Job(NamedTuple):
             InputError: the study cannot be read here, versions differ, or a file has another content here.
         """
         study = load_study(self.path, self.engine)
-        differing = [
-            f"{name} is {here or 'missing'} instead of {there or 'none'}"
-            for (name, there), here in zip(self.computed_by, study.computed_by.values(), strict=True)
-            if here != there
+        differences = [
+            f"{name} is {local_version or 'missing'} instead of {job_version or 'none'}"
+            for (name, job_version), local_version in zip(
+                self.computed_by, study.computed_by.values(), strict=True
+            )
+            if local_version != job_version
         ]
-        if differing:
-            raise InputError.one(f"other rows would be computed here: {', '.join(differing)}")
+        if differences:
+            raise InputError.one(f"other rows would be computed here: {', '.join(differences)}")
         if study.fingerprint != self.fingerprint:
             raise InputError.one(
                 "a file of the study is another one here, or was changed meanwhile; run it again", self.path

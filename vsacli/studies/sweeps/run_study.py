@@ -31,7 +31,7 @@ from vsacli.results.store.study_table import (
     VariedParameter,
     rows_at_once,
 )
-from vsacli.studies.sweeps.columns import arrays_of, pad_curves, steps_of, width
+from vsacli.studies.sweeps.columns import arrays_of, pad_curves, row_length, steps_of
 from vsacli.studies.sweeps.executors import executor
 from vsacli.studies.sweeps.journal import Journal
 from vsacli.studies.sweeps.rows import FAILED, Row
@@ -41,7 +41,7 @@ from vsacli.studies.sweeps.study import Study, load_study
 def write(
     study: Study,
     runs: Sequence[int],
-    lost: Mapping[int, Row],
+    lost_rows: Mapping[int, Row],
     journal: Journal,
     file: Staged,
     **provenance: str,
@@ -51,7 +51,7 @@ def write(
     Args:
         study: study of the runs.
         runs: numbers of the runs, in order.
-        lost: rows that are not in the journal, by run.
+        lost_rows: rows that are not in the journal, by run.
         journal: journal with the other rows.
         file: staged file of the table.
         **provenance: further root attributes.
@@ -62,15 +62,15 @@ def write(
     joints = len(study.robot.joints)
 
     def row(run: int) -> Row:
-        return lost[run] if run in lost else journal.row(run, study.key(study.point(run)))
+        return lost_rows[run] if run in lost_rows else journal.row(run, study.key(study.point(run)))
 
     steps = 0
     if study.over_time:  # the longest run determines the size, so all rows are read first
         steps = max((steps_of(row(run).curves, study.over_time, joints) for run in runs), default=0)
-    at_once = rows_at_once(steps)
+    batch_rows = rows_at_once(steps)
     with StudyWriter(file, _head_of_study(study, steps, provenance), len(runs)) as writer:
-        for start in range(0, len(runs), at_once):
-            writer.write(_table_rows(study, [row(run) for run in runs[start : start + at_once]], steps))
+        for start in range(0, len(runs), batch_rows):
+            writer.write(_table_rows(study, [row(run) for run in runs[start : start + batch_rows]], steps))
         writer.finish()
 
 
@@ -118,17 +118,17 @@ def _table_rows(study: Study, rows: Sequence[Row], steps: int) -> StudyRows:
             ]
     joints = len(study.robot.joints)
     columns = [*study.costs, *study.kept]
-    table = np.full((len(rows), width(columns, joints)), np.nan)
-    for place, row in enumerate(rows):
+    table = np.full((len(rows), row_length(columns, joints)), np.nan)
+    for row_index, row in enumerate(rows):
         if len(row.values):
-            table[place] = row.values
+            table[row_index] = row.values
     arrays |= arrays_of(columns, table, joints)
     if study.over_time:
         arrays |= pad_curves([row.curves for row in rows], study.over_time, steps, joints)
     return StudyRows([row.run for row in rows], arrays)
 
 
-MOST_NAMED = 5
+MAX_LISTED_RUNS = 5
 """Largest number of runs that a message lists."""
 
 
@@ -146,30 +146,33 @@ def merge(paths: Sequence[str | Path], file: Staged, **provenance: str) -> None:
         InputError: the parts belong to different studies, one is given twice, or some runs are in none.
         StorageError: the disk is full or fails.
     """
-    _check_repeated(paths)
+    _check_distinct_paths(paths)
     with ExitStack() as stack:
         parts = [stack.enter_context(StoredStudy(path)) for path in paths]
-        _check_alike(parts)
+        _check_same_study(parts)
         order = _row_order(parts)
         steps = max(part.steps for part in parts)
         with StudyWriter(file, _head_of_parts(parts[0], steps, provenance), len(order)) as writer:
             for start in range(0, len(order), rows_at_once(steps)):
-                rows = order[start : start + rows_at_once(steps)]
+                row_indices = order[start : start + rows_at_once(steps)]
                 writer.write(
-                    StudyRows(range(start, start + len(rows)), _concatenated_columns(parts, rows, steps))
+                    StudyRows(
+                        range(start, start + len(row_indices)),
+                        _concatenated_columns(parts, row_indices, steps),
+                    )
                 )
             writer.finish()
 
 
-def _check_repeated(paths: Sequence[str | Path]) -> None:
-    seen: set[Path] = set()
+def _check_distinct_paths(paths: Sequence[str | Path]) -> None:
+    seen_paths: set[Path] = set()
     for path in paths:
-        if (place := Path(path).resolve()) in seen:
+        if (resolved_path := Path(path).resolve()) in seen_paths:
             raise InputError.one("is given twice; give each table once", path)
-        seen.add(place)
+        seen_paths.add(resolved_path)
 
 
-def _check_alike(parts: Sequence[StoredStudy]) -> None:
+def _check_same_study(parts: Sequence[StoredStudy]) -> None:
     first = parts[0]
     for part in parts[1:]:
         if part.fingerprint != first.fingerprint:
@@ -182,44 +185,54 @@ def _check_alike(parts: Sequence[StoredStudy]) -> None:
 def _row_order(parts: Sequence[StoredStudy]) -> IndexArray:
     """Return the index of each run's row in the concatenated parts."""
     runs = np.concatenate([part.read("run") for part in parts])
-    lost = np.concatenate([np.array(part.texts("verdict")) == FAILED for part in parts])
+    is_failed = np.concatenate([np.array(part.texts("verdict")) == FAILED for part in parts])
     order = np.full(parts[0].runs, -1)
-    for rows in (np.flatnonzero(lost), np.flatnonzero(~lost)):
+    for rows in (np.flatnonzero(is_failed), np.flatnonzero(~is_failed)):
         order[runs[rows]] = rows
-    absent = np.flatnonzero(order < 0)
-    if len(absent):
-        shown = listed(list(map(str, absent)), MOST_NAMED)
-        missing = f"run {shown} is missing" if len(absent) == 1 else f"runs {shown} are missing"
-        held = f"{parts[0].path} holds" if len(parts) == 1 else "the tables hold"
-        found = f"{held} {len(order) - len(absent)} of {counted(len(order), 'run')}"
-        raise InputError.one(f"{found}; {missing}: give the tables of all shards (--shard K/N)")
+    missing_runs = np.flatnonzero(order < 0)
+    if len(missing_runs):
+        listed_runs = listed(list(map(str, missing_runs)), MAX_LISTED_RUNS)
+        missing_text = (
+            f"run {listed_runs} is missing" if len(missing_runs) == 1 else f"runs {listed_runs} are missing"
+        )
+        subject = f"{parts[0].path} holds" if len(parts) == 1 else "the tables hold"
+        count_text = f"{subject} {len(order) - len(missing_runs)} of {counted(len(order), 'run')}"
+        raise InputError.one(f"{count_text}; {missing_text}: give the tables of all shards (--shard K/N)")
     return order
 
 
 def _concatenated_columns(parts: Sequence[StoredStudy], rows: IndexArray, steps: int) -> dict[str, Any]:
     """Return all columns of some runs; `rows` are indices into the concatenated parts."""
     first = parts[0]
-    texts = {name for name in (*TEXTS, *first.parameters) if name in TEXTS or first.parameter_is_text(name)}
-    arrays: dict[str, Any] = {name: np.empty(len(rows), dtype=object) for name in texts}
-    for name in {*first.parameters, *first.columns} - texts:
+    text_columns = {
+        name for name in (*TEXTS, *first.parameters) if name in TEXTS or first.parameter_is_text(name)
+    }
+    arrays: dict[str, Any] = {name: np.empty(len(rows), dtype=object) for name in text_columns}
+    for name in {*first.parameters, *first.columns} - text_columns:
         arrays[name] = np.full((len(rows), *first.shape(name, steps)), np.nan)
     start = 0
     for part in parts:
-        here = np.flatnonzero((start <= rows) & (rows < start + part.rows))
-        if len(here):
-            _fill(arrays, texts, here, part, rows[here] - start)
+        row_indices = np.flatnonzero((start <= rows) & (rows < start + part.rows))
+        if len(row_indices):
+            _copy_rows(arrays, text_columns, row_indices, part, rows[row_indices] - start)
         start += part.rows
-    return arrays | {name: arrays[name].tolist() for name in texts}
+    return arrays | {name: arrays[name].tolist() for name in text_columns}
 
 
-def _fill(
-    arrays: dict[str, Any], texts: Collection[str], here: IndexArray, part: StoredStudy, rows: IndexArray
+def _copy_rows(
+    arrays: dict[str, Any],
+    texts: Collection[str],
+    row_indices: IndexArray,
+    part: StoredStudy,
+    rows: IndexArray,
 ) -> None:
     """Copy rows of a part to their places; runs with fewer samples than others end with NaN."""
     span = slice(int(rows.min()), int(rows.max()) + 1)
     for name, array in arrays.items():
-        found = np.array(part.texts(name, span), dtype=object) if name in texts else part.read(name, span)
-        array[(here, *map(slice, found.shape[1:]))] = found[rows - span.start]
+        part_values = (
+            np.array(part.texts(name, span), dtype=object) if name in texts else part.read(name, span)
+        )
+        array[(row_indices, *map(slice, part_values.shape[1:]))] = part_values[rows - span.start]
 
 
 def _head_of_parts(part: StoredStudy, steps: int, provenance: dict[str, str]) -> Head:
@@ -251,7 +264,7 @@ def _head_of_parts(part: StoredStudy, steps: int, provenance: dict[str, str]) ->
     )
 
 
-MOST_LINES_NAMED = 5
+MAX_LISTED_LINES = 5
 """Largest number of damaged lines of a journal that a message lists."""
 
 
@@ -307,12 +320,13 @@ def run_study(
         with Journal(target.with_name(f"{target.name}.journal")) as journal:
             _tell_damage(journal, tell)
             file = outputs.file(target)
-            with _telling_what_is_kept(journal, study.runs_of_batch, tell):
-                lost = _computed(study, runs, journal, (processes, dask), progress, tell)
-                write(study, runs, lost, journal, file, command_line=command_line)
-    if lost:
+            with _reporting_kept_rows(journal, study.runs_of_batch, tell):
+                lost_rows = _compute_missing_rows(study, runs, journal, (processes, dask), progress, tell)
+                write(study, runs, lost_rows, journal, file, command_line=command_line)
+    if lost_rows:
         tell(
-            f"runs lost with their processes: {len(lost)}; all others are in {journal.path}, and the same "
+            f"runs lost with their processes: {len(lost_rows)}; all others are in {journal.path}, "
+            "and the same "
             "command with --overwrite tries these again"
         )
     else:
@@ -331,16 +345,16 @@ def _study_part(study: Study, number: int, parts: int) -> tuple[range, str]:
 
 def _tell_damage(journal: Journal, tell: Callable[[str], object]) -> None:
     if journal.damaged:
-        numbers = ", ".join(map(str, journal.damaged[:MOST_LINES_NAMED]))
-        more = len(journal.damaged) - MOST_LINES_NAMED
+        numbers = ", ".join(map(str, journal.damaged[:MAX_LISTED_LINES]))
+        other_count = len(journal.damaged) - MAX_LISTED_LINES
         words = (
             ("lines", "are", "their runs are") if len(journal.damaged) > 1 else ("line", "is", "its run is")
         )
-        named = f"{words[0]} {numbers}{f' and {more} more' if more > 0 else ''}"
-        tell(f"{journal.path}: {named} {words[1]} damaged; {words[2]} computed again")
+        line_text = f"{words[0]} {numbers}{f' and {other_count} other_count' if other_count > 0 else ''}"
+        tell(f"{journal.path}: {line_text} {words[1]} damaged; {words[2]} computed again")
 
 
-def _computed(
+def _compute_missing_rows(
     study: Study,
     runs: Sequence[int],
     journal: Journal,
@@ -349,13 +363,13 @@ def _computed(
     tell: Callable[[str], object],
 ) -> dict[int, Row]:
     """Compute rows missing in the journal; return the rows of runs that were lost with their processes."""
-    missing = [run for run in runs if study.key(study.point(run)) not in journal]
-    if len(missing) < len(runs):
-        tell(f"{len(runs) - len(missing):,} of {len(runs):,} runs are in {journal.path} already")
-    if not missing:
+    missing_runs = [run for run in runs if study.key(study.point(run)) not in journal]
+    if len(missing_runs) < len(runs):
+        tell(f"{len(runs) - len(missing_runs):,} of {len(runs):,} runs are in {journal.path} already")
+    if not missing_runs:
         return {}
-    with progress(len(missing)) as bar, executor(study, len(missing), *workers, tell) as rows:
-        return gather(rows(missing), journal, bar.update)
+    with progress(len(missing_runs)) as bar, executor(study, len(missing_runs), *workers, tell) as rows:
+        return gather(rows(missing_runs), journal, bar.update)
 
 
 def gather(rows: Iterable[Row], journal: Journal, done: Callable[[int], object]) -> dict[int, Row]:
@@ -374,18 +388,18 @@ def gather(rows: Iterable[Row], journal: Journal, done: Callable[[int], object])
         InputError: a process cannot read the study as it was.
         StorageError: the disk is full or fails; previous rows are in the journal.
     """
-    lost = {}
+    lost_rows = {}
     for row in rows:
         if row.lost:
-            lost[row.run] = row
+            lost_rows[row.run] = row
         else:
             journal.add(row)
         done(1)
-    return lost
+    return lost_rows
 
 
 @contextmanager
-def _telling_what_is_kept(journal: Journal, together: int, tell: Callable[[str], object]) -> Iterator[None]:
+def _reporting_kept_rows(journal: Journal, together: int, tell: Callable[[str], object]) -> Iterator[None]:
     """Report the kept rows if the study ends early; up to `together` runs finish at a time."""
     try:
         yield

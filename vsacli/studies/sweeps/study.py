@@ -138,8 +138,8 @@ class Study:
             trajectory = declared_trajectory(self.trajectories[0], robot, changes.trajectory)
         except InputError:
             robot, trajectory = self.robot, declared_trajectory(self.trajectories[0], self.robot)
-        alone = self.file.optimize is not None or is_alone(robot, trajectory)
-        return None if alone else PreparedRun(robot, trajectory)
+        is_single = self.file.optimize is not None or is_alone(robot, trajectory)
+        return None if is_single else PreparedRun(robot, trajectory)
 
     @cached_property
     def varied(self) -> tuple[Parameter, ...]:
@@ -150,7 +150,7 @@ class Study:
         if self._first_run is None:
             return ()
         robot = self._first_run.robot
-        candidates = [parameter for each in self.dimensions for parameter in _led_to(robot, each)]
+        candidates = [parameter for each in self.dimensions for parameter in _numbers_matched_by(robot, each)]
         try:
             return numbers_as_rows(*self._first_run, list(dict.fromkeys(candidates)))
         except InputError:  # of which the row of the first run tells
@@ -174,8 +174,8 @@ class Study:
         if not divide_changes_by_file({dimension.path: None}).robot:
             return True
         paths = {str(parameter) for parameter in self.varied}
-        leads = [str(parameter) for parameter in _led_to(self.robot, dimension)]
-        return dimension.numeric and bool(leads) and paths.issuperset(leads)
+        matching_paths = [str(parameter) for parameter in _numbers_matched_by(self.robot, dimension)]
+        return dimension.numeric and bool(matching_paths) and paths.issuperset(matching_paths)
 
     def with_engine(self, name: str) -> Study:
         """Return the study with the engine of a name, see `settle_engine`.
@@ -187,18 +187,20 @@ class Study:
         if name == "numpy":
             return self
         kernel = Variants((self.robot,), self.robot, self.varied).kernel(InverseDynamics(self.robot))
-        settled = settle_engine(name, kernel, self.samples_of_kernel if name == "auto" else 0)
-        return replace(self, engine=settled.name, compiler=settled.compiler)
+        engine_choice = settle_engine(name, kernel, self.samples_of_kernel if name == "auto" else 0)
+        return replace(self, engine=engine_choice.name, compiler=engine_choice.compiler)
 
     @cached_property
     def digest(self) -> str:
         """Hexadecimal digest of everything that rows depend on, except trajectory and values of a run."""
         robot = [source.sha256 for source in self.robot.sources]
-        kept = [*TEXTS, *(each.name for each in self.kept)]
-        curves = [self.file.every, *(each.name for each in self.over_time)]
-        optimized = [] if self.file.optimize is None else [repr(self.file.optimize)]
+        column_names = [*TEXTS, *(each.name for each in self.kept)]
+        curve_names = [self.file.every, *(each.name for each in self.over_time)]
+        optimize_text = [] if self.file.optimize is None else [repr(self.file.optimize)]
         files = [*self._named_files.values()]
-        return _digest([[*self.computed_by.values()], robot, kept, curves, files, *optimized])
+        return _digest(
+            [[*self.computed_by.values()], robot, column_names, curve_names, files, *optimize_text]
+        )
 
     @property
     def computed_by(self) -> dict[str, str]:
@@ -219,12 +221,12 @@ class Study:
     def _named_files(self) -> dict[str, str]:
         """SHA-256, by path, of files that listed values name relative to the robot or a trajectory."""
         folders = {Path(each).parent for each in (self.robot.sources[0].path, *self.trajectories)}
-        texts = (text for each in self.dimensions for value in each.values for text in _texts_in(value))
+        texts = (text for each in self.dimensions for value in each.values for text in _nested_texts(value))
         files = (file for text in texts for file in sorted(folder / text for folder in folders))
         return {str(file): hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()}
 
     @cached_property
-    def _known(self) -> dict[str, str]:
+    def _sha256_by_path(self) -> dict[str, str]:
         """SHA-256 of all files that rows depend on, by path."""
         return self._named_files | {source.path: source.sha256 for source in self.sources}
 
@@ -235,7 +237,7 @@ class Study:
             ChangedError: a file has changed since the study was read.
         """
         for source in sources:
-            if self._known.get(source.path, source.sha256) != source.sha256:
+            if self._sha256_by_path.get(source.path, source.sha256) != source.sha256:
                 raise _changed_error(source.path)
 
     def check_files(self) -> None:
@@ -244,7 +246,7 @@ class Study:
         Raises:
             ChangedError: a file has changed since the study was read, or is missing.
         """
-        for path, sha256 in self._known.items():
+        for path, sha256 in self._sha256_by_path.items():
             try:
                 content = Path(path).read_bytes()
             except OSError:
@@ -272,14 +274,14 @@ def _changed_error(path: str) -> ChangedError:
     return ChangedError.one("was changed while the study was computed; run it again", path)
 
 
-def _texts_in(value: Any) -> Iterator[str]:
+def _nested_texts(value: Any) -> Iterator[str]:
     match value:
         case str() if len(value) <= MOST_LETTERS:
             yield value
         case list():
-            yield from (text for entry in value for text in _texts_in(entry))
+            yield from (text for entry in value for text in _nested_texts(entry))
         case dict():
-            yield from (text for entry in value.values() for text in _texts_in(entry))
+            yield from (text for entry in value.values() for text in _nested_texts(entry))
 
 
 def _digest(content: Any) -> str:
@@ -295,14 +297,14 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     """
     file, source = read_document(path, StudyFile, file_formats.STUDY)
     folder = Path(source.path).parent
-    _check_named(source, "robot", file.robot)
+    _check_file_exists(source, "robot", file.robot)
     read = read_robot_file(folder / file.robot)
     robot = read.robot()
     for each in curve_columns(file.variables or ()):
         if not robot.has_variable(VARIABLES[each.name]):
             raise InputError.one(f"variables: no joint of {robot.name} has a {each.name}", source.path)
-    trajectories = _trajectories(file, folder, source)
-    loaded = [load_trajectory(each, robot) for each in trajectories]
+    trajectories = _trajectory_paths(file, folder, source)
+    loaded_trajectories = [load_trajectory(each, robot) for each in trajectories]
     entries = Entries(file, source.path, read, robot, trajectories)
     dimensions = entries.dimensions()
     try:
@@ -310,24 +312,26 @@ def load_study(path: str | os.PathLike[str], engine: str = "numpy") -> Study:
     except InputError as error:
         raise InputError.one(str(error), source.path) from None
     entries.try_values()
-    sources = tuple(each.sources for each in loaded)
-    warnings = dict.fromkeys((*robot.warnings, *(text for each in loaded for text in each.warnings)))
+    sources = tuple(each.sources for each in loaded_trajectories)
+    warnings = dict.fromkeys(
+        (*robot.warnings, *(text for each in loaded_trajectories for text in each.warnings))
+    )
     study = Study(file, source, read, robot, trajectories, sources, dimensions, design, tuple(warnings))
     return study.with_engine(engine)
 
 
-def _led_to(robot: Robot, dimension: Dimension) -> list[Parameter]:
+def _numbers_matched_by(robot: Robot, dimension: Dimension) -> list[Parameter]:
     """Return the numbers of a robot to which a dimension leads, or which are part of what it leads to."""
-    ends = (dimension.path, f"{dimension.path}.*")
-    return [each for each in numbers_of_robot(robot) if each.matches(*ends)]
+    patterns = (dimension.path, f"{dimension.path}.*")
+    return [each for each in numbers_of_robot(robot) if each.matches(*patterns)]
 
 
-def _check_named(source: Source, key: str, name: str) -> None:
+def _check_file_exists(source: Source, key: str, name: str) -> None:
     """Raise an error at the line of a key that names a missing file, relative to the study."""
     folder = Path(source.path).parent
     if not (folder / name).exists():
-        hint = near_file(folder / name).replace(f"'{folder}{os.sep}", "'")
-        raise InputError.one(f"{key}: {name}: no such file{hint}", source.path, _line_of(source, key))
+        suggestion = near_file(folder / name).replace(f"'{folder}{os.sep}", "'")
+        raise InputError.one(f"{key}: {name}: no such file{suggestion}", source.path, _line_of(source, key))
 
 
 def _line_of(source: Source, key: str) -> int:
@@ -335,17 +339,17 @@ def _line_of(source: Source, key: str) -> int:
     return root.key_lines.get(key, 0) if isinstance(root, MapNode) else 0
 
 
-def _trajectories(file: StudyFile, folder: Path, source: Source) -> tuple[str, ...]:
-    found: list[str] = []
+def _trajectory_paths(file: StudyFile, folder: Path, source: Source) -> tuple[str, ...]:
+    paths: list[str] = []
     for pattern in file.trajectory:
-        place = str(folder / pattern)
-        if os.path.exists(place) or not glob.has_magic(pattern):
-            _check_named(source, "trajectory", pattern)
-            matching = [place]
+        full_path = str(folder / pattern)
+        if os.path.exists(full_path) or not glob.has_magic(pattern):
+            _check_file_exists(source, "trajectory", pattern)
+            matching_paths = [full_path]
         else:
-            matching = sorted(glob.glob(place))
-        if not matching:
+            matching_paths = sorted(glob.glob(full_path))
+        if not matching_paths:
             line = _line_of(source, "trajectory")
             raise InputError.one(f"trajectory: no file fits {pattern!r}", source.path, line)
-        found += [each for each in matching if each not in found]
-    return tuple(found)
+        paths += [each for each in matching_paths if each not in paths]
+    return tuple(paths)

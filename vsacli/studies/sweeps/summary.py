@@ -21,14 +21,14 @@ from vsacli.results.charts.study_points import (
 from vsacli.results.store.study_table import FIRST_LIMIT, StoredStudy
 from vsacli.studies.sweeps.rows import FAILED, IMPOSSIBLE
 
-MOST_LIMITS = 5
+MAX_LISTED_LIMITS = 5
 """Largest number of limits that the text lists."""
 
-MOST_ERRORS = 3
+MAX_LISTED_ERRORS = 3
 """Largest number of failed runs that the text lists."""
 
 
-MOST_NUMBERS = 3
+MAX_LISTED_PARAMETERS = 3
 """Largest number of parameters shown with a run; the table has them all."""
 
 
@@ -131,40 +131,42 @@ class StudySummary(Stored, TextReport):
     def as_text(self) -> ReportText:
         """Return the report in parts."""
         lines = [] if self.ok_share is None else [_share_line(self.ok_share)]
-        lines += [f"run {each.run} failed: {each.error}" for each in self.failures[:MOST_ERRORS]]
-        if len(self.failures) > MOST_ERRORS:
-            others = counted(len(self.failures) - MOST_ERRORS, "other run")
+        lines += [f"run {each.run} failed: {each.error}" for each in self.failures[:MAX_LISTED_ERRORS]]
+        if len(self.failures) > MAX_LISTED_ERRORS:
+            others = counted(len(self.failures) - MAX_LISTED_ERRORS, "other run")
             lines.append(f"{others} failed; the column error of the table says why")
         return ReportText(self.title, list(self._findings()), [self._rows()], lines)
 
     def _findings(self) -> Iterator[str]:
         yield from (f"warning: {warning}" for warning in self.warnings)
-        without = sum(self.verdicts.get(verdict, 0) for verdict in ("infeasible", "singular"))
-        if without:
-            runs = counted(without, "run")
+        run_count = sum(self.verdicts.get(verdict, 0) for verdict in ("infeasible", "singular"))
+        if run_count:
+            runs = counted(run_count, "run")
             yield f"infeasible or singular samples in {runs}; peaks and energies there are NaN"
         if impossible := self.verdicts.get(IMPOSSIBLE, 0):
             runs = counted(impossible, "run")
             yield f"nothing feasible was found in {runs}; the column error of the table says why"
         if self.first_limits:
-            listed = [f"{limit} ({counted(runs, 'run')})" for limit, runs in self.first_limits.items()]
-            more = len(listed) - MOST_LIMITS
-            listed[MOST_LIMITS:] = [f"and {counted(more, 'other limit')}"] if more > 0 else []
-            yield f"first limit exceeded: {', '.join(listed)}"
+            limit_texts = [f"{limit} ({counted(runs, 'run')})" for limit, runs in self.first_limits.items()]
+            other_count = len(limit_texts) - MAX_LISTED_LIMITS
+            limit_texts[MAX_LISTED_LIMITS:] = (
+                [f"and {counted(other_count, 'other limit')}"] if other_count > 0 else []
+            )
+            yield f"first limit exceeded: {', '.join(limit_texts)}"
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Return the table of the smallest margin of each joint, smallest first."""
         if not self.worst:
             return []
-        varied = list(dict.fromkeys(path for each in self.worst for path in each.at))
-        varied = varied if len(varied) <= MOST_NUMBERS else []
-        rows = [("joint", "smallest margin\n%", "run", *varied)]
+        varied_paths = list(dict.fromkeys(path for each in self.worst for path in each.at))
+        varied_paths = varied_paths if len(varied_paths) <= MAX_LISTED_PARAMETERS else []
+        rows = [("joint", "smallest margin\n%", "run", *varied_paths)]
         rows += [
             (
                 each.joint,
                 f"{100 * each.margin:.3g}",
                 f"{each.run}",
-                *(each.at.get(path, "-") for path in varied),
+                *(each.at.get(path, "-") for path in varied_paths),
             )
             for each in sorted(self.worst, key=lambda each: each.margin)
         ]
@@ -172,8 +174,8 @@ class StudySummary(Stored, TextReport):
 
 
 def _share_line(ok: OkShare) -> str:
-    share, low, high = (f"{100 * each:.3g}" for each in (ok.share, ok.low, ok.high))
-    return f"share of ok runs: {share} %, 95 % confidence interval {low} to {high} %"
+    share, low_end, high_end = (f"{100 * each:.3g}" for each in (ok.share, ok.low, ok.high))
+    return f"share of ok runs: {share} %, 95 % confidence interval {low_end} to {high_end} %"
 
 
 def _worst(table: StoredStudy) -> list[Extreme]:

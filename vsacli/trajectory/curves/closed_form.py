@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from vsacli.trajectory.fits import FitChoice
 
 
-SHORTEST, LONGEST = 1e-30, 1e30
+MIN_DURATION, MAX_DURATION = 1e-30, 1e30
 """Range of durations, s, whose fourth powers neither overflow nor underflow."""
 
 DEGREES = range(3, 16, 2)
@@ -64,8 +64,8 @@ class ClosedForm(Profile):
 
     def __post_init__(self) -> None:
         first, last = self.span
-        if not SHORTEST <= last - first <= LONGEST:
-            allowed = f"a positive time ({SHORTEST:g} to {LONGEST:g} s)"
+        if not MIN_DURATION <= last - first <= MAX_DURATION:
+            allowed = f"a positive time ({MIN_DURATION:g} to {MAX_DURATION:g} s)"
             raise InputError.one(f"a profile must last {allowed}, not from {first:g} to {last:g} s")
 
     @property
@@ -104,9 +104,9 @@ class ConstantProfile(ClosedForm):
 
     def at(self, time: FloatArray) -> FloatArray:
         """See `Profile.at`."""
-        rows = np.zeros((self.signal.orders, self.components, len(time)))
-        rows[0] = np.array(self.value)[:, None]
-        return rows
+        derivatives = np.zeros((self.signal.orders, self.components, len(time)))
+        derivatives[0] = np.array(self.value)[:, None]
+        return derivatives
 
     def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:
         """See `ClosedForm.rescaled`."""
@@ -162,10 +162,10 @@ class Use:
 
     def degree(self, degrees: range) -> Check:
         """Return the check of a degree: smooth enough for a motion that begins and ends at rest."""
-        vanishing = "its rate"
+        vanishing_text = "its rate"
         if self.signal is POSITION:
-            vanishing = "velocity" if self.rigid else "derivatives up to the third"
-        return odd(degrees, 2 * self.smoothness - 1, f"{vanishing} must vanish at both ends")
+            vanishing_text = "velocity" if self.rigid else "derivatives up to the third"
+        return odd(degrees, 2 * self.smoothness - 1, f"{vanishing_text} must vanish at both ends")
 
     @property
     def _kind(self) -> PerJoint | NumberList:
@@ -181,8 +181,8 @@ class Use:
 def odd(degrees: range, lowest: int, reason: str) -> Check:
     """Return the check of a degree: odd, and at least the lowest that is smooth enough."""
     allowed = range(max(lowest, degrees.start), degrees.stop, degrees.step)
-    words = f"odd, from {allowed[0]} to {allowed[-1]} ({reason})"
-    return Check(lambda degree: degree in allowed, words, {"enum": list(allowed)})
+    requirement = f"odd, from {allowed[0]} to {allowed[-1]} ({reason})"
+    return Check(lambda degree: degree in allowed, requirement, {"enum": list(allowed)})
 
 
 class Declaration(DeclaredRecord, ABC):
@@ -211,15 +211,15 @@ class Declaration(DeclaredRecord, ABC):
     @classmethod
     def record(cls, use: Use) -> type[Self]:
         """Return the record class for a use."""
-        made: type[Self] = _declare_record(cls, use)
-        return made
+        record_class: type[Self] = _declare_record(cls, use)
+        return record_class
 
 
 @cache
 def _declare_record(cls: type[Declaration], use: Use) -> Any:
     fields = [(name, Any, field) for name, field in cls.fields(use).items()]
-    which = "Rigid" if use.rigid else "Tool" if use.by_tool else ""
-    name = f"{which}{use.signal.key.capitalize()}{cls.__name__}"
+    prefix = "Rigid" if use.rigid else "Tool" if use.by_tool else ""
+    name = f"{prefix}{use.signal.key.capitalize()}{cls.__name__}"
     namespace = {"__doc__": cls.meaning(use), "use": use, **({"keyed_by": "name"} if use.by_tool else {})}
     return make_dataclass(name, fields, bases=(cls,), namespace=namespace, frozen=True)
 
@@ -289,8 +289,8 @@ class Recorded(Declaration):
     @classmethod
     def meaning(cls, use: Use) -> str:
         """Return the meaning for users."""
-        columns = f"Samples from a CSV table with the columns {', '.join(WRENCH_AXES)}."
-        return columns if use.signal is WRENCH else super().meaning(use)
+        meaning = f"Samples from a CSV table with the columns {', '.join(WRENCH_AXES)}."
+        return meaning if use.signal is WRENCH else super().meaning(use)
 
 
 class Formula(Declaration):
@@ -345,16 +345,16 @@ def nan_for_none(values: Values) -> tuple[float, ...]:
 
 
 _JOINTS = ("position", "commanded")
-_EVERY = (*_JOINTS, "wrench")
+_ALL_USES = (*_JOINTS, "wrench")
 
 TYPES = {
-    "polynomial": ("vsacli.trajectory.curves.polynomial:Polynomial", _EVERY),
+    "polynomial": ("vsacli.trajectory.curves.polynomial:Polynomial", _ALL_USES),
     "via": ("vsacli.trajectory.curves.via_points:Via", _JOINTS),
     "sinusoids": ("vsacli.trajectory.curves.sinusoids:SumOfSinusoids", _JOINTS),
     "sequence": ("vsacli.trajectory.curves.sequence:Sequence", ("position",)),
     "steps": ("vsacli.trajectory.curves.steps:Steps", ("commanded", "wrench")),
-    "constant": ("vsacli.trajectory.curves.polynomial:Hold", _EVERY),
-    "csv": ("vsacli.trajectory.curves.closed_form:Recorded", _EVERY),
+    "constant": ("vsacli.trajectory.curves.polynomial:Hold", _ALL_USES),
+    "csv": ("vsacli.trajectory.curves.closed_form:Recorded", _ALL_USES),
 }
 """Types of declarations, each with module and class, and its uses: position, commanded signals, wrench."""
 
@@ -363,8 +363,8 @@ class _Types(LazyRegistry):
     """The record classes of the types that are possible for a use."""
 
     def __init__(self, use: Use) -> None:
-        served = {POSITION: "position", WRENCH: "wrench"}.get(use.signal, "commanded")
-        super().__init__({name: home for name, (home, serves) in TYPES.items() if served in serves})
+        use_name = {POSITION: "position", WRENCH: "wrench"}.get(use.signal, "commanded")
+        super().__init__({name: home for name, (home, serves) in TYPES.items() if use_name in serves})
         self._use = use
 
     def __getitem__(self, name: str) -> Any:

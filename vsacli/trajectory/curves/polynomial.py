@@ -57,20 +57,24 @@ class RestToRest(ClosedForm):
 
     def at(self, time: FloatArray) -> FloatArray:
         """See `Profile.at`."""
-        first, last = self.span
-        elapsed, remaining = time - first, last - time
-        late = remaining < elapsed
+        start_time, end_time = self.span
+        elapsed, remaining = time - start_time, end_time - time
+        second_half = remaining < elapsed
         start, end = np.array(self.start)[:, None], np.array(self.end)[:, None]
         change = end - start
 
-        rows = np.empty((self.signal.orders, self.components, len(time)))
-        rise = _rise(_scalar(np.minimum(elapsed, remaining)) / (last - first), self.degree)
-        np.multiply(change, np.where(late, -rise, rise), out=rows[0])
-        rows[0] += np.where(late, end, start)
-        rates = _rise_rates(_scalar(elapsed), _scalar(remaining), last - first, self.degree)
-        for row, rate in zip(rows[1:], rates, strict=False):
-            np.multiply(change, rate, out=row)
-        return rows
+        derivatives = np.empty((self.signal.orders, self.components, len(time)))
+        step_shape = _step_shape(
+            _scalar(np.minimum(elapsed, remaining)) / (end_time - start_time), self.degree
+        )
+        np.multiply(change, np.where(second_half, -step_shape, step_shape), out=derivatives[0])
+        derivatives[0] += np.where(second_half, end, start)
+        shape_rates = _step_shape_rates(
+            _scalar(elapsed), _scalar(remaining), end_time - start_time, self.degree
+        )
+        for derivative, shape_rate in zip(derivatives[1:], shape_rates, strict=False):
+            np.multiply(change, shape_rate, out=derivative)
+        return derivatives
 
     def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:
         """See `ClosedForm.rescaled`."""
@@ -83,46 +87,46 @@ def _scalar(times: FloatArray) -> Scalar:
     return times.item() if len(times) == 1 else times
 
 
-def _rise(u: Scalar, degree: int) -> Scalar:
+def _step_shape(u: Scalar, degree: int) -> Scalar:
     """Return the polynomial from 0 at u = 0 to 1 at u = 1.
 
     With m = (degree-1)/2 it is u^(m+1) sum over k = 0..m of binomial(m+k, k) (1-u)^k, whose terms are
     positive, so it is accurate for small u.
     """
     m = (degree - 1) // 2
-    series, rest = 0.0 * u, 1 - u
+    series, complement = 0.0 * u, 1 - u
     for k in range(m, -1, -1):
-        series = series * rest + math.comb(m + k, k)
+        series = series * complement + math.comb(m + k, k)
     return series * _integer_power(u, m + 1)
 
 
-def _rise_rates(elapsed: Scalar, remaining: Scalar, total: float, degree: int) -> Iterator[Scalar]:
-    """Yield the time derivatives of order 1, 2, ... of the polynomial `_rise`.
+def _step_shape_rates(elapsed: Scalar, remaining: Scalar, duration: float, degree: int) -> Iterator[Scalar]:
+    """Yield the time derivatives of order 1, 2, ... of the polynomial `_step_shape`.
 
     The first is c p^m / T with p = s (1-s), s = elapsed / T, m = (degree-1)/2 and c = degree! / m!^2. Since
     dp/ds = 1-2s and d(1-2s)/ds = -2, the others are also sums of terms p^i (1-2s)^j.
     """
     m = (degree - 1) // 2
-    p, slope = elapsed / total * (remaining / total), (remaining - elapsed) / total
+    p, slope = elapsed / duration * (remaining / duration), (remaining - elapsed) / duration
     terms = {(m, 0): math.factorial(degree) / math.factorial(m) ** 2}
-    scale = total
+    scale = duration
     while True:
         rate: Scalar = 0.0
         for (i, j), c in terms.items():
             rate += c / scale * _integer_power(p, i) * _integer_power(slope, j)
         yield rate
-        terms, scale = _differentiate_terms(terms), scale * total
+        terms, scale = _differentiate_terms(terms), scale * duration
 
 
 def _differentiate_terms(terms: dict[tuple[int, int], float]) -> dict[tuple[int, int], float]:
     """Return d/ds of the sum of terms c p^i (1-2s)^j, given and returned as {(i, j): c}."""
-    result: dict[tuple[int, int], float] = defaultdict(float)
+    derivative_terms: dict[tuple[int, int], float] = defaultdict(float)
     for (i, j), c in terms.items():
         if i:
-            result[i - 1, j + 1] += i * c
+            derivative_terms[i - 1, j + 1] += i * c
         if j:
-            result[i, j - 1] -= 2 * j * c
-    return result
+            derivative_terms[i, j - 1] -= 2 * j * c
+    return derivative_terms
 
 
 def _integer_power(base: Scalar, exponent: int) -> Scalar:

@@ -16,8 +16,8 @@ from vsacli.base.signals import POSITION
 from vsacli.documents.fields import POSITIVE, Items, OneOf, integer, number, value
 from vsacli.trajectory.curves.closed_form import (
     DEGREES,
-    LONGEST,
-    SHORTEST,
+    MAX_DURATION,
+    MIN_DURATION,
     ClosedForm,
     ConstantProfile,
     Declaration,
@@ -33,7 +33,7 @@ from vsacli.trajectory.curves.via_points import Via
 Position: TypeAlias = tuple[float, ...]
 
 
-class _OfAnyRobot(Declaration):
+class _RobotIndependent(Declaration):
     """A declaration that means the same for robots whose joints are all rigid, though with other degrees."""
 
     @classmethod
@@ -94,7 +94,7 @@ class Dwell(_Timed):
         return ConstantProfile(signal=POSITION, span=span, value=start_position)
 
 
-class PolynomialPart(_OfAnyRobot, _Timed):
+class PolynomialPart(_RobotIndependent, _Timed):
     """Rest to rest: all derivatives up to (degree-1)/2 vanish at both ends."""
 
     opening = ("start",)
@@ -148,7 +148,7 @@ class _Standalone(Formula, SequencePart):
         return self.problems_over(self.lasts)
 
 
-class ViaPart(_OfAnyRobot, Via, _Standalone):
+class ViaPart(_RobotIndependent, Via, _Standalone):
     """A spline through points as above."""
 
     opening = ("points", 0)
@@ -197,7 +197,7 @@ PARTS: dict[str, type[SequencePart]] = {
 }
 
 
-class Sequence(_OfAnyRobot, Formula):
+class Sequence(_RobotIndependent, Formula):
     """Parts one after the other. Each begins as the one before ends, to the fourth derivative."""
 
     parts: tuple[SequencePart, ...]
@@ -217,16 +217,16 @@ class Sequence(_OfAnyRobot, Formula):
         return unfit or list(self._order_problems()) or list(self._discontinuities())
 
     def _order_problems(self) -> Iterator[FieldProblem]:
-        moving = [index for index, part in enumerate(self.parts) if not isinstance(part, Dwell)]
-        if not moving:
+        moving_indices = [index for index, part in enumerate(self.parts) if not isinstance(part, Dwell)]
+        if not moving_indices:
             yield FieldProblem(("parts",), "no part moves; take `type: constant`")
-        elif self.parts[moving[0]].begins is None:
+        elif self.parts[moving_indices[0]].begins is None:
             message = (
                 "missing key 'start' (position at the start), since no part before says where the robot is"
             )
-            yield FieldProblem(("parts", moving[0]), message)
-        ends = self._ends()
-        if not (ends[-1] <= LONGEST and np.all(np.diff(ends) >= SHORTEST)):
+            yield FieldProblem(("parts", moving_indices[0]), message)
+        ends = self._part_ends()
+        if not (ends[-1] <= MAX_DURATION and np.all(np.diff(ends) >= MIN_DURATION)):
             durations = [part.lasts for part in self.parts]
             message = f"durations from {min(durations):g} to {max(durations):g} s cannot follow one another"
             yield FieldProblem(("parts",), message)
@@ -241,15 +241,17 @@ class Sequence(_OfAnyRobot, Formula):
                 yield FieldProblem(path, _describe_gap(jump, path), jump.component)
             else:
                 name = self.signal.names[jump.order]
-                change = f"{name} jumps from {jump.before:.4g} to {jump.after:.4g} where this part begins"
-                yield FieldProblem(part, f"{change}; {self._advice()}", jump.component)
+                jump_text = f"{name} jumps from {jump.before:.4g} to {jump.after:.4g} where this part begins"
+                yield FieldProblem(part, f"{jump_text}; {self._smoothness_advice()}", jump.component)
 
-    def _advice(self) -> str:
-        smooth = "twice" if self.use.rigid else "four times"
-        advice = f"the motion must be {smooth} continuously differentiable, so that parts meet at rest"
+    def _smoothness_advice(self) -> str:
+        smoothness_text = "twice" if self.use.rigid else "four times"
+        advice = (
+            f"the motion must be {smoothness_text} continuously differentiable, so that parts meet at rest"
+        )
         return f"{advice}: take degree {2 * self.use.smoothness + 1} or more, and a ramp for sinusoids"
 
-    def _ends(self) -> FloatArray:
+    def _part_ends(self) -> FloatArray:
         """Return start and ends of the parts, from zero on, s, (parts+1,)."""
         with np.errstate(over="ignore"):  # an infinite sum is refused
             return np.concatenate(([0.0], np.cumsum([part.lasts for part in self.parts])))
@@ -257,31 +259,31 @@ class Sequence(_OfAnyRobot, Formula):
     @property
     def lasts(self) -> float:
         """Sum of the durations, s."""
-        return float(self._ends()[-1])
+        return float(self._part_ends()[-1])
 
     def profile_over(self, span: tuple[float, float]) -> PiecewiseProfile:
         """See `Formula.profile_over`."""
         return PiecewiseProfile(
-            signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed(span))
+            signal=self.signal, span=span, parts=tuple(profile for _, profile in self._placed_parts(span))
         )
 
-    def _placed(self, span: tuple[float, float]) -> Iterator[tuple[SequencePart, ClosedForm]]:
-        ends = [*(span[0] + (span[1] - span[0]) * self._ends()[:-1] / self.lasts).tolist(), span[1]]
+    def _placed_parts(self, span: tuple[float, float]) -> Iterator[tuple[SequencePart, ClosedForm]]:
+        part_ends = [*(span[0] + (span[1] - span[0]) * self._part_ends()[:-1] / self.lasts).tolist(), span[1]]
         start_position = next(part.begins for part in self.parts if part.begins is not None)
-        for part, piece in zip(self.parts, pairwise(ends), strict=True):
-            profile = part.placed(piece, start_position)
-            start_position = tuple(profile.at(np.array(piece[1:]))[0, :, 0].tolist())
+        for part, part_span in zip(self.parts, pairwise(part_ends), strict=True):
+            profile = part.placed(part_span, start_position)
+            start_position = tuple(profile.at(np.array(part_span[1:]))[0, :, 0].tolist())
             yield part, profile
 
     def warnings_over(self, span: tuple[float, float], joints: Mapping[str, str], /) -> Iterator[str]:
         """Yield the warnings of the parts."""
-        for part, profile in self._placed(span):
+        for part, profile in self._placed_parts(span):
             if isinstance(part, Formula):
                 yield from part.warnings_over(profile.span, joints)
 
     def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
         """Yield the notes of the parts."""
-        for part, profile in self._placed(span):
+        for part, profile in self._placed_parts(span):
             if isinstance(part, Formula):
                 yield from part.notes_over(profile.span)
 

@@ -89,21 +89,21 @@ class Sinusoids(ClosedForm):
 
     def at(self, time: FloatArray) -> FloatArray:
         """See `Profile.at`."""
-        rows = self._series(time)
+        derivatives = self._series(time)
         if self.ramp:
             window = profile_of_levels(
                 self.signal, self.span, RAMP_DEGREE, ((0.0,), (1.0,), (0.0,)), self._ramps()
             )
-            rows = _product(window.at(time), rows)
-        rows[0] += np.array(self.offset)[:, None]
-        return rows
+            derivatives = _product(window.at(time), derivatives)
+        derivatives[0] += np.array(self.offset)[:, None]
+        return derivatives
 
     def lowest(self) -> Lowest:
         """Return the smallest values over the span."""
-        stretches = [self._sampled_lowest(time) for time in self._times_to_search()]
-        values, times = (np.stack(rows) for rows in zip(*stretches, strict=True))
-        first = np.nan_to_num(values, nan=np.inf).argmin(axis=0), np.arange(self.components)
-        return Lowest(values[first], times[first])
+        stretch_minima = [self._sampled_lowest(time) for time in self._times_to_search()]
+        values, times = (np.stack(rows) for rows in zip(*stretch_minima, strict=True))
+        first_index = np.nan_to_num(values, nan=np.inf).argmin(axis=0), np.arange(self.components)
+        return Lowest(values[first_index], times[first_index])
 
     def _times_to_search(self) -> Iterator[FloatArray]:
         """Yield ascending times of stretches that together contain the smallest value.
@@ -130,21 +130,24 @@ class Sinusoids(ClosedForm):
         lowest = Lowest(np.full(self.components, np.nan), np.full(self.components, np.nan))
         for component in np.flatnonzero(~np.isnan(values[:, 0])).tolist():
             times = np.union1d(time, self._minima(time, values[component], component))
-            of_component = self.at(times)[0, component]
-            best = of_component.argmin()
-            lowest.value[component], lowest.at[component] = of_component[best], times[best]
+            component_values = self.at(times)[0, component]
+            best_index = component_values.argmin()
+            lowest.value[component], lowest.at[component] = component_values[best_index], times[best_index]
         return lowest
 
     def _minima(self, time: FloatArray, values: FloatArray, component: int) -> FloatArray:
         """Return the times of minima, by bisection next to samples without a smaller neighbor."""
-        before = np.concatenate(([np.inf], values[:-1]))
-        after = np.concatenate((values[1:], [np.inf]))
-        near = np.flatnonzero((values < before) & (values <= after))
-        low, high = time[np.maximum(near - 1, 0)], time[np.minimum(near + 1, len(time) - 1)]
+        previous_values = np.concatenate(([np.inf], values[:-1]))
+        next_values = np.concatenate((values[1:], [np.inf]))
+        minimum_indices = np.flatnonzero((values < previous_values) & (values <= next_values))
+        low, high = (
+            time[np.maximum(minimum_indices - 1, 0)],
+            time[np.minimum(minimum_indices + 1, len(time) - 1)],
+        )
         for _ in range(HALVINGS):
-            middle = (low + high) / 2
-            falling = self.at(middle)[1, component] < 0
-            low, high = np.where(falling, middle, low), np.where(falling, high, middle)
+            midpoint = (low + high) / 2
+            is_falling = self.at(midpoint)[1, component] < 0
+            low, high = np.where(is_falling, midpoint, low), np.where(is_falling, high, midpoint)
         return (low + high) / 2
 
     def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:

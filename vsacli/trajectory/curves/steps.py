@@ -87,12 +87,12 @@ class PiecewiseProfile(ClosedForm):
         Where two parts meet, the later one is used.
         """
         starts = [part.span[0] for part in self.parts]
-        which = np.searchsorted(starts[1:], time, side="right")
-        rows = np.empty((self.signal.orders, self.components, len(time)))
-        for index in np.unique(which).tolist():
-            chosen = which == index
-            rows[:, :, chosen] = self.parts[index].at(time[chosen])
-        return rows
+        part_indices = np.searchsorted(starts[1:], time, side="right")
+        derivatives = np.empty((self.signal.orders, self.components, len(time)))
+        for index in np.unique(part_indices).tolist():
+            in_part = part_indices == index
+            derivatives[:, :, in_part] = self.parts[index].at(time[in_part])
+        return derivatives
 
     def stretched(self, factor: float) -> Self:
         """Return the profile with every part slowed down by a factor."""
@@ -110,16 +110,19 @@ class PiecewiseProfile(ClosedForm):
 
     def jumps(self, orders: int) -> Iterator[Jump]:
         """Yield the jumps between parts, of the value and derivatives of order below `orders`."""
-        for index, (before, after) in enumerate(pairwise(self.parts), start=1):
-            left, right = before.at(np.array(before.span)), after.at(np.array(after.span))
-            difference = np.abs(right[:orders, :, 0] - left[:orders, :, 1])
-            peaks = np.maximum(_peak_magnitudes(before), _peak_magnitudes(after))[:orders]
+        for index, (previous_part, next_part) in enumerate(pairwise(self.parts), start=1):
+            end_values, start_values = (
+                previous_part.at(np.array(previous_part.span)),
+                next_part.at(np.array(next_part.span)),
+            )
+            difference = np.abs(start_values[:orders, :, 0] - end_values[:orders, :, 1])
+            peaks = np.maximum(_peak_magnitudes(previous_part), _peak_magnitudes(next_part))[:orders]
             discontinuous = np.argwhere(difference > CONTINUOUS * peaks).tolist()
             lowest = [
                 (order, component) for order, component in discontinuous if order == discontinuous[0][0]
             ]
             for order, component in lowest if lowest and lowest[0][0] == 0 else lowest[:1]:
-                sides = left[order, component, 1], right[order, component, 0]
+                sides = end_values[order, component, 1], start_values[order, component, 0]
                 yield Jump(index, order, component, *map(float, sides))
 
 
@@ -145,14 +148,14 @@ def profile_of_levels(
         changes: start and end of each change, s; one less than levels.
     """
     parts: list[ClosedForm] = []
-    held_from = span[0]
-    for (before, after), (start, end) in zip(pairwise(levels), changes, strict=True):
-        if start > held_from:
-            parts.append(ConstantProfile(signal=signal, span=(held_from, start), value=before))
-        parts.append(RestToRest(signal=signal, span=(start, end), degree=degree, start=before, end=after))
-        held_from = end
-    if span[1] > held_from:
-        parts.append(ConstantProfile(signal=signal, span=(held_from, span[1]), value=levels[-1]))
+    hold_start = span[0]
+    for (level, next_level), (start, end) in zip(pairwise(levels), changes, strict=True):
+        if start > hold_start:
+            parts.append(ConstantProfile(signal=signal, span=(hold_start, start), value=level))
+        parts.append(RestToRest(signal=signal, span=(start, end), degree=degree, start=level, end=next_level))
+        hold_start = end
+    if span[1] > hold_start:
+        parts.append(ConstantProfile(signal=signal, span=(hold_start, span[1]), value=levels[-1]))
     return PiecewiseProfile(signal=signal, span=span, parts=tuple(parts))
 
 
@@ -185,9 +188,9 @@ class Steps(Formula):
         if len(self.times) != len(self.levels) - 1:
             expected = f"{len(self.levels) - 1}, one for each level but the first"
             yield FieldProblem(("times",), f"expected {expected}, found {len(self.times)}")
-        for index, (before, after) in enumerate(pairwise(self.times), start=1):
-            if not before + self.transition <= after * (1 + SAME_TIME):
-                message = f"{after:g} s is before the change that begins at {before:g} s ends"
+        for index, (change_time, next_change_time) in enumerate(pairwise(self.times), start=1):
+            if not change_time + self.transition <= next_change_time * (1 + SAME_TIME):
+                message = f"{next_change_time:g} s is before the change that begins at {change_time:g} s ends"
                 yield FieldProblem(("times", index), f"{message}, {self.transition:g} s later")
 
     def problems_over(self, duration: float) -> Iterator[FieldProblem]:

@@ -87,7 +87,7 @@ class ViaPoints(ClosedForm):
         return times
 
     @cached_property
-    def _specified(self) -> BoolArray:
+    def _has_values(self) -> BoolArray:
         """Mask of components with values, (components,)."""
         return ~np.isnan(self.points[0])
 
@@ -97,22 +97,24 @@ class ViaPoints(ClosedForm):
 
         The highest derivative is constant between two points, and stored for the first of them.
         """
-        points, shares = np.array(self.points)[:, self._specified], np.array(self.shares)
+        points, shares = np.array(self.points)[:, self._has_values], np.array(self.shares)
         vanishing = (self.degree - 1) // 2
-        rest = [(order, np.zeros(points.shape[1])) for order in range(1, vanishing + 1)]
+        zero_derivatives = [(order, np.zeros(points.shape[1])) for order in range(1, vanishing + 1)]
         with np.errstate(all="ignore"):  # poorly spaced points are refused below
             try:
-                ends: Any = (rest, rest)
-                away = points - points[0]  # zero, and so exact, for a component at rest
-                spline = scipy.interpolate.make_interp_spline(shares, away, k=self.degree, bc_type=ends)
+                ends: Any = (zero_derivatives, zero_derivatives)
+                displacements = points - points[0]  # zero, and so exact, for a component at rest
+                spline = scipy.interpolate.make_interp_spline(
+                    shares, displacements, k=self.degree, bc_type=ends
+                )
             except (np.linalg.LinAlgError, ValueError):
                 raise _degree_error(self.degree) from None
-            rows = np.stack([spline(shares, nu=order).T for order in range(self.degree + 1)])
-            rows[0] = points.T
-            rows[1 : vanishing + 1, :, [0, -1]] = 0.0
-            if not _is_smooth(rows, np.diff(shares), min(self.signal.orders, self.degree)):
+            derivatives = np.stack([spline(shares, nu=order).T for order in range(self.degree + 1)])
+            derivatives[0] = points.T
+            derivatives[1 : vanishing + 1, :, [0, -1]] = 0.0
+            if not _is_smooth(derivatives, np.diff(shares), min(self.signal.orders, self.degree)):
                 raise _degree_error(self.degree)
-        return rows
+        return derivatives
 
     def at(self, time: FloatArray) -> FloatArray:
         """Return value and derivatives at any times of the span, shape (orders, components, samples).
@@ -124,15 +126,17 @@ class ViaPoints(ClosedForm):
         """
         first, last = self.span
         knots = self.breakpoints
-        piece = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
-        nearest = piece + (time - knots[piece] > knots[piece + 1] - time)
-        coefficients = [*self._derivatives[:-1, :, nearest], self._derivatives[-1][:, piece]]
-        series = _taylor_series(coefficients, (time - knots[nearest]) / (last - first), self.signal.orders)
+        piece_index = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
+        nearest_index = piece_index + (time - knots[piece_index] > knots[piece_index + 1] - time)
+        coefficients = [*self._derivatives[:-1, :, nearest_index], self._derivatives[-1][:, piece_index]]
+        series = _taylor_series(
+            coefficients, (time - knots[nearest_index]) / (last - first), self.signal.orders
+        )
 
-        rows = np.full((self.signal.orders, self.components, len(time)), np.nan)
-        for order, total in enumerate(series):
-            rows[order, self._specified] = total / np.float64(last - first) ** order
-        return rows
+        derivatives = np.full((self.signal.orders, self.components, len(time)), np.nan)
+        for order, taylor_sum in enumerate(series):
+            derivatives[order, self._has_values] = taylor_sum / np.float64(last - first) ** order
+        return derivatives
 
     def rescaled(self, factors: Sequence[float], constants: Sequence[float]) -> Self:
         """See `ClosedForm.rescaled`."""
@@ -144,15 +148,15 @@ class ViaPoints(ClosedForm):
         Raises:
             InputError: see `at`.
         """
-        times = [np.union1d(self.breakpoints, zeros) for zeros in self._zeros()]
-        rows = np.full((4, self.components), np.nan)
-        for component, time in zip(np.flatnonzero(self._specified), times, strict=True):
+        times = [np.union1d(self.breakpoints, zeros) for zeros in self._stationary_times()]
+        extremes = np.full((4, self.components), np.nan)
+        for component, time in zip(np.flatnonzero(self._has_values), times, strict=True):
             values = self.at(time)[0, component]
-            low, high = values.argmin(), values.argmax()
-            rows[:, component] = values[low], time[low], values[high], time[high]
-        return ProfileExtremes(*rows)
+            low_index, high_index = values.argmin(), values.argmax()
+            extremes[:, component] = values[low_index], time[low_index], values[high_index], time[high_index]
+        return ProfileExtremes(*extremes)
 
-    def _zeros(self) -> Sequence[FloatArray]:
+    def _stationary_times(self) -> Sequence[FloatArray]:
         """Return the times, s, at which the first derivative of each given component vanishes."""
         first, last = self.span
         orders = np.arange(self.degree, 0, -1)
@@ -177,23 +181,30 @@ def passing_shares(points: npt.ArrayLike, degree: int) -> FloatArray:
     corners = np.nan_to_num(np.asarray(points, dtype=np.float64))
     steps = np.diff(corners / (np.abs(corners).max() or 1.0), axis=0)
     lengths = np.concatenate(([0.0], np.cumsum(np.sqrt(np.linalg.norm(steps, axis=1)))))
-    half = (degree + 1) // 2
-    return scipy.special.betaincinv(half, half, lengths / (lengths[-1] or 1.0))
+    half_order = (degree + 1) // 2
+    return scipy.special.betaincinv(half_order, half_order, lengths / (lengths[-1] or 1.0))
 
 
-def _is_smooth(rows: FloatArray, lengths: FloatArray, orders: int) -> bool:
+def _is_smooth(derivatives: FloatArray, lengths: FloatArray, orders: int) -> bool:
     """Return whether expansions about neighboring points agree half-way, below order `orders`.
 
     Differences of values are relative to the largest point, those of derivatives to their peaks.
     """
-    left, right = list(rows[:, :, :-1]), [*rows[:-1, :, 1:], rows[-1, :, :-1]]
-    before, after = (
-        np.array(_taylor_series(*side, orders)) for side in ((left, lengths / 2), (right, -lengths / 2))
+    left_derivatives, right_derivatives = (
+        list(derivatives[:, :, :-1]),
+        [*derivatives[:-1, :, 1:], derivatives[-1, :, :-1]],
     )
-    quarters = [_taylor_series(left, lengths / 4, orders), _taylor_series(right, -lengths / 4, orders)]
-    peaks = np.abs(np.concatenate([rows[:orders], before, *quarters], axis=2)).max(axis=2)
-    peaks[0] = np.abs(rows[0]).max(axis=1)
-    return bool(np.all(np.abs(before - after).max(axis=2) <= SEAM * peaks))
+    left_middle, right_middle = (
+        np.array(_taylor_series(*side, orders))
+        for side in ((left_derivatives, lengths / 2), (right_derivatives, -lengths / 2))
+    )
+    quarters = [
+        _taylor_series(left_derivatives, lengths / 4, orders),
+        _taylor_series(right_derivatives, -lengths / 4, orders),
+    ]
+    peaks = np.abs(np.concatenate([derivatives[:orders], left_middle, *quarters], axis=2)).max(axis=2)
+    peaks[0] = np.abs(derivatives[0]).max(axis=1)
+    return bool(np.all(np.abs(left_middle - right_middle).max(axis=2) <= SEAM * peaks))
 
 
 def _degree_error(degree: int) -> InputError:
@@ -211,16 +222,16 @@ def _taylor_series(derivatives: Sequence[FloatArray], offset: FloatArray, orders
         offset: offset from the center, (samples,).
         orders: number of derivatives to return, the value included.
     """
-    none = np.zeros_like(derivatives[0])
-    return [_horner(derivatives[order:] or [none], offset) for order in range(orders)]
+    zeros = np.zeros_like(derivatives[0])
+    return [_horner(derivatives[order:] or [zeros], offset) for order in range(orders)]
 
 
 def _horner(derivatives: Sequence[FloatArray], offset: FloatArray) -> FloatArray:
-    total = derivatives[-1].copy()
+    polynomial = derivatives[-1].copy()
     for power in range(len(derivatives) - 1, 0, -1):
-        total *= offset / power
-        total += derivatives[power - 1]
-    return total
+        polynomial *= offset / power
+        polynomial += derivatives[power - 1]
+    return polynomial
 
 
 OVERSHOOT = 0.1
@@ -262,27 +273,27 @@ class Via(Formula):
         """Return the meaning for users."""
         if use.rigid:
             return "The same for a robot whose joints are all rigid."
-        what = "A spline through points, from rest to rest"
+        meaning = "A spline through points, from rest to rest"
         if use.signal is POSITION:
-            what += "; that of degree 7 has the least mean square snap"
+            meaning += "; that of degree 7 has the least mean square snap"
         elif use.signal.positive:
-            what = "A spline through points, which must stay positive between them"
-        vanishing = "All derivatives up to (degree-1)/2 vanish at both ends"
-        return f"{what}.\n\n{vanishing}, those up to degree-1 are continuous."
+            meaning = "A spline through points, which must stay positive between them"
+        vanishing_text = "All derivatives up to (degree-1)/2 vanish at both ends"
+        return f"{meaning}.\n\n{vanishing_text}, those up to degree-1 are continuous."
 
     def _problems(self) -> Iterator[FieldProblem]:
         if not 2 <= len(self.points) <= MAX_POINTS:
             message = f"expected 2 to {MAX_POINTS} points, found {len(self.points)}"
             yield FieldProblem(("points",), message)
         elif self.times is None:
-            for index, (before, after) in enumerate(pairwise(self.points), start=1):
-                if before == after:
+            for index, (point, next_point) in enumerate(pairwise(self.points), start=1):
+                if point == next_point:
                     message = f"point {index + 1} is the one before again; give times to pass it twice"
                     yield FieldProblem(("points", index), message)
         else:
-            yield from self._time_problems(self.times)
+            yield from self._point_time_problems(self.times)
 
-    def _time_problems(self, times: tuple[float, ...]) -> Iterator[FieldProblem]:
+    def _point_time_problems(self, times: tuple[float, ...]) -> Iterator[FieldProblem]:
         if len(times) != len(self.points):
             message = f"expected {len(self.points)}, one for each point, found {len(times)}"
             yield FieldProblem(("times",), message)
@@ -290,9 +301,9 @@ class Via(Formula):
             yield FieldProblem(
                 ("times", 0), f"the first must be 0, not {times[0]:g}: it counts from the start"
             )
-        for index, (before, after) in enumerate(pairwise(times), start=1):
-            if not before < after:
-                message = f"must increase strictly, but {after:g} follows {before:g}"
+        for index, (point_time, next_point_time) in enumerate(pairwise(times), start=1):
+            if not point_time < next_point_time:
+                message = f"must increase strictly, but {next_point_time:g} follows {point_time:g}"
                 yield FieldProblem(("times", index), message)
 
     @property
@@ -317,10 +328,12 @@ class Via(Formula):
         yield from problems
         if problems or not self.signal.positive:
             return
-        lowest, when, *_ = self.profile_over((0.0, duration)).extremes()
+        lowest, lowest_times, *_ = self.profile_over((0.0, duration)).extremes()
         for joint in np.flatnonzero(lowest <= 0).tolist():
-            fall = f"the spline through them falls to {lowest[joint]:.4g} after {when[joint]:.3f} s"
-            message = f"{fall}, but must stay positive; add a point there, or give other times"
+            message_start = (
+                f"the spline through them falls to {lowest[joint]:.4g} after {lowest_times[joint]:.3f} s"
+            )
+            message = f"{message_start}, but must stay positive; add a point there, or give other times"
             yield FieldProblem(("points",), message, joint)
 
     def notes_over(self, span: tuple[float, float], /) -> Iterator[str]:
@@ -337,15 +350,19 @@ class Via(Formula):
             joints, joints.values(), np.transpose(profile.points), *profile.extremes(), strict=True
         ):
             lowest, lowest_at, highest, highest_at = extremes
-            further, when = max((points.min() - lowest, lowest_at), (highest - points.max(), highest_at))
-            if further > OVERSHOOT * np.ptp(points):
+            overshoot, overshoot_time = max(
+                (points.min() - lowest, lowest_at), (highest - points.max(), highest_at)
+            )
+            if overshoot > OVERSHOOT * np.ptp(points):
                 unit = self.signal.quantities[0].unit(joint_type)
-                yield f"{name} goes {further:.3g} {unit} beyond its via points, at t = {when:.3f} s"
+                yield (
+                    f"{name} goes {overshoot:.3g} {unit} beyond its via points, at t = {overshoot_time:.3f} s"
+                )
 
 
 def _list_times(times: list[float]) -> str:
-    shown = [f"{time:.4g}" for time in times]
-    if len(shown) > SHOWN_TIMES:
+    time_texts = [f"{time:.4g}" for time in times]
+    if len(time_texts) > SHOWN_TIMES:
         half = SHOWN_TIMES // 2
-        shown[half:-half] = ["..."]
-    return ", ".join(shown)
+        time_texts[half:-half] = ["..."]
+    return ", ".join(time_texts)

@@ -52,15 +52,15 @@ class BinMoments(NamedTuple):
         sums = np.zeros((degree + 3, bins))
         for first in range(0, len(time), BLOCK_SAMPLES):
             block = slice(first, first + BLOCK_SAMPLES)
-            place = np.clip((time[block] - start) / width, 0, bins * (1 - 1e-15))
-            which = np.minimum(place.astype(int), bins - 1)
-            place -= which
-            power = np.ones_like(place)
-            for total in sums[:-2]:
-                total += np.bincount(which, power, minlength=bins)
-                power *= place
-            sums[-2] += np.bincount(which, time[block], minlength=bins)
-            sums[-1] += np.bincount(which, row[block], minlength=bins)
+            bin_positions = np.clip((time[block] - start) / width, 0, bins * (1 - 1e-15))
+            bin_indices = np.minimum(bin_positions.astype(int), bins - 1)
+            bin_positions -= bin_indices
+            power = np.ones_like(bin_positions)
+            for power_sum in sums[:-2]:
+                power_sum += np.bincount(bin_indices, power, minlength=bins)
+                power *= bin_positions
+            sums[-2] += np.bincount(bin_indices, time[block], minlength=bins)
+            sums[-1] += np.bincount(bin_indices, row[block], minlength=bins)
         return cls(start, width, sums[:-2], sums[-2], sums[-1])
 
     @property
@@ -74,8 +74,10 @@ class BinMoments(NamedTuple):
 def merged(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return sums of powers of places in bins twice as wide, (powers, bins), from those of halves."""
     count = len(left)
-    shift = np.array([[math.comb(k, i) for i in range(count)] for k in range(count)], dtype=np.float64)
-    return np.asarray((left + shift @ right) / 2.0 ** np.arange(count)[:, None])
+    binomial_shift = np.array(
+        [[math.comb(k, i) for i in range(count)] for k in range(count)], dtype=np.float64
+    )
+    return np.asarray((left + binomial_shift @ right) / 2.0 ** np.arange(count)[:, None])
 
 
 BINS_PER_SPAN = 2
@@ -138,12 +140,15 @@ class Bins:
             noise: standard deviation of a sample's noise; None if unknown.
         """
         count, degree = moments.powers[0], len(moments.powers) - 1
-        used = np.flatnonzero(count)
-        means, times = moments.row[used] / count[used], moments.time[used] / count[used]
+        used_bins = np.flatnonzero(count)
+        means, times = moments.row[used_bins] / count[used_bins], moments.time[used_bins] / count[used_bins]
         # A bin is the first or second half of its span: merge it with an empty other half.
-        halves, nothing = moments.powers[:, used], np.zeros_like(moments.powers[:, used])
-        second = used % BINS_PER_SPAN == 1
-        powers = np.where(second, merged(nothing, halves), merged(halves, nothing)) / count[used]
+        powers_in_half, zeros = moments.powers[:, used_bins], np.zeros_like(moments.powers[:, used_bins])
+        is_second_half = used_bins % BINS_PER_SPAN == 1
+        powers = (
+            np.where(is_second_half, merged(zeros, powers_in_half), merged(powers_in_half, zeros))
+            / count[used_bins]
+        )
         gaps = np.diff(times) / moments.width
         return cls(
             start=moments.start,
@@ -152,9 +157,9 @@ class Bins:
             degree=degree,
             means=means,
             design=powers.T @ _basis_polynomials(degree),
-            first=used // BINS_PER_SPAN,
+            first=used_bins // BINS_PER_SPAN,
             gaps=np.where(gaps > LONGEST_LINK, np.inf, gaps),
-            samples=float(np.sum(count)) / len(used),
+            samples=float(np.sum(count)) / len(used_bins),
             noise=noise,
         )
 
@@ -166,8 +171,8 @@ class Bins:
     @property
     def knots(self) -> FloatArray:
         """Knots of the spline, s, equally spaced, also beyond both ends."""
-        places = np.arange(-self.degree, self.spans + self.degree + 1, dtype=np.float64)
-        return self.start + self.span * places
+        knot_indices = np.arange(-self.degree, self.spans + self.degree + 1, dtype=np.float64)
+        return self.start + self.span * knot_indices
 
     def stretch(self, first: int, spans: int) -> Bins:
         """Return the bins of some spans, as of a recording of its own.
@@ -194,14 +199,14 @@ class Bins:
             correlation: correlation of the errors of two means one bin apart; it decreases with the distance
                 as for a first-order process.
         """
-        here, before, block, place = self._linked_rows
+        rows_here, previous_rows, block, row_index = self._linked_rows
         lag = np.append(0.0, np.sign(correlation) * np.abs(correlation) ** self.gaps)
         scale = 1 / np.sqrt(1 - lag**2)
-        lags, scales = np.zeros((2, *here.shape[:2]))
-        lags[block, place], scales[block, place] = lag, scale
-        rows = scales[..., None] * (here - lags[..., None] * before)
-        target = np.zeros(here.shape[:2])
-        target[block, place] = scale * (self.means - lag * np.append(0.0, self.means[:-1]))
+        lags, scales = np.zeros((2, *rows_here.shape[:2]))
+        lags[block, row_index], scales[block, row_index] = lag, scale
+        rows = scales[..., None] * (rows_here - lags[..., None] * previous_rows)
+        target = np.zeros(rows_here.shape[:2])
+        target[block, row_index] = scale * (self.means - lag * np.append(0.0, self.means[:-1]))
         variance = self._noise_variance(correlation)
         log_scale = 2 * float(np.sum(np.log(scale)))
         return Whitened(correlation, factorize(rows, target), log_scale, variance)
@@ -209,15 +214,15 @@ class Bins:
     @cached_property
     def _linked_rows(self) -> tuple[FloatArray, FloatArray, IndexArray, IndexArray]:
         """Design rows in blocks, those of the previous bins, and block and place of each bin's row."""
-        linked, width = np.isfinite(self.gaps), self.degree + 1
+        is_linked, width = np.isfinite(self.gaps), self.degree + 1
         first = self.first.copy()
-        first[1:] = np.where(linked, self.first[:-1], self.first[1:])
-        both = np.zeros((2, len(first), width + math.ceil(LONGEST_LINK / BINS_PER_SPAN)))
+        first[1:] = np.where(is_linked, self.first[:-1], self.first[1:])
+        padded_rows = np.zeros((2, len(first), width + math.ceil(LONGEST_LINK / BINS_PER_SPAN)))
         columns = (self.first - first)[:, None] + np.arange(width)
-        np.put_along_axis(both[0], columns, self.design, axis=1)
-        both[1, 1:, :width] = np.where(linked[:, None], self.design[:-1], 0)
-        here, before = (sort_rows(first, rows, self.coefficients) for rows in both)
-        return here.blocks, before.blocks, here.block, here.place
+        np.put_along_axis(padded_rows[0], columns, self.design, axis=1)
+        padded_rows[1, 1:, :width] = np.where(is_linked[:, None], self.design[:-1], 0)
+        rows_here, previous_rows = (sort_rows(first, rows, self.coefficients) for rows in padded_rows)
+        return rows_here.blocks, previous_rows.blocks, rows_here.block, rows_here.place
 
     def _noise_variance(self, correlation: float) -> float | None:
         """Return the variance of a mean for first-order noise; None if that of samples is unknown.
@@ -229,14 +234,18 @@ class Bins:
         if self.noise is None:
             return None
         count = max(1.0, self.samples)
-        of_samples = 1 - np.geomspace(1, 1e-6, 200)[1:]
-        passed = of_samples**count
-        sums = (1 - passed) / (1 - of_samples)
+        sample_correlations = 1 - np.geomspace(1, 1e-6, 200)[1:]
+        powers = sample_correlations**count
+        sums = (1 - powers) / (1 - sample_correlations)
         # Sums of correlations over all pairs of samples in a bin, and over pairs from two neighboring bins.
-        within = (count * (1 + of_samples) - 2 * of_samples * sums) / (1 - of_samples)
-        between = of_samples * sums**2
-        share = np.interp(correlation, between / within, within / count**2, left=1 / count)
-        return float(self.noise**2 * share)
+        within_sums = (count * (1 + sample_correlations) - 2 * sample_correlations * sums) / (
+            1 - sample_correlations
+        )
+        between_sums = sample_correlations * sums**2
+        variance_share = np.interp(
+            correlation, between_sums / within_sums, within_sums / count**2, left=1 / count
+        )
+        return float(self.noise**2 * variance_share)
 
     @cached_property
     def differences(self) -> FloatArray:
@@ -245,15 +254,15 @@ class Bins:
         Unit rows after the last one make the unknowns zero that fill up the last block.
         """
         order = self.degree
-        count, last = block_count(self.coefficients), self.coefficients - order
+        count, row_count = block_count(self.coefficients), self.coefficients - order
         weights = [(-1.0) ** (order - k) * math.comb(order, k) for k in range(order + 1)]
-        rows = sort_rows(np.arange(last), np.tile(weights, (last, 1)), self.coefficients).blocks
+        rows = sort_rows(np.arange(row_count), np.tile(weights, (row_count, 1)), self.coefficients).blocks
         height = rows.shape[2] // 2
-        full = np.zeros((count, height, 2 * height))
-        full[:, : rows.shape[1]] = rows
-        spare = np.arange(self.coefficients, count * height)
-        full[spare // height, spare % height, spare % height] = 1
-        return full
+        padded_rows = np.zeros((count, height, 2 * height))
+        padded_rows[:, : rows.shape[1]] = rows
+        spare_indices = np.arange(self.coefficients, count * height)
+        padded_rows[spare_indices // height, spare_indices % height, spare_indices % height] = 1
+        return padded_rows
 
 
 def uniform_basis(place: FloatArray, degree: int) -> list[FloatArray]:

@@ -96,30 +96,32 @@ class Part:
         """
         degree, knots = self.spline.k, self.knots
         span = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, len(knots) - 2)
-        used, which = np.unique(span, return_inverse=True)
+        used_spans, span_of_sample = np.unique(span, return_inverse=True)
         offset = time - knots[span]
-        taylor = [self.spline(knots[used], nu=order).T[:, which] for order in range(degree + 1)]
-        rows = np.empty((orders, len(self.members), len(time)))
-        for order, row in enumerate(rows):
-            row[:] = taylor[degree]
+        taylor = [
+            self.spline(knots[used_spans], nu=order).T[:, span_of_sample] for order in range(degree + 1)
+        ]
+        derivatives = np.empty((orders, len(self.members), len(time)))
+        for order, derivative in enumerate(derivatives):
+            derivative[:] = taylor[degree]
             for power in range(degree - order, 0, -1):
-                row *= offset / power
-                row += taylor[order + power - 1]
-        return rows
+                derivative *= offset / power
+                derivative += taylor[order + power - 1]
+        return derivatives
 
     def size(self, order: int) -> FloatArray:
         """Return the root mean square of a derivative away from the ends, (members,)."""
         derivative = self.spline(np.linspace(*self.inside, PROBES), nu=order)
         return np.asarray(np.sqrt(np.mean(derivative**2, axis=0)))
 
-    def further_errors(self, orders: int) -> FloatArray:
+    def unmodeled_covariance(self, orders: int) -> FloatArray:
         """Return covariances of noise that is followed and of motion left out, (members, orders, orders)."""
-        found = np.zeros((len(self.members), orders, orders))
+        covariances = np.zeros((len(self.members), orders, orders))
         if self.noise is not None and self.noise.share:
-            found += self.size(orders - 1)[:, None, None] ** 2 * self.noise.covariance(orders)
+            covariances += self.size(orders - 1)[:, None, None] ** 2 * self.noise.covariance(orders)
         if self.left_out is not None:
-            found += self.left_out.covariance(orders)
-        return found
+            covariances += self.left_out.covariance(orders)
+        return covariances
 
     def posterior(self, time: FloatArray) -> Posterior | None:
         """Return the posterior of the coefficients for white noise of deviation 1; None if it is unknown.
@@ -135,14 +137,14 @@ class Part:
     def stretched(self, factor: float) -> Part:
         """Return the spline slowed down by a factor, with the same first time."""
         knots = stretch(self.spline.t, self.knots[0], factor)
-        known = None if self.smoothing is None else self.smoothing.stretched(factor)
+        smoothing = None if self.smoothing is None else self.smoothing.stretched(factor)
         noise = None if self.noise is None else self.noise.stretched(factor)
         spline, (start, end) = scipy.interpolate.BSpline(knots, self.spline.c, self.spline.k), self.ringing
         left_out = None if self.left_out is None else self.left_out.stretched(factor)
         return replace(
             self,
             spline=spline,
-            smoothing=known,
+            smoothing=smoothing,
             noise=noise,
             ringing=(factor * start, factor * end),
             transient=factor * self.transient,
@@ -199,10 +201,10 @@ class Fit:
 
     def at(self, time: FloatArray, orders: int) -> FloatArray:
         """Return value and derivatives at any times of the span, shape (orders, components, samples)."""
-        rows = np.full((orders, self.components, len(time)), np.nan)
+        derivatives = np.full((orders, self.components, len(time)), np.nan)
         for part in self.parts:
-            rows[:, part.members] = part.at(time, orders)
-        return rows
+            derivatives[:, part.members] = part.at(time, orders)
+        return derivatives
 
     def stretched(self, factor: float) -> Fit:
         """Return the splines slowed down by a factor, with the same first time."""
@@ -224,26 +226,26 @@ class Fit:
             smoothing spline agree.
         """
         orders = ORDERS[self.degree]
-        found = np.full((self.components, orders, orders, len(time)), np.nan)
+        covariances = np.full((self.components, orders, orders, len(time)), np.nan)
         for part in self.parts:
-            known = part.smoothing
-            if known is None:
-                found[part.members] = self._of_white_noise(part, time)
-            elif known.resolved:
-                found[part.members] = known.covariance(time)
+            smoothing = part.smoothing
+            if smoothing is None:
+                covariances[part.members] = self._white_noise_covariance(part, time)
+            elif smoothing.resolved:
+                covariances[part.members] = smoothing.covariance(time)
                 if not part.smooth:
-                    found[part.members] += known.disagreement[..., None]
-            found[part.members] += part.further_errors(orders)[..., None]
-        return found
+                    covariances[part.members] += smoothing.disagreement[..., None]
+            covariances[part.members] += part.unmodeled_covariance(orders)[..., None]
+        return covariances
 
-    def _of_white_noise(self, part: Part, time: FloatArray) -> FloatArray:
+    def _white_noise_covariance(self, part: Part, time: FloatArray) -> FloatArray:
         """Return the covariances of a part that no smoothing spline assesses; NaN if they are unknown."""
         orders, posterior = ORDERS[self.degree], self._posterior_of(part)
         if posterior is None:
             return np.full((len(part.members), orders, orders, len(time)), np.nan)
         covariance = of_derivatives(posterior, local_basis(part.spline.t, self.degree, time, orders))
-        found = self.noise[part.members, None, None, None] ** 2 * covariance
-        return np.asarray(found)
+        scaled_covariance = self.noise[part.members, None, None, None] ** 2 * covariance
+        return np.asarray(scaled_covariance)
 
     def _posterior_of(self, part: Part) -> Posterior | None:
         if part not in self._posteriors:
@@ -262,7 +264,7 @@ def join(
     time: FloatArray,
     rows: FloatArray,
     noise: FloatArray,
-    given: FloatArray,
+    given_noise: FloatArray,
 ) -> Fit:
     """Return the fit that consists of parts.
 
@@ -273,7 +275,7 @@ def join(
         rows: fitted samples, (components, samples).
         noise: estimated standard deviation of the samples, (components,); replaced by an estimate from the
             residual for parts that are not exact.
-        given: standard deviation given by the user, (components,); NaN without one.
+        given_noise: standard deviation given by the user, (components,); NaN without one.
     """
     components = len(rows)
     residual, largest, noise = np.zeros(components), np.zeros(components), noise.copy()
@@ -284,7 +286,7 @@ def join(
             residual[part.members] = np.sqrt(np.mean(error**2, axis=1))
             largest[part.members] = np.abs(error).max(axis=1)
             noise[part.members] = np.sqrt(np.sum(error**2, axis=1) / freedom)
-    noise = np.where(np.isnan(given), noise, given)
+    noise = np.where(np.isnan(given_noise), noise, given_noise)
     return Fit(components, degree, tuple(parts), residual, largest, noise, time)
 
 
@@ -315,13 +317,15 @@ def unresolved(fit: Fit, orders: int) -> Iterator[tuple[IndexArray, FloatArray]]
         of the difference between resolutions, and impulses of the highest derivative.
     """
     for part in fit.parts:
-        known = part.smoothing
-        if known is not None and not known.resolved:
-            caution = CAUTION if known.spread else SMOOTH_CAUTION
-            bound = caution**2 * known.disagreement + part.further_errors(orders)
+        smoothing = part.smoothing
+        if smoothing is not None and not smoothing.resolved:
+            caution = CAUTION if smoothing.spread else SMOOTH_CAUTION
+            error_covariance = caution**2 * smoothing.disagreement + part.unmodeled_covariance(orders)
             shortest = max(SHORTEST_IMPULSE, fit.step)
-            bound[:, -1, -1] += IMPULSES**2 * known.spread / shortest * part.size(orders - 1) ** 2
-            yield part.members, bound
+            error_covariance[:, -1, -1] += (
+                IMPULSES**2 * smoothing.spread / shortest * part.size(orders - 1) ** 2
+            )
+            yield part.members, error_covariance
 
 
 def vibrations(fit: Fit, orders: int) -> Iterator[tuple[int, FloatArray]]:
@@ -332,11 +336,13 @@ def vibrations(fit: Fit, orders: int) -> Iterator[tuple[int, FloatArray]]:
         as noise, with all their power at the highest frequency; NaN if the spline follows the lines.
     """
     for part in fit.parts:
-        known = part.smoothing
-        if known is not None and known.lines.others:
-            rate = 2 * np.pi * max(known.lines.others) * np.exp(0.5j * np.pi)
-            line = rate ** np.arange(orders)  # derivatives of a rotating phasor
-            covariance = np.real(line[:, None] * line.conj())
+        smoothing = part.smoothing
+        if smoothing is not None and smoothing.lines.others:
+            rate = 2 * np.pi * max(smoothing.lines.others) * np.exp(0.5j * np.pi)
+            line_phasor = rate ** np.arange(orders)  # derivatives of a rotating phasor
+            covariance = np.real(line_phasor[:, None] * line_phasor.conj())
             for member in part.members.tolist():
-                power = np.nan if known.follows_lines else known.lines.share * fit.residual[member] ** 2
+                power = (
+                    np.nan if smoothing.follows_lines else smoothing.lines.share * fit.residual[member] ** 2
+                )
                 yield member, power * covariance

@@ -24,10 +24,10 @@ from vsacli.trajectory.fits.selection import (
     SMALLEST_SHARE,
     SMOOTH,
 )
-from vsacli.trajectory.fits.smoothing import DETERMINED, Smoothing
+from vsacli.trajectory.fits.smoothing import MAX_DETERMINED_ERROR, Smoothing
 from vsacli.trajectory.fits.spectrum import motion_band
 
-TOLD = 0.01
+MIN_REPORTED_SHARE = 0.01
 """Share of the highest derivative above which filtered noise is reported."""
 
 LISTED_LINES = 5
@@ -49,37 +49,40 @@ def fit_sentences(
     if not fitted or not fit.parts:
         return
     exact = [part for part in fit.parts if part.exact]
-    near = {
+    approximating = {
         "least-squares": [part for part in fit.parts if not part.exact and not part.smooth],
         "smoothing": [part for part in fit.parts if part.smooth],
     }
     names = ", ".join(fitted)
     verb = "comes" if len(fitted) == 1 else "come"
-    of_some = sum(map(bool, (exact, *near.values()))) > 1
+    is_partial = sum(map(bool, (exact, *approximating.values()))) > 1
     if exact:
-        whose = f" of {_members(exact, labels)}" if of_some else ""
-        yield f"{names}{whose} {verb} from a C{fit.degree - 1} spline through {value}; {_trust(time, exact)}"
-    for kind, parts in near.items():
+        members_clause = f" of {_member_names(exact, labels)}" if is_partial else ""
+        yield (
+            f"{names}{members_clause} {verb} from a C{fit.degree - 1} spline through {value}; "
+            f"{_unreliable_ends_text(time, exact)}"
+        )
+    for kind, parts in approximating.items():
         if parts:
-            whose = f" of {_members(parts, labels)}" if of_some else ""
+            members_clause = f" of {_member_names(parts, labels)}" if is_partial else ""
             source = f"come from a C{fit.degree - 1} {kind} spline near the samples of {value}"
-            misfit, trust = _misfit(parts, labels, fit), _trust(time, parts)
-            yield f"{value}, {names}{whose} {source}: {misfit}; {trust}"
-    yield from _doubts(value, labels, fit)
+            misfit, trust = _misfit(parts, labels, fit), _unreliable_ends_text(time, parts)
+            yield f"{value}, {names}{members_clause} {source}: {misfit}; {trust}"
+    yield from _left_out_sentences(value, labels, fit)
 
 
-def _doubts(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
+def _left_out_sentences(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
     """Yield sentences on motion that a fit leaves out, and on vibrations."""
     for part in fit.parts:
-        known, label = part.smoothing, _members([part], labels)
+        smoothing, label = part.smoothing, _member_names([part], labels)
         if part.left_out is not None and part.left_out.size > fit.noise[part.members].max() / 2:
             yield (
                 f"{value} of {label} moves below {part.left_out.above:.2g} Hz beyond what the fit follows, by"
                 f" {part.left_out.size:.2g} rms, as its residual shows: leave out fit, noise and bandwidth,"
                 f" or set bandwidth: {part.left_out.above:.2g}"
             )
-        if known is not None and known.lines.others:
-            yield f"{value} of {label} has a vibration at {_vibration(known)}"
+        if smoothing is not None and smoothing.lines.others:
+            yield f"{value} of {label} has a vibration at {_vibration(smoothing)}"
 
 
 def undetermined_derivatives(
@@ -97,14 +100,14 @@ def undetermined_derivatives(
         A sentence, and the same without the derivative, for a robot that does not use it.
     """
     for part in fit.parts:
-        known, label = part.smoothing, _members([part], labels)
-        if known is None or known.determined:
+        smoothing, label = part.smoothing, _member_names([part], labels)
+        if smoothing is None or smoothing.determined:
             continue
         extent, advice = "", f"record it with less noise{_advised_bandwidth(part, fit)}"
         reason = "no two resolutions of a smoothing spline agree on it"
-        if known.resolved:
+        if smoothing.resolved:
             extent, advice = " to 10 %", _advice(part)
-            reason = f"its standard deviation is {100 * known.relative:.2g} % of its root mean square"
+            reason = f"its standard deviation is {100 * smoothing.relative:.2g} % of its root mean square"
         yield (
             f"{highest} of {label} is not determined by the record{extent}: {reason}; {advice}",
             f"{value} of {label}: {advice}",
@@ -118,7 +121,7 @@ def _advice(part: Part) -> str:
             f" filter, or set bandwidth: {part.noise.above:.2g}; if it is motion, set bandwidth:"
             f" {2 * part.noise.peak:.2g}"
         )
-    if part.smooth or part.smoothing is None or part.smoothing.own > DETERMINED:
+    if part.smooth or part.smoothing is None or part.smoothing.own > MAX_DETERMINED_ERROR:
         return "record it with less noise, or slower"
     return "try it with fit: smooth"
 
@@ -129,12 +132,12 @@ def _advised_bandwidth(part: Part, fit: Fit) -> str:
     return "" if band is None else f", or set bandwidth: {band:.2g} if there is no motion above that many Hz"
 
 
-def _vibration(known: Smoothing) -> str:
-    lines = known.lines.others
-    listed = ", ".join(f"{frequency:.4g}" for frequency in lines[:LISTED_LINES])
-    if known.follows_lines:
-        return f"{listed} Hz beyond a smooth motion; if it is noise, set bandwidth: {min(lines) / 2:.2g}"
-    return f"{listed} Hz, which is taken for noise; if it is motion, set bandwidth: {2 * max(lines):.2g}"
+def _vibration(smoothing: Smoothing) -> str:
+    lines = smoothing.lines.others
+    line_texts = ", ".join(f"{frequency:.4g}" for frequency in lines[:LISTED_LINES])
+    if smoothing.follows_lines:
+        return f"{line_texts} Hz beyond a smooth motion; if it is noise, set bandwidth: {min(lines) / 2:.2g}"
+    return f"{line_texts} Hz, which is taken for noise; if it is motion, set bandwidth: {2 * max(lines):.2g}"
 
 
 def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
@@ -148,28 +151,35 @@ def fit_notes(value: str, labels: Sequence[str], fit: Fit) -> Iterator[str]:
     exact = [part for part in fit.parts if part.exact]
     if exact and len(fit.time) < FEWEST_JUDGED:
         yield (
-            f"{value} of {_members(exact, labels)} is taken for exact: {len(fit.time)} samples are too few to"
+            f"{value} of {_member_names(exact, labels)} is taken for exact: {len(fit.time)} "
+            "samples are too few to"
             f" tell noise from motion, which takes {FEWEST_JUDGED}"
         )
     for part in fit.parts:
-        known = part.smoothing
+        smoothing = part.smoothing
         ends = zip(("first", "last"), part.ringing, strict=True)
         if rings := " and the ".join(f"{which} {time:.2g} s" for which, time in ends if time):
             yield (
-                f"{value} of {_members([part], labels)} rings in the {rings}, as if a filter had started or"
+                f"{value} of {_member_names([part], labels)} rings in the {rings}, as if a filter "
+                "had started or"
                 " stopped there: left out of the verdict"
             )
-        if known is not None and known.lines.hum:
-            hum = ", ".join(f"{frequency:.4g}" for frequency in known.lines.hum[:LISTED_LINES])
-            yield f"mains hum of {hum} Hz in {value} of {_members([part], labels)} is taken for noise"
-        if known is not None and known.lines.resampled:
+        if smoothing is not None and smoothing.lines.hum:
+            hum = ", ".join(f"{frequency:.4g}" for frequency in smoothing.lines.hum[:LISTED_LINES])
+            yield f"mains hum of {hum} Hz in {value} of {_member_names([part], labels)} is taken for noise"
+        if smoothing is not None and smoothing.lines.resampled:
             yield (
-                f"{value} of {_members([part], labels)} was resampled from {known.lines.resampled:.4g} Hz,"
+                f"{value} of {_member_names([part], labels)} was resampled from "
+                f"{smoothing.lines.resampled:.4g} Hz,"
                 " which left images of the motion: they are taken for noise"
             )
-        if part.noise is not None and part.noise.share > TOLD and (known is None or known.determined):
+        if (
+            part.noise is not None
+            and part.noise.share > MIN_REPORTED_SHARE
+            and (smoothing is None or smoothing.determined)
+        ):
             yield (
-                f"{value} of {_members([part], labels)} has noise above {part.noise.above:.2g} Hz that a"
+                f"{value} of {_member_names([part], labels)} has noise above {part.noise.above:.2g} Hz that a"
                 " filter made smooth, which counts as uncertainty"
             )
 
@@ -212,12 +222,12 @@ def _band(part: Part, member: int, fit: Fit) -> float | None:
 
 def _judgment(part: Part) -> dict[str, Any]:
     """Return the assessment of a component by a smoothing spline and by the spectrum."""
-    found: dict[str, Any] = {}
+    properties: dict[str, Any] = {}
     if part.smoothing is not None:
-        found["deviation"] = part.smoothing.relative
+        properties["deviation"] = part.smoothing.relative
     if part.noise is not None:
-        found["filtered_noise"] = {"share": part.noise.share, "above": part.noise.above}
-    return found
+        properties["filtered_noise"] = {"share": part.noise.share, "above": part.noise.above}
+    return properties
 
 
 def _method(part: Part) -> str:
@@ -226,19 +236,19 @@ def _method(part: Part) -> str:
     return INTERPOLATE if part.exact else LEAST_SQUARES
 
 
-def _members(parts: Sequence[Part], labels: Sequence[str]) -> str:
+def _member_names(parts: Sequence[Part], labels: Sequence[str]) -> str:
     return ", ".join(labels[i] for i in sorted(member for part in parts for member in part.members.tolist()))
 
 
 def _misfit(parts: Sequence[Part], labels: Sequence[str], fit: Fit) -> str:
     knots = [len(part.knots) for part in parts]
     count = f"{min(knots)} to {max(knots)}" if min(knots) < max(knots) else f"{knots[0]}"
-    worst = int(np.argmax(fit.largest))
-    largest = f"at most {fit.largest[worst]:.2g} ({labels[worst]})"
-    return f"{count} knots, off by {np.max(fit.residual):.2g} rms, {largest}"
+    worst_index = int(np.argmax(fit.largest))
+    largest_text = f"at most {fit.largest[worst_index]:.2g} ({labels[worst_index]})"
+    return f"{count} knots, off by {np.max(fit.residual):.2g} rms, {largest_text}"
 
 
-def _trust(time: FloatArray, parts: Sequence[Part]) -> str:
+def _unreliable_ends_text(time: FloatArray, parts: Sequence[Part]) -> str:
     start, end = (max(stretch) for stretch in zip(*(part.unreliable for part in parts), strict=True))
     if start + end >= time[-1] - time[0]:
         return "on so few knots, derivatives are unreliable far into the record from both ends"

@@ -77,10 +77,12 @@ def filtered_noise(time: FloatArray, rows: FloatArray, order: int) -> BoolArray:
     """
     if len(time) <= order:
         return np.zeros(len(rows), dtype=bool)
-    sizes = np.array([_typical(time, rows, order, stride) for stride in _strides(len(time), order)])
-    least = ABOVE_FLOOR * np.maximum(sizes[0], ROUNDING * np.abs(rows).max(axis=1))
-    between = (sizes > least) & (sizes < sizes.max(axis=0) / BELOW_MOTION)
-    return np.asarray(np.any(between[:-1] & (sizes[1:] < SLOW_GROWTH * sizes[:-1]), axis=0))
+    deviations = np.array(
+        [_median_deviation(time, rows, order, stride) for stride in _strides(len(time), order)]
+    )
+    min_deviation = ABOVE_FLOOR * np.maximum(deviations[0], ROUNDING * np.abs(rows).max(axis=1))
+    is_between = (deviations > min_deviation) & (deviations < deviations.max(axis=0) / BELOW_MOTION)
+    return np.asarray(np.any(is_between[:-1] & (deviations[1:] < SLOW_GROWTH * deviations[:-1]), axis=0))
 
 
 def typical_noise(time: FloatArray, rows: FloatArray, order: int) -> FloatArray:
@@ -91,7 +93,7 @@ def typical_noise(time: FloatArray, rows: FloatArray, order: int) -> FloatArray:
         rows: values, (components, samples).
         order: order of the differences.
     """
-    return _typical(time, rows, order, 1) if len(time) > order else np.zeros(len(rows))
+    return _median_deviation(time, rows, order, 1) if len(time) > order else np.zeros(len(rows))
 
 
 def white_noise_level(time: FloatArray, row: FloatArray, order: int) -> float | None:
@@ -111,12 +113,14 @@ def white_noise_level(time: FloatArray, row: FloatArray, order: int) -> float | 
     """
     if len(time) < FEWEST_DIFFERENCES * order:
         return None
-    nearest, second, fourth = (float(_typical(time, row[None], order, stride)[0]) for stride in (1, 2, 4))
+    nearest, second, fourth = (
+        float(_median_deviation(time, row[None], order, stride)[0]) for stride in (1, 2, 4)
+    )
     if not ROUNDING * np.abs(row).max() < nearest <= EQUAL_STRIDES * second:
         return None
-    moves = second < SLOW_GROWTH * nearest and SLOW_GROWTH * second < fourth
-    fast = moves and not filtered_noise(time, row[None], order)[0]
-    return nearest if fast or second <= EQUAL_STRIDES * nearest else None
+    is_moving = second < SLOW_GROWTH * nearest and SLOW_GROWTH * second < fourth
+    is_fast_motion = is_moving and not filtered_noise(time, row[None], order)[0]
+    return nearest if is_fast_motion or second <= EQUAL_STRIDES * nearest else None
 
 
 def _strides(samples: int, order: int) -> list[int]:
@@ -124,14 +128,16 @@ def _strides(samples: int, order: int) -> list[int]:
     return [2**power for power in range(max(1, (samples // (3 * order)).bit_length()))]
 
 
-def _typical(time: FloatArray, rows: FloatArray, order: int, stride: int) -> FloatArray:
+def _median_deviation(time: FloatArray, rows: FloatArray, order: int, stride: int) -> FloatArray:
     """Return the standard deviation of differences in motion by their median, (components,)."""
-    last = len(time) - 1 - order * stride
-    first = np.unique(np.linspace(0, last, min(PROBES, last + 1)).astype(int))
-    sizes = np.abs(_differences(time, rows, order, first, stride))
+    last_start = len(time) - 1 - order * stride
+    first = np.unique(np.linspace(0, last_start, min(PROBES, last_start + 1)).astype(int))
+    magnitudes = np.abs(_differences(time, rows, order, first, stride))
     nodes = rows[:, first + stride * np.arange(order + 1)[:, None]]
-    moving = np.ptp(nodes, axis=1) > AT_REST * np.std(rows, axis=1, keepdims=True)
-    medians = [np.median(size[of]) if of.any() else 0.0 for size, of in zip(sizes, moving, strict=True)]
+    is_moving = np.ptp(nodes, axis=1) > AT_REST * np.std(rows, axis=1, keepdims=True)
+    medians = [
+        np.median(size[of]) if of.any() else 0.0 for size, of in zip(magnitudes, is_moving, strict=True)
+    ]
     return np.array(medians) / 0.6745
 
 
@@ -146,10 +152,10 @@ def _differences(
         for other in (*nodes[:i], *nodes[i + 1 :]):
             weights[i] /= (node - other) / span
     weights /= np.sqrt(np.sum(weights**2, axis=0))
-    total = np.zeros((len(rows), len(first)))
+    difference_sums = np.zeros((len(rows), len(first)))
     for i, weight in enumerate(weights):
-        total += weight * rows[:, first + i * stride]
-    return total
+        difference_sums += weight * rows[:, first + i * stride]
+    return difference_sums
 
 
 LINE_RATIO = 100.0
@@ -241,28 +247,28 @@ def spectral_lines(
     if len(time) < 4 * NEIGHBORS or np.abs(steps - step).max() > UNEVEN * step:
         return Lines()
     power = np.abs(np.fft.rfft(residual * np.hanning(len(residual)))) ** 2
-    narrow, wide = _standing_out(power, FEW_NEIGHBORS), _standing_out(power, NEIGHBORS)
-    slow = NEIGHBORS + LEAKAGE  # lower frequencies have fewer neighbors
-    found = np.concatenate([narrow[narrow < slow], wide])
-    frequencies = found / (len(time) * step)
+    narrow, wide = _line_indices(power, FEW_NEIGHBORS), _line_indices(power, NEIGHBORS)
+    min_wide_index = NEIGHBORS + LEAKAGE  # lower frequencies have fewer neighbors
+    line_indices = np.concatenate([narrow[narrow < min_wide_index], wide])
+    frequencies = line_indices / (len(time) * step)
     # With a Hann window the magnitude at a line is a quarter of amplitude times number of samples.
-    derivatives = 4 * np.sqrt(power[found] / 2) / len(time) * (2 * np.pi * frequencies) ** order
-    matter = derivatives > LEAST_EFFECT * size
-    found, frequencies = found[matter], frequencies[matter]
-    if len(found) > MOST_LINES:
+    derivatives = 4 * np.sqrt(power[line_indices] / 2) / len(time) * (2 * np.pi * frequencies) ** order
+    is_effective = derivatives > LEAST_EFFECT * size
+    line_indices, frequencies = line_indices[is_effective], frequencies[is_effective]
+    if len(line_indices) > MOST_LINES:
         return Lines()
-    near = CLOSE_LINES / (len(time) * step)
-    mains = _mains(frequencies)
-    mains |= _side_bands(frequencies, mains, near)
-    images, resampled = _images(frequencies, near)
-    unclear = ~mains & ~images & (frequencies < (np.inf if bandwidth is None else bandwidth))
-    places = np.unique(found[unclear, None] + np.arange(-LEAKAGE, LEAKAGE + 1))
-    share = float(np.sum(power[places]) / max(np.sum(power), np.finfo(float).tiny))
-    hum, others = (tuple(frequencies[which].tolist()) for which in (mains & ~images, unclear))
+    frequency_tolerance = CLOSE_LINES / (len(time) * step)
+    is_mains = _mains_mask(frequencies)
+    is_mains |= _side_band_mask(frequencies, is_mains, frequency_tolerance)
+    is_image, resampled = _image_mask(frequencies, frequency_tolerance)
+    is_unclear = ~is_mains & ~is_image & (frequencies < (np.inf if bandwidth is None else bandwidth))
+    power_indices = np.unique(line_indices[is_unclear, None] + np.arange(-LEAKAGE, LEAKAGE + 1))
+    share = float(np.sum(power[power_indices]) / max(np.sum(power), np.finfo(float).tiny))
+    hum, others = (tuple(frequencies[which].tolist()) for which in (is_mains & ~is_image, is_unclear))
     return Lines(hum, others, share, resampled)
 
 
-def _standing_out(power: FloatArray, neighbors: int) -> IndexArray:
+def _line_indices(power: FloatArray, neighbors: int) -> IndexArray:
     """Return the indices of lines among frequencies with this number of neighbors on both sides."""
     windows = np.lib.stride_tricks.sliding_window_view(power, neighbors)
     starts = range(0, len(windows), BLOCK_FREQUENCIES)
@@ -270,40 +276,40 @@ def _standing_out(power: FloatArray, neighbors: int) -> IndexArray:
     center = np.arange(neighbors + LEAKAGE, len(power) - neighbors - LEAKAGE)
     below = medians[center - neighbors - LEAKAGE]
     # In a steeply falling spectrum the lower side has the larger median.
-    beside = np.maximum(below, medians[center + LEAKAGE + 1])
-    here = power[center]
-    peak = (here >= power[center - 1]) & (here >= power[center + 1])
-    return np.asarray(center[peak & (here > LINE_RATIO * beside)])
+    neighbor_median = np.maximum(below, medians[center + LEAKAGE + 1])
+    line_power = power[center]
+    is_peak = (line_power >= power[center - 1]) & (line_power >= power[center + 1])
+    return np.asarray(center[is_peak & (line_power > LINE_RATIO * neighbor_median)])
 
 
-def _side_bands(frequencies: FloatArray, mains: BoolArray, near: float) -> BoolArray:
+def _side_band_mask(frequencies: FloatArray, mains: BoolArray, near: float) -> BoolArray:
     """Return the mask of pairs about a line of mains: side bands of hum with varying amplitude."""
-    found = np.zeros(len(frequencies), dtype=bool)
-    for middle in frequencies[mains]:
-        mirrored = 2 * middle - frequencies
-        found |= np.any(np.abs(frequencies[:, None] - mirrored) < near, axis=1)
-    return found
+    is_side_band = np.zeros(len(frequencies), dtype=bool)
+    for mains_frequency in frequencies[mains]:
+        mirrored = 2 * mains_frequency - frequencies
+        is_side_band |= np.any(np.abs(frequencies[:, None] - mirrored) < near, axis=1)
+    return is_side_band
 
 
-def _images(frequencies: FloatArray, near: float) -> tuple[BoolArray, float]:
+def _image_mask(frequencies: FloatArray, near: float) -> tuple[BoolArray, float]:
     """Return the mask of images left by resampling, and the original rate, Hz; 0 without images.
 
     Interpolation of samples of another rate repeats the motion's lines on both sides of multiples of that
     rate. Images are pairs about a rate and about its double.
     """
     first, second = np.triu_indices(len(frequencies), 1)
-    far = (frequencies[first] + frequencies[second]) > FAR * (frequencies[second] - frequencies[first])
-    first, second = first[far], second[far]
-    middle = (frequencies[first] + frequencies[second]) / 2
-    distance = (frequencies[second] - frequencies[first]) / 2
-    found, rates = np.zeros(len(frequencies), dtype=bool), []
-    for rate, about in zip(middle, distance, strict=True):
-        multiple = np.round(middle / rate)
-        alike = (np.abs(middle - multiple * rate) < near) & (np.abs(distance - about) < near)
-        if np.any(alike & (multiple == 2)):
+    is_far = (frequencies[first] + frequencies[second]) > FAR * (frequencies[second] - frequencies[first])
+    first, second = first[is_far], second[is_far]
+    middles = (frequencies[first] + frequencies[second]) / 2
+    distances = (frequencies[second] - frequencies[first]) / 2
+    is_image, rates = np.zeros(len(frequencies), dtype=bool), []
+    for rate, rate_distance in zip(middles, distances, strict=True):
+        multiple = np.round(middles / rate)
+        is_equal = (np.abs(middles - multiple * rate) < near) & (np.abs(distances - rate_distance) < near)
+        if np.any(is_equal & (multiple == 2)):
             rates.append(float(rate))
-            found[first[alike]] = found[second[alike]] = True
-    return found, min(rates, default=0.0)
+            is_image[first[is_equal]] = is_image[second[is_equal]] = True
+    return is_image, min(rates, default=0.0)
 
 
 def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
@@ -320,12 +326,12 @@ def is_rounding(row: FloatArray, residual: FloatArray) -> bool:
     return multiples and bool(np.mean(residual**2) <= ROUNDING_RATIO * step**2 / 12)
 
 
-def _mains(frequencies: FloatArray) -> BoolArray:
-    near = np.zeros(len(frequencies), dtype=bool)
+def _mains_mask(frequencies: FloatArray) -> BoolArray:
+    is_mains = np.zeros(len(frequencies), dtype=bool)
     for mains in MAINS:
         harmonic = mains * np.round(frequencies / mains)
-        near |= (harmonic > 0) & (np.abs(frequencies - harmonic) < MAINS_RTOL * frequencies)
-    return near
+        is_mains |= (harmonic > 0) & (np.abs(frequencies - harmonic) < MAINS_RTOL * frequencies)
+    return is_mains
 
 
 FIRST_LINE = 3
@@ -380,13 +386,15 @@ def left_out_motion(time: FloatArray, residual: FloatArray) -> LeftOutMotion | N
     power = 2 * np.abs(np.fft.rfft(window * even)) ** 2 / (count * np.sum(window**2))
     edges = FIRST_LINE * 2 ** np.arange(int(np.log2(len(power) / FIRST_LINE)) + 1)
     density = np.array([np.mean(power[start:stop]) for start, stop in pairwise(edges.tolist())])
-    high = np.flatnonzero(density >= density.max() / FALL)
-    falls = density[high[-1] : -1] > FALL * density[high[-1] + 1 :]
-    last = int(high[-1] + (len(falls) if falls.all() else np.argmin(falls)))
-    first = int(high[0])
-    if np.ptp(high) >= BROADEST or last == high[-1]:
+    loud_octaves = np.flatnonzero(density >= density.max() / FALL)
+    is_falling = density[loud_octaves[-1] : -1] > FALL * density[loud_octaves[-1] + 1 :]
+    last_octave = int(loud_octaves[-1] + (len(is_falling) if is_falling.all() else np.argmin(is_falling)))
+    first_octave = int(loud_octaves[0])
+    if np.ptp(loud_octaves) >= BROADEST or last_octave == loud_octaves[-1]:
         return None
     step = 1 / float(time[-1] - time[0])
-    middle = step * np.sqrt(2) * edges[first:last]
-    missed = edges[first:last] * (density[first:last] - density[last])
-    return LeftOutMotion(middle, missed, float(step * edges[last]))
+    middle_frequencies = step * np.sqrt(2) * edges[first_octave:last_octave]
+    missed_power = edges[first_octave:last_octave] * (
+        density[first_octave:last_octave] - density[last_octave]
+    )
+    return LeftOutMotion(middle_frequencies, missed_power, float(step * edges[last_octave]))

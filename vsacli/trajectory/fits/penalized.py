@@ -82,16 +82,16 @@ def _means_of_motion(values: FloatArray) -> float:
     as where an encoder flickers. It is infinite if nothing is certain.
     """
     means, count = values, np.inf
-    floors: list[float] = []
+    finer_medians: list[float] = []
     while len(means) >= FEWEST_MEANS:
         powers = _powers(means)
-        middle = float(np.median(powers))
-        floor = float(np.median(floors)) if floors else middle
-        allowed = max(EQUAL, 1 + 1 / np.sqrt(len(powers)))
-        equal = floor / allowed <= middle <= allowed * floor
-        if not (floor and equal and (not floors or powers.max() <= LARGEST * floor)):
+        median_power = float(np.median(powers))
+        floor = float(np.median(finer_medians)) if finer_medians else median_power
+        max_ratio = max(EQUAL, 1 + 1 / np.sqrt(len(powers)))
+        is_equal = floor / max_ratio <= median_power <= max_ratio * floor
+        if not (floor and is_equal and (not finer_medians or powers.max() <= LARGEST * floor)):
             return count
-        floors.append(middle)
+        finer_medians.append(median_power)
         count = len(means) / 2
         means = means[: len(means) // 2 * 2].reshape(-1, 2).sum(axis=1) / np.sqrt(2)
     return count
@@ -157,8 +157,8 @@ class Model:
     @cached_property
     def noise_variance(self) -> float:
         """Variance of a whitened mean: known, or else of maximum likelihood."""
-        known = self.whitened.variance
-        return self._factor.rest / _freedom(self.bins) if known is None else known
+        known_variance = self.whitened.variance
+        return self._factor.rest / _freedom(self.bins) if known_variance is None else known_variance
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -178,8 +178,8 @@ class Model:
     @cached_property
     def freedoms(self) -> FloatArray:
         """Degree of freedom of each difference of coefficients: 1 by the samples, 0 by the prior alone."""
-        certain = self.posterior.variances(self.bins.differences).ravel()[: len(self.penalties)]
-        return np.clip(1 - certain * self.penalties, 0, 1)
+        prior_variances = self.posterior.variances(self.bins.differences).ravel()[: len(self.penalties)]
+        return np.clip(1 - prior_variances * self.penalties, 0, 1)
 
     @property
     def piece(self) -> float:
@@ -194,11 +194,15 @@ class Model:
             step: share of the full logarithmic step.
         """
         segment = self._segment
-        free = np.maximum(np.bincount(segment, self.freedoms), 1e-4 * np.bincount(segment))
-        found = np.bincount(segment, self.penalties * np.diff(self.coefficients, self.bins.degree) ** 2)
-        change = np.log(free * self.noise_variance / np.maximum(found, np.finfo(float).tiny))
-        change = step * np.clip(change, -LARGEST_STEP, LARGEST_STEP)
-        penalties = np.clip(self.penalties * np.exp(change[segment]), LEAST_PENALTY, LARGEST_PENALTY)
+        freedoms = np.maximum(np.bincount(segment, self.freedoms), 1e-4 * np.bincount(segment))
+        squared_differences = np.bincount(
+            segment, self.penalties * np.diff(self.coefficients, self.bins.degree) ** 2
+        )
+        log_change = np.log(
+            freedoms * self.noise_variance / np.maximum(squared_differences, np.finfo(float).tiny)
+        )
+        log_change = step * np.clip(log_change, -LARGEST_STEP, LARGEST_STEP)
+        penalties = np.clip(self.penalties * np.exp(log_change[segment]), LEAST_PENALTY, LARGEST_PENALTY)
         return Model(self.bins, self.whitened, penalties, self.segments)
 
     @cached_property
@@ -210,9 +214,11 @@ class Model:
         """
         if self.segments == 1:
             return self.posterior
-        each = np.pad(self.each_penalty, 1, constant_values=np.inf)
-        least = np.minimum(np.minimum(each[:-2], each[1:-1]), each[2:])
-        factor = _factor(self.bins, self.whitened, least[self._segment])
+        padded_penalties = np.pad(self.each_penalty, 1, constant_values=np.inf)
+        min_penalties = np.minimum(
+            np.minimum(padded_penalties[:-2], padded_penalties[1:-1]), padded_penalties[2:]
+        )
+        factor = _factor(self.bins, self.whitened, min_penalties[self._segment])
         return Posterior(factor.diagonal, factor.upper)
 
     def stiffened(self, logarithm: float) -> Model:
@@ -236,8 +242,8 @@ class Model:
     @property
     def kinks(self) -> BoolArray:
         """Mask of `probes` in segments with a penalty far from that of a neighbor."""
-        far = np.abs(np.diff(np.log(self.each_penalty))) > np.log(KINK)
-        segments: BoolArray = np.append(far, False) | np.append(False, far)
+        is_far = np.abs(np.diff(np.log(self.each_penalty))) > np.log(KINK)
+        segments: BoolArray = np.append(is_far, False) | np.append(False, is_far)
         return segments[segment_of(2 * self.bins.spans, self.segments)]
 
     @property
@@ -286,21 +292,21 @@ def evidence(
 def deviance(stretches: Sequence[Evidence]) -> float:
     """Return minus twice the log restricted likelihood of all stretches together."""
     rest = sum(each.rest for each in stretches)
-    freedom, known = sum(each.freedom for each in stretches), stretches[0].variance
-    if known is None:
-        size = freedom * math.log(max(rest, np.finfo(float).tiny) / freedom)
+    freedom, variance = sum(each.freedom for each in stretches), stretches[0].variance
+    if variance is None:
+        deviance_value = freedom * math.log(max(rest, np.finfo(float).tiny) / freedom)
     else:
-        size = freedom * (math.log(known) - 1) + rest / known
-    return size + sum(each.volume for each in stretches)
+        deviance_value = freedom * (math.log(variance) - 1) + rest / variance
+    return deviance_value + sum(each.volume for each in stretches)
 
 
 def _factor(bins: Bins, whitened: Whitened, penalties: FloatArray) -> BandedFactor:
-    differences, samples = bins.differences, whitened.factor
+    differences, sample_factor = bins.differences, whitened.factor
     weights = np.ones(differences.shape[:2])
     weights.ravel()[: len(penalties)] = np.sqrt(penalties)
-    rows = np.concatenate([weights[..., None] * differences, samples.rows], axis=1)
-    found = factorize(rows, np.concatenate([np.zeros_like(weights), samples.right], axis=1))
-    return found._replace(rest=found.rest + samples.rest)
+    rows = np.concatenate([weights[..., None] * differences, sample_factor.rows], axis=1)
+    factor = factorize(rows, np.concatenate([np.zeros_like(weights), sample_factor.right], axis=1))
+    return factor._replace(rest=factor.rest + sample_factor.rest)
 
 
 def _freedom(bins: Bins) -> int:

@@ -34,13 +34,13 @@ NEAR_DECADES = np.arange(-5.0, 5.0)
 NEAR_CORRELATION = 1.2
 """Largest distance from the correlation of the coarser resolution, of inverse hyperbolic tangents."""
 
-MOST_SPANS_OF_GRID = 2048
+MAX_GRID_SPANS = 2048
 """Number of spans above which the grid is evaluated on stretches only, since it gives an initial model: that
 saves half of the time."""
 
 STRETCHES = 8
 
-MOST_SEGMENTS = 64
+MAX_SEGMENTS = 64
 FEWEST_DIFFERENCES = 4
 """Fewest differences in a segment."""
 
@@ -56,9 +56,9 @@ def most_likely(bins: Bins, coarser: Model | None) -> Model:
         bins: means of the recording.
         coarser: model with half as many spans, around which to search; None to search everywhere.
     """
-    model = _segmented(_improved(_best_of_grids(bins, _grids(bins, coarser))))
-    for _ in range(1 if _long(bins) else 2):
-        model = _improved(_recorrelated(model))
+    model = _halve_segments(_update_penalties(_best_of_grids(bins, _grids(bins, coarser))))
+    for _ in range(1 if _is_long(bins) else 2):
+        model = _update_penalties(_refine_correlation(model))
     return model
 
 
@@ -83,42 +83,44 @@ class _Grid(NamedTuple):
 
 def _grids(bins: Bins, coarser: Model | None) -> list[_Grid]:
     """Return the grids to search: near the coarser model, with its segments if long, and everywhere."""
-    tried = CORRELATIONS if bins.noise is None else np.append(CORRELATIONS, SMALL_CORRELATIONS)
-    level = np.zeros(1)
+    correlations = CORRELATIONS if bins.noise is None else np.append(CORRELATIONS, SMALL_CORRELATIONS)
+    zero_shape = np.zeros(1)
     if coarser is None:
-        return [_Grid(tried, level, FIRST_DECADES)]
-    near = np.abs(np.arctanh(tried) - np.arctanh(coarser.whitened.correlation)) <= NEAR_CORRELATION
-    found = np.log10(coarser.each_penalty if _long(bins) else coarser.penalties)
-    shape = found if _long(bins) else np.mean(found, keepdims=True)
+        return [_Grid(correlations, zero_shape, FIRST_DECADES)]
+    is_near = np.abs(np.arctanh(correlations) - np.arctanh(coarser.whitened.correlation)) <= NEAR_CORRELATION
+    log_penalties = np.log10(coarser.each_penalty if _is_long(bins) else coarser.penalties)
+    shape = log_penalties if _is_long(bins) else np.mean(log_penalties, keepdims=True)
     # With half the span, differences of order n shrink by 2^n, noise of a mean grows by 2^(1/2).
     growth = (2 * bins.degree - 1) * np.log10(2)
     # A motion that counted as noise on coarser bins, e.g. a sweep, may be resolved now: search everywhere.
-    everywhere = _Grid(CORRELATIONS[::3], level, FIRST_DECADES[::3])
-    return [_Grid(tried[near], shape + growth, NEAR_DECADES), everywhere]
+    coarse_grid = _Grid(CORRELATIONS[::3], zero_shape, FIRST_DECADES[::3])
+    return [_Grid(correlations[is_near], shape + growth, NEAR_DECADES), coarse_grid]
 
 
 def _best_of_grids(bins: Bins, grids: Sequence[_Grid]) -> Model:
     """Return the model of largest likelihood on the grids; for long recordings by distant stretches only."""
     differences = bins.coefficients - bins.degree
-    spans = MOST_SPANS_OF_GRID // STRETCHES if _long(bins) else bins.spans
-    firsts = np.linspace(0, bins.spans - spans, STRETCHES if _long(bins) else 1).astype(int).tolist()
-    stretches = [(bins.stretch(first, spans), slice(first, first + spans)) for first in firsts]
-    tried = []
+    spans = MAX_GRID_SPANS // STRETCHES if _is_long(bins) else bins.spans
+    first_spans = np.linspace(0, bins.spans - spans, STRETCHES if _is_long(bins) else 1).astype(int).tolist()
+    stretches = [(bins.stretch(first, spans), slice(first, first + spans)) for first in first_spans]
+    candidates = []
     for grid in grids:
         for correlation in grid.correlations.tolist():
-            parts = [(part, part.whitened(correlation), of) for part, of in stretches]
+            whitened_stretches = [(part, part.whitened(correlation), of) for part, of in stretches]
             for penalties in grid.penalties(differences):
-                fit = deviance([evidence(part, whitened, penalties[of]) for part, whitened, of in parts])
-                tried.append((fit, correlation, penalties, len(grid.shape)))
-    _, correlation, penalties, segments = min(tried, key=lambda each: each[0])
+                fit = deviance(
+                    [evidence(part, whitened, penalties[of]) for part, whitened, of in whitened_stretches]
+                )
+                candidates.append((fit, correlation, penalties, len(grid.shape)))
+    _, correlation, penalties, segments = min(candidates, key=lambda each: each[0])
     return Model(bins, bins.whitened(correlation), penalties, segments)
 
 
-def _long(bins: Bins) -> bool:
-    return bins.spans > MOST_SPANS_OF_GRID
+def _is_long(bins: Bins) -> bool:
+    return bins.spans > MAX_GRID_SPANS
 
 
-def _improved(model: Model) -> Model:
+def _update_penalties(model: Model) -> Model:
     """Return the model after updates of its penalties, each accepted if it increases the likelihood."""
     step = 1.0
     for _ in range(UPDATES):
@@ -135,21 +137,21 @@ def _improved(model: Model) -> Model:
     return model
 
 
-def _segmented(model: Model) -> Model:
+def _halve_segments(model: Model) -> Model:
     """Return the model with segments halved as long as the likelihood increases.
 
     Each additional segment must gain more than its parameter would by chance.
     """
-    most = min(MOST_SEGMENTS, len(model.penalties) // FEWEST_DIFFERENCES)
+    max_segments = min(MAX_SEGMENTS, len(model.penalties) // FEWEST_DIFFERENCES)
     trial = model
-    while 2 * trial.segments <= most and trial.segments <= 2 * model.segments:
-        trial = _improved(Model(model.bins, model.whitened, trial.penalties, 2 * trial.segments))
+    while 2 * trial.segments <= max_segments and trial.segments <= 2 * model.segments:
+        trial = _update_penalties(Model(model.bins, model.whitened, trial.penalties, 2 * trial.segments))
         if trial.deviance < model.deviance - (trial.segments - model.segments) - 1:
             model = trial
     return model
 
 
-def _recorrelated(model: Model) -> Model:
+def _refine_correlation(model: Model) -> Model:
     """Return the model with the most likely correlation near its own."""
     bins, center = model.bins, np.arctanh(model.whitened.correlation)
     candidates = np.clip(np.tanh(center + FINER_CORRELATIONS), -0.6, 0.985).tolist()
@@ -170,7 +172,7 @@ NEGLIGIBLE = 0.02
 """Relative change of the highest derivative from one resolution to the next that requires no finer one. If
 noise does not explain it, the next is used. With a fifth, splines followed filtered noise in a sweep."""
 
-CONFIRMED = 1.0
+CONFIRMING_DEVIATIONS = 1.0
 """Number of standard deviations by which this derivative may change if a resolution is confirmed. With more,
 half the necessary knots were accepted for rest-to-rest motions, and the true error exceeded two deviations in
 up to 30 % of the samples."""
@@ -179,21 +181,21 @@ KINK_CAUTION = 5.0
 """Factor of the variance where motion starts or stops, in the comparison of resolutions: root mean square
 errors are up to 2.2 deviations there."""
 
-ACCEPTED = 0.25
+MAX_DEVIATION = 0.25
 """Largest relative deviation of the highest derivative of an accepted resolution. It was 0.3 and more for
 motions whose fast parts counted as noise."""
 
-CLOSE = 3.0
+CLOSE_RESIDUAL_RATIO = 3.0
 """Largest residual of a resolution that is considered if none is accepted, over the smallest of all. A coarse
 one may state the smallest deviation of a derivative that it does not resolve: with a factor of 100, steps of
 velocity smoothed over 50 ms were missed by 0.03 rad, and motor torques were off by 17 % with a stated 7 %."""
 
-ASKED_AT = 256
+CHECKED_SPANS = 256
 """Number of spans at which a search that has accepted nothing asks whether finer ones can show anything. Most
 searches have ended before; the question takes as long as the resolution of 32 spans. Without it, a fit to
 10,000 samples of white noise takes 4 times as long."""
 
-MISSED = 0.3
+MAX_RESIDUAL_SHARE = 0.3
 """Largest residual over the recording's standard deviation. A larger one is motion that only the finest
 resolution follows, which no other confirms."""
 
@@ -260,8 +262,8 @@ class Resolution(NamedTuple):
     @property
     def accepted(self) -> bool:
         """Whether the change to the next resolution does not exceed that by noise, and both are small."""
-        confirmed = self.settled or self.change < max(CONFIRMED * self.deviation, NEGLIGIBLE)
-        return self.given or (confirmed and self.total < ACCEPTED and not self.refused)
+        confirmed = self.settled or self.change < max(CONFIRMING_DEVIATIONS * self.deviation, NEGLIGIBLE)
+        return self.given or (confirmed and self.total < MAX_DEVIATION and not self.refused)
 
 
 def find_resolution(
@@ -292,45 +294,47 @@ def find_resolution(
         samples; the finest if none is close; None if there is none.
     """
     if known.bandwidth is not None:
-        return _given(time, row, degree, order, known)
-    tried = []
+        return _resolution_of_bandwidth(time, row, degree, order, known)
+    resolutions = []
     finest: Model | None = None
-    enough = np.inf
+    max_spans = np.inf
     moments = _moments(time, row, degree, below, BINS_PER_SPAN if known.white else FEWEST_SAMPLES)
     for coarse, finest in pairwise(_models(moments, known)):
-        tried.append(_judged(_compared(time, row, coarse, finest, order), known))
-        if tried[-1].accepted:
-            return tried[-1]
-        if finest.bins.spans == ASKED_AT:
-            enough = enough_spans(time, row)
-        if finest.bins.spans >= enough:
+        resolutions.append(_judge_residual(_compare_resolutions(time, row, coarse, finest, order), known))
+        if resolutions[-1].accepted:
+            return resolutions[-1]
+        if finest.bins.spans == CHECKED_SPANS:
+            max_spans = enough_spans(time, row)
+        if finest.bins.spans >= max_spans:
             break
     if finest is not None and known.white:
-        last = _judged(_compared(time, row, finest, finest, order), known)
-        if last.settled and last.accepted:
-            return last
-    least = min((each.residual for each in tried), default=0.0)
-    if finest is not None and least > MISSED:
-        return tried[-1]._replace(model=finest, other=tried[-1].model, residual=_residual(time, row, finest))
-    close = [each for each in tried if each.residual <= CLOSE * least]
-    return min(close, key=lambda each: each.total, default=None)
+        last_resolution = _judge_residual(_compare_resolutions(time, row, finest, finest, order), known)
+        if last_resolution.settled and last_resolution.accepted:
+            return last_resolution
+    min_residual = min((each.residual for each in resolutions), default=0.0)
+    if finest is not None and min_residual > MAX_RESIDUAL_SHARE:
+        return resolutions[-1]._replace(
+            model=finest, other=resolutions[-1].model, residual=_residual(time, row, finest)
+        )
+    close_resolutions = [each for each in resolutions if each.residual <= CLOSE_RESIDUAL_RATIO * min_residual]
+    return min(close_resolutions, key=lambda each: each.total, default=None)
 
 
-def _given(
+def _resolution_of_bandwidth(
     time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
 ) -> Resolution | None:
     assert known.bandwidth is not None
     spans = SPANS_PER_PERIOD * known.bandwidth * float(time[-1] - time[0])
-    finest = int(np.clip(np.ceil(spans), 1, max(1, len(time) // BINS_PER_SPAN - degree)))
-    halvings = range(int(np.log2(max(1, finest / FIRST_SPANS))), -1, -1)
-    bins = [BINS_PER_SPAN * -(-finest // 2**halving) for halving in halvings]
-    models = list(_models((BinMoments.of(time, row, count, degree) for count in bins), known))
+    finest_spans = int(np.clip(np.ceil(spans), 1, max(1, len(time) // BINS_PER_SPAN - degree)))
+    halvings = range(int(np.log2(max(1, finest_spans / FIRST_SPANS))), -1, -1)
+    bin_counts = [BINS_PER_SPAN * -(-finest_spans // 2**halving) for halving in halvings]
+    models = list(_models((BinMoments.of(time, row, count, degree) for count in bin_counts), known))
     if not models:
         return None
-    return _compared(time, row, models[-1], models[-1], order)._replace(given=True)
+    return _compare_resolutions(time, row, models[-1], models[-1], order)._replace(given=True)
 
 
-def _judged(resolution: Resolution, known: KnownNoise) -> Resolution:
+def _judge_residual(resolution: Resolution, known: KnownNoise) -> Resolution:
     """Return the resolution judged by what it leaves over, if white noise is known."""
     if not known.white or known.deviation is None:
         return resolution
@@ -344,13 +348,13 @@ def _moments(
     """Return the moments of all resolutions, from coarse to fine."""
     samples = len(time)
     spans = FIRST_SPANS if samples >= SHORT else FIRST_SPANS_SHORT
-    most = max(samples // fewest_samples, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
-    slower = max(spans, 2 * below * float(time[-1] - time[0]))
-    doublings = int(np.log2(min(most, MOST_SPANS, slower) // spans))
-    found = [BinMoments.of(time, row, BINS_PER_SPAN * spans * 2**doublings, degree)]
+    max_spans = max(samples // fewest_samples, min(samples // BINS_PER_SPAN, ALWAYS_SPANS), FIRST_SPANS)
+    max_useful_spans = max(spans, 2 * below * float(time[-1] - time[0]))
+    doublings = int(np.log2(min(max_spans, MOST_SPANS, max_useful_spans) // spans))
+    moments = [BinMoments.of(time, row, BINS_PER_SPAN * spans * 2**doublings, degree)]
     for _ in range(doublings):
-        found.append(found[-1].halved)
-    return found[::-1]
+        moments.append(moments[-1].halved)
+    return moments[::-1]
 
 
 def _models(moments: Iterable[BinMoments], known: KnownNoise) -> Iterator[Model]:
@@ -363,26 +367,33 @@ def _models(moments: Iterable[BinMoments], known: KnownNoise) -> Iterator[Model]
             yield model
 
 
-def _compared(time: FloatArray, row: FloatArray, coarse: Model, fine: Model, order: int) -> Resolution:
-    expected = fine.spline(fine.probes, nu=order)[fine.inside, 0]
-    found = coarse.spline(fine.probes, nu=order)[fine.inside, 0]
-    size = max(_rms(expected), np.finfo(float).tiny)
-    change, deviation = _rms(found - expected), _deviation(coarse, order)
-    explained = change < CONFIRMED * deviation
-    model = fine if not explained and change < NEGLIGIBLE * size else coarse
+def _compare_resolutions(
+    time: FloatArray, row: FloatArray, coarse: Model, fine: Model, order: int
+) -> Resolution:
+    fine_derivative = fine.spline(fine.probes, nu=order)[fine.inside, 0]
+    coarse_derivative = coarse.spline(fine.probes, nu=order)[fine.inside, 0]
+    derivative_rms = max(_rms(fine_derivative), np.finfo(float).tiny)
+    change, deviation = _rms(coarse_derivative - fine_derivative), _deviation(coarse, order)
+    is_explained = change < CONFIRMING_DEVIATIONS * deviation
+    model = fine if not is_explained and change < NEGLIGIBLE * derivative_rms else coarse
     deviation = deviation if model is coarse else _deviation(fine, order)
     residual = _residual(time, row, model)
     # The finer of two splines near the same samples is the coarser plus an independent part.
-    more, less = (_mean_variance(each, each.variances(order)) for each in (fine, coarse))
-    unexplained = float(np.sqrt(max(0.0, change**2 - abs(more - less))))
+    fine_variance, coarse_variance = (_mean_variance(each, each.variances(order)) for each in (fine, coarse))
+    unexplained = float(np.sqrt(max(0.0, change**2 - abs(fine_variance - coarse_variance))))
     return Resolution(
-        model, coarse if model is fine else fine, deviation / size, change / size, unexplained, residual
+        model,
+        coarse if model is fine else fine,
+        deviation / derivative_rms,
+        change / derivative_rms,
+        unexplained,
+        residual,
     )
 
 
 def _residual(time: FloatArray, row: FloatArray, model: Model) -> float:
-    some = slice(None, None, 1 + len(time) // PROBES)
-    return _rms(row[some] - model.spline(time[some])[:, 0])
+    probe_slice = slice(None, None, 1 + len(time) // PROBES)
+    return _rms(row[probe_slice] - model.spline(time[probe_slice])[:, 0])
 
 
 def _deviation(model: Model, order: int) -> float:

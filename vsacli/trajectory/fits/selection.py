@@ -75,12 +75,14 @@ class FittedRecording(NamedTuple):
 def smooth_part(record: FittedRecording, member: int, degree: int, known: KnownNoise | None = None) -> Part:
     """Return a smoothing spline of one component; a polynomial by least squares if that is impossible."""
     row, members = record.values[member], np.array([member])
-    found = smoothing_spline(record.time, row, degree, record.order, known or record.known[member])
-    if found is None:
+    spline_and_smoothing = smoothing_spline(
+        record.time, row, degree, record.order, known or record.known[member]
+    )
+    if spline_and_smoothing is None:
         return Part(members, fit_spline(record.time, row[None], 1, degree), exact=False)
-    spline, smoothing = found
+    spline, smoothing = spline_and_smoothing
     part = Part(members, spline, exact=False, smoothing=smoothing, smooth=True)
-    return _following(*_without_ends(part, record), record)
+    return _with_followed_noise(*_without_ends(part, record), record)
 
 
 def judged(record: FittedRecording, fit: Fit, bar: ProgressBar, *, chosen: bool) -> Iterator[Part]:
@@ -97,40 +99,45 @@ def judged(record: FittedRecording, fit: Fit, bar: ProgressBar, *, chosen: bool)
     """
     for part in fit.parts:
         for column in range(len(part.members)):
-            instead = _instead(record, part, column, chosen=chosen)
+            replacement = _replacement(record, part, column, chosen=chosen)
             bar.update(len(record.time))
-            if instead is not None:
-                yield instead
+            if replacement is not None:
+                yield replacement
 
 
-def _instead(record: FittedRecording, part: Part, column: int, *, chosen: bool) -> Part | None:
+def _replacement(record: FittedRecording, part: Part, column: int, *, chosen: bool) -> Part | None:
     """Return the replacement of a component of a part; None if it needs no assessment, or has none."""
     member, degree = int(part.members[column]), part.spline.k
-    wanted = not chosen and record.known[member].bandwidth is not None
-    single, noise = _without_ends(part.of_columns(np.array([column])), record)
-    unjudged = single if any(single.ringing) else None
-    filtered = bool(record.filtered[member]) or noise.share > SUSPECT
-    if part.exact and record.spoilt[member] <= SUSPECT and not filtered and not wanted:
-        return replace(single, noise=noise) if noise.share > record.spoilt[member] else unjudged
-    judge = _judge(record, member, degree)
-    if judge.smoothing is None:
-        return unjudged
-    inside = _inside(judge, record)
-    differ = disagreement(single.spline, judge.spline, inside, record.order + 1)
-    size = float(np.sqrt(np.mean(judge.spline(inside, nu=record.order) ** 2)))
-    difference = float(np.sqrt(differ[-1, -1])) / size if size else 0.0
-    if wanted or (not chosen and _better(judge, difference, record, filtered)):
-        return judge
+    has_bandwidth = not chosen and record.known[member].bandwidth is not None
+    single_part, noise = _without_ends(part.of_columns(np.array([column])), record)
+    unassessed_part = single_part if any(single_part.ringing) else None
+    is_filtered = bool(record.filtered[member]) or noise.share > SUSPECT
+    if part.exact and record.spoilt[member] <= SUSPECT and not is_filtered and not has_bandwidth:
+        return replace(single_part, noise=noise) if noise.share > record.spoilt[member] else unassessed_part
+    smoothing_part = _smoothing_part(record, member, degree)
+    if smoothing_part.smoothing is None:
+        return unassessed_part
+    inside = _inner_times(smoothing_part, record)
+    difference_covariance = disagreement(single_part.spline, smoothing_part.spline, inside, record.order + 1)
+    derivative_rms = float(np.sqrt(np.mean(smoothing_part.spline(inside, nu=record.order) ** 2)))
+    difference = float(np.sqrt(difference_covariance[-1, -1])) / derivative_rms if derivative_rms else 0.0
+    if has_bandwidth or (not chosen and _is_better(smoothing_part, difference, record, is_filtered)):
+        return smoothing_part
     # Only noise is a reason to doubt a spline through the samples.
-    if judge.smoothing.resolved or record.spoilt[member] > DISAGREEMENT or filtered or not part.exact:
-        known = replace(
-            judge.smoothing,
-            relative=float(np.hypot(judge.smoothing.relative, difference)),
-            disagreement=judge.smoothing.disagreement + differ,
+    if (
+        smoothing_part.smoothing.resolved
+        or record.spoilt[member] > DISAGREEMENT
+        or is_filtered
+        or not part.exact
+    ):
+        smoothing = replace(
+            smoothing_part.smoothing,
+            relative=float(np.hypot(smoothing_part.smoothing.relative, difference)),
+            disagreement=smoothing_part.smoothing.disagreement + difference_covariance,
             follows_lines=True,
         )
-        return _following(replace(single, smoothing=known), noise, record)
-    return unjudged
+        return _with_followed_noise(replace(single_part, smoothing=smoothing), noise, record)
+    return unassessed_part
 
 
 def _without_ends(part: Part, record: FittedRecording) -> tuple[Part, FollowedNoise]:
@@ -139,14 +146,14 @@ def _without_ends(part: Part, record: FittedRecording) -> tuple[Part, FollowedNo
     Also returns the filtered noise that it follows between them.
     """
     part = replace(part, ringing=ringing_ends(part.spline, part.inside, record.order))
-    noise = _noise_of(record, part)
+    noise = _followed_noise_of(record, part)
     if part.exact or part.smooth:  # a least-squares spline has a cut-off of its own
         part = replace(part, transient=noise.transient)
-    between = _noise_of(record, part) if noise.share else noise
-    return part, between if between.share else noise
+    noise_between_ends = _followed_noise_of(record, part) if noise.share else noise
+    return part, noise_between_ends if noise_between_ends.share else noise
 
 
-def _noise_of(record: FittedRecording, part: Part) -> FollowedNoise:
+def _followed_noise_of(record: FittedRecording, part: Part) -> FollowedNoise:
     """Return the filtered noise that a part of one component follows."""
     bandwidth = record.known[int(part.members[0])].bandwidth
     rings = any(part.ringing)
@@ -161,58 +168,62 @@ def _interval(record: FittedRecording) -> float:
     return float(record.time[-1] - record.time[0]) / (len(record.time) - 1)
 
 
-def _following(part: Part, noise: FollowedNoise, record: FittedRecording) -> Part:
+def _with_followed_noise(part: Part, noise: FollowedNoise, record: FittedRecording) -> Part:
     """Return a part of one component whose assessment includes the noise that it follows."""
-    known = part.smoothing
-    if known is None or not noise.share or (part.smooth and noise.relative <= known.relative):
+    smoothing = part.smoothing
+    if smoothing is None or not noise.share or (part.smooth and noise.relative <= smoothing.relative):
         return part
-    return replace(part, smoothing=known.following(noise, part.size(record.order).item()), noise=noise)
+    return replace(part, smoothing=smoothing.following(noise, part.size(record.order).item()), noise=noise)
 
 
-def _judge(record: FittedRecording, member: int, degree: int) -> Part:
+def _smoothing_part(record: FittedRecording, member: int, degree: int) -> Part:
     """Return the smoothing spline of a component; it follows a strong vibration, which may be motion."""
-    judge = smooth_part(record, member, degree)
-    known, lines = record.known[member], judge.smoothing and judge.smoothing.lines
-    if not lines or lines.share < VIBRATION or known.bandwidth is not None:
-        return judge
-    follower = smooth_part(record, member, degree, known._replace(bandwidth=PASSING * max(lines.others)))
-    if follower.smoothing is None:
-        return judge
-    return replace(follower, smoothing=replace(follower.smoothing, lines=lines, follows_lines=True))
+    smoothing_part = smooth_part(record, member, degree)
+    known_noise, lines = record.known[member], smoothing_part.smoothing and smoothing_part.smoothing.lines
+    if not lines or lines.share < VIBRATION or known_noise.bandwidth is not None:
+        return smoothing_part
+    following_part = smooth_part(
+        record, member, degree, known_noise._replace(bandwidth=PASSING * max(lines.others))
+    )
+    if following_part.smoothing is None:
+        return smoothing_part
+    return replace(
+        following_part, smoothing=replace(following_part.smoothing, lines=lines, follows_lines=True)
+    )
 
 
-def _better(judge: Part, difference: float, record: FittedRecording, filtered: bool) -> bool:
+def _is_better(smoothing_part: Part, difference: float, record: FittedRecording, filtered: bool) -> bool:
     """Return whether a smoothing spline should replace a spline through the samples of a component.
 
     If no resolution is accepted, noise must dominate more in the latter. If noise was filtered, both must
     differ by more than the smoothing spline's own deviation explains.
     """
-    known, member = judge.smoothing, judge.members[0]
-    if known is None:
+    smoothing, member = smoothing_part.smoothing, smoothing_part.members[0]
+    if smoothing is None:
         return False
-    if record.spoilt[member] > (SUSPECT if known.resolved else DISAGREEMENT):
+    if record.spoilt[member] > (SUSPECT if smoothing.resolved else DISAGREEMENT):
         return True
-    return filtered and difference > DISAGREEMENT + DISAGREEING_DEVIATIONS * known.relative
+    return filtered and difference > DISAGREEMENT + DISAGREEING_DEVIATIONS * smoothing.relative
 
 
-def _inside(part: Part, record: FittedRecording) -> FloatArray:
+def _inner_times(part: Part, record: FittedRecording) -> FloatArray:
     """Return some sample times away from the ends, s."""
     time, (start, end) = record.time, part.inside
     inside = time[(time >= start) & (time <= end)]
     return inside[:: 1 + len(inside) // PROBES]
 
 
-def replaced(parts: Sequence[Part], instead: Sequence[Part]) -> list[Part]:
+def replace_components(parts: Sequence[Part], replacements: Sequence[Part]) -> list[Part]:
     """Return all parts, with some components replaced by parts of their own."""
-    taken = np.concatenate([part.members for part in instead])
-    kept: list[Part] = []
+    replaced_members = np.concatenate([part.members for part in replacements])
+    remaining_parts: list[Part] = []
     for part in parts:
-        left = np.flatnonzero(~np.isin(part.members, taken))
-        if len(left) == len(part.members):
-            kept.append(part)
-        elif left.size:
-            kept.append(part.of_columns(left))
-    return [*kept, *instead]
+        remaining_columns = np.flatnonzero(~np.isin(part.members, replaced_members))
+        if len(remaining_columns) == len(part.members):
+            remaining_parts.append(part)
+        elif remaining_columns.size:
+            remaining_parts.append(part.of_columns(remaining_columns))
+    return [*remaining_parts, *replacements]
 
 
 LEAST_SQUARES, INTERPOLATE, SMOOTH = "lsq", "interpolate", "smooth"
@@ -266,11 +277,16 @@ be only rounding of a component at rest."""
 
 def _with_left_out_motion(parts: Sequence[Part], record: FittedRecording) -> list[Part]:
     """Return parts of one component each, with the motion that those near the samples leave out."""
-    single = [part.of_columns(np.array([column])) for part in parts for column in range(len(part.members))]
-    return [part if part.exact else replace(part, left_out=_left_out(part, record)) for part in single]
+    single_parts = [
+        part.of_columns(np.array([column])) for part in parts for column in range(len(part.members))
+    ]
+    return [
+        part if part.exact else replace(part, left_out=_left_out_motion(part, record))
+        for part in single_parts
+    ]
 
 
-def _left_out(part: Part, record: FittedRecording) -> LeftOutMotion | None:
+def _left_out_motion(part: Part, record: FittedRecording) -> LeftOutMotion | None:
     """Return the motion that a part of one component leaves out; lines count as vibrations instead.
 
     A residual as large as the filtered noise that the default fit follows is such noise.
@@ -279,13 +295,15 @@ def _left_out(part: Part, record: FittedRecording) -> LeftOutMotion | None:
     if lines and (lines.hum or lines.others):
         return None
     member = int(part.members[0])
-    missed = left_out_motion(record.time, record.values[member] - part.spline(record.time)[:, 0])
-    if missed is None:
+    motion = left_out_motion(record.time, record.values[member] - part.spline(record.time)[:, 0])
+    if motion is None:
         return None
-    free = smooth_part(record, member, part.spline.k, record.known[member]._replace(bandwidth=None))
-    noise = followed_noise(free.spline, free.inside, _interval(record), record.order)
-    explained = noise.share and free.size(record.order) * np.sqrt(noise.covariance(record.order + 1)[0, 0])
-    return missed if missed.size > explained else None
+    free_part = smooth_part(record, member, part.spline.k, record.known[member]._replace(bandwidth=None))
+    noise = followed_noise(free_part.spline, free_part.inside, _interval(record), record.order)
+    noise_size = noise.share and free_part.size(record.order) * np.sqrt(
+        noise.covariance(record.order + 1)[0, 0]
+    )
+    return motion if motion.size > noise_size else None
 
 
 def fit_samples(
@@ -313,47 +331,51 @@ def fit_samples(
         bandwidth: frequency above which there is no motion, Hz; None to let smoothing splines determine it.
         progress: function that opens a progress bar over the samples of all components.
     """
-    present = np.flatnonzero(~np.all(np.isnan(values), axis=1))
-    given = np.full(len(values), np.nan) if noise is None else noise
+    present_members = np.flatnonzero(~np.all(np.isnan(values), axis=1))
+    given_noise = np.full(len(values), np.nan) if noise is None else noise
     estimate = np.zeros(len(values))
-    estimate[present] = estimated_noise(time, values[present], degree + 1)
-    estimate = np.where(np.isnan(given), estimate, given)
+    estimate[present_members] = estimated_noise(time, values[present_members], degree + 1)
+    estimate = np.where(np.isnan(given_noise), estimate, given_noise)
     record = FittedRecording(
         time,
         values,
         spoilt=np.zeros(len(values)),
         filtered=np.zeros(len(values), dtype=bool),
         order=order,
-        known=[KnownNoise(None if np.isnan(each) else each, bandwidth) for each in given.tolist()],
+        known=[KnownNoise(None if np.isnan(each) else each, bandwidth) for each in given_noise.tolist()],
     )
     parts: list[Part] = []
     if method == SMOOTH:
-        with progress(len(time) * len(present)) as bar:
-            for member in present.tolist():
+        with progress(len(time) * len(present_members)) as bar:
+            for member in present_members.tolist():
                 parts.append(smooth_part(record, member, degree))
                 bar.update(len(time))
-        return join(degree, _with_left_out_motion(parts, record), time, values, estimate, given)
-    if present.size and method == LEAST_SQUARES:
-        parts += _least_squares(time, values, present, degree)
-    elif present.size:
-        through = scipy.interpolate.make_interp_spline(time, values[present].T, k=degree)
-        parts.append(Part(present, through, exact=True))
-    if present.size and method != LEAST_SQUARES and len(time) >= FEWEST_JUDGED:
-        typical = typical_noise(time, values[present], degree + 1)
-        expected = np.where(np.isnan(given[present]), typical, given[present])
-        record.spoilt[present], least = _spoilt(parts[0].spline, time, values[present], expected, order)
-        record = record._replace(least=least)
-        record.filtered[present] = filtered_noise(time, values[present], degree + 1)
-    fit = join(degree, parts, time, values, estimate, given)
-    with progress(len(time) * len(present)) as bar:
-        instead = list(judged(record, fit, bar, chosen=method is not None))
-    parts = replaced(parts, instead) if instead else parts
+        return join(degree, _with_left_out_motion(parts, record), time, values, estimate, given_noise)
+    if present_members.size and method == LEAST_SQUARES:
+        parts += _least_squares_parts(time, values, present_members, degree)
+    elif present_members.size:
+        interpolating_spline = scipy.interpolate.make_interp_spline(time, values[present_members].T, k=degree)
+        parts.append(Part(present_members, interpolating_spline, exact=True))
+    if present_members.size and method != LEAST_SQUARES and len(time) >= FEWEST_JUDGED:
+        noise_estimate = typical_noise(time, values[present_members], degree + 1)
+        expected = np.where(
+            np.isnan(given_noise[present_members]), noise_estimate, given_noise[present_members]
+        )
+        record.spoilt[present_members], rest_derivative = _noise_shares(
+            parts[0].spline, time, values[present_members], expected, order
+        )
+        record = record._replace(least=rest_derivative)
+        record.filtered[present_members] = filtered_noise(time, values[present_members], degree + 1)
+    fit = join(degree, parts, time, values, estimate, given_noise)
+    with progress(len(time) * len(present_members)) as bar:
+        replacements = list(judged(record, fit, bar, chosen=method is not None))
+    parts = replace_components(parts, replacements) if replacements else parts
     if method is not None or bandwidth is not None or noise is not None:
         parts = _with_left_out_motion(parts, record)
-    return join(degree, parts, time, values, estimate, given)
+    return join(degree, parts, time, values, estimate, given_noise)
 
 
-def _spoilt(
+def _noise_shares(
     spline: BSpline[np.float64], time: FloatArray, rows: FloatArray, noise: FloatArray, order: int
 ) -> tuple[FloatArray, float]:
     """Return the share of noise in the highest derivative of a spline through samples.
@@ -363,17 +385,19 @@ def _spoilt(
     """
     degree, duration = spline.k, time[-1] - time[0]
     step = duration / (len(time) - 1)
-    inside = time[degree:-degree] if len(time) > 4 * degree else time
-    derivative = np.sqrt(np.mean(spline(inside, nu=order) ** 2, axis=0))
-    least = np.abs(rows).max(axis=1) / duration**order
-    smallest = SMALLEST_SHARE * float(derivative.max())
-    scale = np.maximum(np.maximum(derivative, least), smallest)
+    inner_times = time[degree:-degree] if len(time) > 4 * degree else time
+    derivative = np.sqrt(np.mean(spline(inner_times, nu=order) ** 2, axis=0))
+    min_derivative = np.abs(rows).max(axis=1) / duration**order
+    rest_derivative = SMALLEST_SHARE * float(derivative.max())
+    scale = np.maximum(np.maximum(derivative, min_derivative), rest_derivative)
     error = INTERPOLATION_GAIN[degree][order] * noise / step**order
-    return np.asarray(error / np.maximum(scale, np.finfo(float).tiny)), smallest
+    return np.asarray(error / np.maximum(scale, np.finfo(float).tiny)), rest_derivative
 
 
-def _least_squares(time: FloatArray, values: FloatArray, members: IndexArray, degree: int) -> Iterator[Part]:
+def _least_squares_parts(
+    time: FloatArray, values: FloatArray, members: IndexArray, degree: int
+) -> Iterator[Part]:
     spans = best_spans(time, values[members], degree)
     for count in np.unique(spans).tolist():
-        alike = members[spans == count]
-        yield Part(alike, fit_spline(time, values[alike], count, degree), exact=False)
+        equal_members = members[spans == count]
+        yield Part(equal_members, fit_spline(time, values[equal_members], count, degree), exact=False)

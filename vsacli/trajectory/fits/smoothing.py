@@ -23,16 +23,16 @@ if TYPE_CHECKING:
 STEP = 0.35
 """Step of log t to both sides, for finite differences with respect to it."""
 
-KINK_VARIANCE = 2.5
+KINK_VARIANCE_FACTOR = 2.5
 """Factor of the variance where motion starts or stops: there a single difference of coefficients carries what
 the penalty spreads over a segment. On 32 rest-to-rest recordings errors were 0.7 to 2.1 deviations there.
 With this factor deviations are 0.7 to 1.5 times the errors over a recording; with twice as much up to 2.0."""
 
-LEAST_SHARE = 0.3
+MIN_BIAS_SHARE = 0.3
 """Smallest share of the expected bias; its estimate varies by about 0.4 from recording to recording."""
 
 
-FEW_SAMPLES = 2.0
+SEGMENT_ERROR_FACTOR = 2.0
 """Factor from the posterior deviation of a spline with several penalties to its error, both root mean square.
 A few samples at the ends of pauses have most of the error: nearly all samples are within twice their
 deviation, and yet the sum of squares is larger. On 150 recordings the factor was up to 2.4."""
@@ -59,24 +59,26 @@ def calibrated(model: Model, orders: int, unexplained: float) -> Calibration:
         unexplained: change of the highest derivative from one resolution to the next that noise does not
             explain, root mean square away from the ends.
     """
-    near = [model.stiffened(-STEP), model.stiffened(STEP)]
+    neighbor_models = [model.stiffened(-STEP), model.stiffened(STEP)]
     share = _bias_share(model, orders - 1)
     cautious = np.array([model.variances(order, model.cautious) for order in range(orders)])
-    softer, stiffer = (np.array([each.variances(order) for order in range(orders)]) for each in near)
-    bias = (softer - stiffer) / (2 * STEP)
+    softer_variances, stiffer_variances = (
+        np.array([each.variances(order) for order in range(orders)]) for each in neighbor_models
+    )
+    bias = (softer_variances - stiffer_variances) / (2 * STEP)
     # The finite difference may exceed the variance, although bias is a part of that: bound it.
-    found = np.maximum(cautious - (1 - share) * bias, min(share, 1.0) * cautious)
-    found = np.where(model.kinks, np.maximum(found, KINK_VARIANCE * cautious), found)
-    found *= 1 + unexplained**2 / float(np.mean(found[-1, model.inside]) * model.noise_variance)
+    variances = np.maximum(cautious - (1 - share) * bias, min(share, 1.0) * cautious)
+    variances = np.where(model.kinks, np.maximum(variances, KINK_VARIANCE_FACTOR * cautious), variances)
+    variances *= 1 + unexplained**2 / float(np.mean(variances[-1, model.inside]) * model.noise_variance)
     return Calibration(
-        np.sqrt(model.noise_variance * found), np.sqrt(model.noise_variance * found / cautious)
+        np.sqrt(model.noise_variance * variances), np.sqrt(model.noise_variance * variances / cautious)
     )
 
 
 def posterior_error(model: Model, order: int) -> float:
     """Return the root mean square error of a derivative away from the ends, by the posterior only."""
     variance = np.mean(model.variances(order, model.cautious)[model.inside]) * model.noise_variance
-    return float((FEW_SAMPLES if model.segments > 1 else 1.0) * np.sqrt(variance))
+    return float((SEGMENT_ERROR_FACTOR if model.segments > 1 else 1.0) * np.sqrt(variance))
 
 
 def _bias_share(model: Model, order: int) -> float:
@@ -87,12 +89,12 @@ def _bias_share(model: Model, order: int) -> float:
     """
     weight = model.inside / model.variances(order)  # equal weight of all parts of the recording
     power = motion_power(model, order, 2, weight)
-    exists = power.expected > 0  # a straight line has no cut-off
-    share = float(np.max(power.found[exists] / power.expected[exists], initial=0.0))
-    return max(share, LEAST_SHARE, share * abs(share))
+    has_power = power.expected > 0  # a straight line has no cut-off
+    share = float(np.max(power.found[has_power] / power.expected[has_power], initial=0.0))
+    return max(share, MIN_BIAS_SHARE, share * abs(share))
 
 
-DETERMINED = 0.074
+MAX_DETERMINED_ERROR = 0.074
 """Largest expected relative error of the highest derivative with which it counts as accurate to 10 %. Of 1260
 recordings with seven motions and twelve noises, three with 0.077 were off by 10.0 to 10.4 %, none with
 less."""
@@ -137,7 +139,7 @@ class Smoothing:
     @property
     def determined(self) -> bool:
         """Whether the recording determines the highest derivative to 10 %."""
-        return self.resolved and self.relative <= DETERMINED
+        return self.resolved and self.relative <= MAX_DETERMINED_ERROR
 
     def following(self, noise: FollowedNoise, size: float) -> Smoothing:
         """Return the assessment of a spline that also follows filtered noise.
@@ -148,8 +150,8 @@ class Smoothing:
         """
         # If unresolved, the error is relative to the spline's derivative including the noise.
         relative = float(np.hypot(self.relative, noise.relative if self.resolved else noise.share))
-        of_noise = size**2 * np.diag(noise.covariance(len(self.deviations)))
-        return replace(self, deviations=np.sqrt(self.deviations**2 + of_noise), relative=relative)
+        noise_variance = size**2 * np.diag(noise.covariance(len(self.deviations)))
+        return replace(self, deviations=np.sqrt(self.deviations**2 + noise_variance), relative=relative)
 
     def units_at(self, place: FloatArray) -> FloatArray:
         """Return the factors of the posterior's deviations, (orders, places).
@@ -200,37 +202,39 @@ def smoothing_spline(
     if scale <= 4 * np.finfo(float).eps * abs(offset):
         return None
     deviation = None if known.deviation is None else known.deviation / scale
-    normal = known._replace(deviation=deviation)
-    found = _found(time, (row - offset) / scale, degree, order, normal)
-    if found is None:
+    normalized_noise = known._replace(deviation=deviation)
+    resolution = _resolution_below_hum(time, (row - offset) / scale, degree, order, normalized_noise)
+    if resolution is None:
         return None
-    model, spline = found.model, found.model.spline
-    known_errors = calibrated(model, order + 1, found.unexplained)
-    deviations = scale * np.sqrt(np.mean(known_errors.deviations[:, model.inside] ** 2, axis=1))
-    size = scale * float(np.sqrt(np.mean(spline(model.probes, nu=order)[model.inside] ** 2)))
-    relative = found.total
-    if found.accepted:
+    model, spline = resolution.model, resolution.model.spline
+    calibration = calibrated(model, order + 1, resolution.unexplained)
+    deviations = scale * np.sqrt(np.mean(calibration.deviations[:, model.inside] ** 2, axis=1))
+    derivative_rms = scale * float(np.sqrt(np.mean(spline(model.probes, nu=order)[model.inside] ** 2)))
+    relative = resolution.total
+    if resolution.accepted:
         errors = np.array([deviations[order], scale * posterior_error(model, order)])
-        relative = float(np.max(np.hypot(errors / max(size, np.finfo(float).tiny), [0.0, found.change])))
+        relative = float(
+            np.max(np.hypot(errors / max(derivative_rms, np.finfo(float).tiny), [0.0, resolution.change]))
+        )
     residual = row - (scale * spline(time)[:, 0] + offset)
     lines = (
         Lines()
         if is_rounding(row, residual)
-        else spectral_lines(time, residual, order, size, known.bandwidth)
+        else spectral_lines(time, residual, order, derivative_rms, known.bandwidth)
     )
-    units = scale * known_errors.units
-    spread = 0.0 if found.accepted or falls(model, order) else model.piece
+    units = scale * calibration.units
+    spread = 0.0 if resolution.accepted or falls(model, order) else model.piece
     probes = model.probes[model.inside]
     smoothing = Smoothing(
         deviations,
         relative,
-        found.accepted,
+        resolution.accepted,
         spread,
         lines,
         spline.t,
         model.cautious,
         units,
-        scale**2 * disagreement(spline, found.other.spline, probes, order + 1),
+        scale**2 * disagreement(spline, resolution.other.spline, probes, order + 1),
         relative,
     )
     return scipy.interpolate.BSpline(spline.t, scale * spline.c + offset, degree), smoothing
@@ -247,7 +251,7 @@ def disagreement(
     return np.asarray(rows @ rows.T / len(time))
 
 
-def _found(
+def _resolution_below_hum(
     time: FloatArray, row: FloatArray, degree: int, order: int, known: KnownNoise
 ) -> Resolution | None:
     """Return the resolution below mains hum, which a finer one would follow like a motion.
@@ -255,21 +259,21 @@ def _found(
     Where white noise hides the motion in the differences of samples, its size is known: a resolution that
     leaves over more leaves motion out.
     """
-    found = find_resolution(time, row, degree, order, known)
-    if found is None or found.given:
-        return found
-    spline = found.model.spline
-    size = float(np.sqrt(np.mean(spline(found.model.probes, nu=order) ** 2)))
-    hum = spectral_lines(time, spline(time)[:, 0], order, size).hum
+    resolution = find_resolution(time, row, degree, order, known)
+    if resolution is None or resolution.given:
+        return resolution
+    spline = resolution.model.spline
+    derivative_rms = float(np.sqrt(np.mean(spline(resolution.model.probes, nu=order) ** 2)))
+    hum = spectral_lines(time, spline(time)[:, 0], order, derivative_rms).hum
     if hum:
         return find_resolution(time, row, degree, order, known, min(hum))
-    white = white_noise_level(time, row, degree + 1) if known.deviation is None else None
-    if white is None or (found.accepted and found.residual <= LEFT_OVER * white):
-        return found
-    vibrations = spectral_lines(time, row - spline(time)[:, 0], order, size)
-    if found.accepted and (vibrations.hum or vibrations.others):
-        return found  # they may be noise, which is for the user to say
-    finer = find_resolution(time, row, degree, order, KnownNoise(white, white=True))
-    if finer is not None and finer.accepted:
-        return finer
-    return found._replace(refused=found.residual > LEFT_OVER * white)
+    white_noise = white_noise_level(time, row, degree + 1) if known.deviation is None else None
+    if white_noise is None or (resolution.accepted and resolution.residual <= LEFT_OVER * white_noise):
+        return resolution
+    vibrations = spectral_lines(time, row - spline(time)[:, 0], order, derivative_rms)
+    if resolution.accepted and (vibrations.hum or vibrations.others):
+        return resolution  # they may be noise, which is for the user to say
+    finer_resolution = find_resolution(time, row, degree, order, KnownNoise(white_noise, white=True))
+    if finer_resolution is not None and finer_resolution.accepted:
+        return finer_resolution
+    return resolution._replace(refused=resolution.residual > LEFT_OVER * white_noise)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import BSpline
 
 
-SEGMENT_SAMPLES, MOST_SEGMENTS = 16384, 8
+SEGMENT_SAMPLES, MAX_STRETCHES = 16384, 8
 """Most samples of a spectrum, and most stretches of a longer recording with a spectrum each."""
 
 FIRST_LINE = 4
@@ -35,7 +35,7 @@ RISE = 4.0
 """Smallest rise of the derivative's density from a valley to both sides. Medians of fifteen lines of noise
 differ by less than a factor of 2.2 in 19 of 20 cases."""
 
-QUIET = 1e-4
+MAX_CUTOFF_POWER = 1e-4
 """Largest share of the samples' power of noise at the cut-off of a filter that rings; more is motion."""
 
 STEEP = 4
@@ -92,10 +92,10 @@ TRANSIENT = 4.0
 density of noise is largest, its cut-off."""
 
 
-WITHIN = 0.99
+BAND_POWER_SHARE = 0.99
 """Share of a derivative's power within its band."""
 
-LEAST_REST = 0.01
+MIN_MOTION_SHARE = 0.01
 """Smallest share of a derivative's power that counts as motion."""
 
 
@@ -115,7 +115,7 @@ class FollowedNoise(NamedTuple):
     @property
     def relative(self) -> float:
         """Root mean square over that of the derivative without the noise."""
-        return float(self.share / np.sqrt(max(1 - self.share**2, LEAST_REST)))
+        return float(self.share / np.sqrt(max(1 - self.share**2, MIN_MOTION_SHARE)))
 
     @property
     def transient(self) -> float:
@@ -128,10 +128,10 @@ class FollowedNoise(NamedTuple):
         The density of the noise is flat up to its peak.
         """
         rate, order = 2 * np.pi * self.peak, orders - 1
-        total = np.add.outer(np.arange(orders), np.arange(orders))
+        order_sums = np.add.outer(np.arange(orders), np.arange(orders))
         phase = np.cos(np.pi / 2 * np.subtract.outer(np.arange(orders), np.arange(orders)))
         return np.asarray(
-            self.share**2 * phase * (2 * order + 1) / (total + 1) * rate ** (total - 2.0 * order)
+            self.share**2 * phase * (2 * order + 1) / (order_sums + 1) * rate ** (order_sums - 2.0 * order)
         )
 
     def stretched(self, factor: float) -> FollowedNoise:
@@ -196,33 +196,33 @@ def followed_noise(
     """
     time = _stretches(inside, step)
     spectrum = _spectrum(spline, time, step, order)
-    total = float(np.sum(spectrum.power))
-    if not total or spectrum.lines.shape[1] <= 2 * (FIRST_LINE + FEWEST_LINES):
+    total_power = float(np.sum(spectrum.power))
+    if not total_power or spectrum.lines.shape[1] <= 2 * (FIRST_LINE + FEWEST_LINES):
         return FollowedNoise()
     bands, motion = _bands(spectrum), _power_of_motion(spline, time, order)
-    found = _below_cutoff(spectrum, bands, motion) if rings and bandwidth is None else FollowedNoise()
+    noise = _noise_below_cutoff(spectrum, bands, motion) if rings and bandwidth is None else FollowedNoise()
     # Of several humps of noise, the one from the lowest valley on includes all others.
-    valleys, descends = _valleys(bands, motion)
-    for valley in np.flatnonzero(valleys).tolist():
+    is_valley, is_descending = _valley_masks(bands, motion)
+    for valley in np.flatnonzero(is_valley).tolist():
         top = valley + int(np.argmax(bands.derivative[valley:]))
         peak = float(spectrum.frequency[bands.line[top]])
         fall = bands.samples[top] / bands.samples[valley]
-        steady = descends[valley] or fall > min(FLAT, bands.line[valley] / bands.line[top])
-        if steady and peak > (bandwidth or 0) and _is_noise(spectrum, bands, valley, top):
+        is_flat = is_descending[valley] or fall > min(FLAT, bands.line[valley] / bands.line[top])
+        if is_flat and peak > (bandwidth or 0) and _is_noise(spectrum, bands, valley, top):
             power = float(np.sum((bands.width * bands.derivative)[valley:])) * len(spectrum.lines)
             above = _end_of_motion(spectrum, bands, valley, top)
-            found = max(found, FollowedNoise(float(np.sqrt(min(1.0, power / total))), above, peak))
+            noise = max(noise, FollowedNoise(float(np.sqrt(min(1.0, power / total_power))), above, peak))
             break
-    if not found.share:
-        return found
+    if not noise.share:
+        return noise
     grid = np.linspace(*inside, SEGMENT_SAMPLES)
     row = spline(grid, nu=order)[:, 0]
     spans = min(
-        int(SPANS_PER_PERIOD * found.above * (inside[1] - inside[0])) + 1, most_spans(len(grid), DEGREE)
+        int(SPANS_PER_PERIOD * noise.above * (inside[1] - inside[0])) + 1, most_spans(len(grid), DEGREE)
     )
-    rest = row - fit_spline(grid, row[None], spans, DEGREE)(grid)[:, 0]
+    residual = row - fit_spline(grid, row[None], spans, DEGREE)(grid)[:, 0]
     # Unlike the window of a spectrum, this includes what a transient of the filter adds near the ends.
-    return found._replace(share=max(found.share, float(np.std(rest) / np.sqrt(np.mean(row**2)))))
+    return noise._replace(share=max(noise.share, float(np.std(residual) / np.sqrt(np.mean(row**2)))))
 
 
 def motion_band(
@@ -243,8 +243,12 @@ def motion_band(
     """
     spectrum = _spectrum(spline, _stretches(inside, step), step, order)
     power = np.where(spectrum.frequency < below, np.sum(spectrum.power, axis=0), 0.0)
-    summed = np.cumsum(power)
-    return float(spectrum.frequency[np.searchsorted(summed, WITHIN * summed[-1])]) if summed[-1] else np.nan
+    cumulative_power = np.cumsum(power)
+    return (
+        float(spectrum.frequency[np.searchsorted(cumulative_power, BAND_POWER_SHARE * cumulative_power[-1])])
+        if cumulative_power[-1]
+        else np.nan
+    )
 
 
 def _stretches(inside: tuple[float, float], step: float) -> FloatArray:
@@ -252,7 +256,7 @@ def _stretches(inside: tuple[float, float], step: float) -> FloatArray:
     first, last = inside
     samples = int((last - first) / step) + 1
     count = max(2, min(samples, SEGMENT_SAMPLES))
-    stretches = 1 if samples == count else min(MOST_SEGMENTS, samples // count)
+    stretches = 1 if samples == count else min(MAX_STRETCHES, samples // count)
     starts = np.linspace(first, last - (count - 1) * step, stretches)
     return np.asarray(starts[:, None] + step * np.arange(count))
 
@@ -283,44 +287,55 @@ def _bands(spectrum: _Spectrum) -> _Bands:
     density = spectrum.power / spectrum.weight
     medians = np.empty(len(line))
     for band, middle in enumerate(line.tolist()):
-        reach = max(LEAST_LINES, int(HALF_WIDTH * middle))
-        near = density[:, max(1, middle - reach) : middle + reach + 1]
-        medians[band] = np.median(near) / np.log(2)  # mean of an exponential distribution by its median
+        half_width = max(LEAST_LINES, int(HALF_WIDTH * middle))
+        near_density = density[:, max(1, middle - half_width) : middle + half_width + 1]
+        medians[band] = np.median(near_density) / np.log(
+            2
+        )  # mean of an exponential distribution by its median
     medians = np.maximum(medians, np.finfo(float).tiny)
     slowest = float(np.mean(spectrum.power[:, 1:FIRST_LINE], axis=0).max())
     return _Bands(line, count, medians, medians * spectrum.weight[line], slowest)
 
 
-def _below_cutoff(spectrum: _Spectrum, bands: _Bands, motion: float) -> FollowedNoise:
+def _noise_below_cutoff(spectrum: _Spectrum, bands: _Bands, motion: float) -> FollowedNoise:
     """Return the noise of a filter that rings: white up to the cut-off, if there is no motion there."""
     frequency = spectrum.frequency[bands.line]
     top = int(np.argmax(bands.derivative * frequency**STEEP))
-    reach = max(LEAST_LINES, int(HALF_WIDTH * (last := int(bands.line[top]))))
-    near = slice(max(1, last - reach), last + reach + 1)
-    density = float(np.mean(spectrum.power[:, near] / spectrum.weight[near]))  # more than medians: it peaks
-    if last * density > QUIET * motion:
+    half_width = max(LEAST_LINES, int(HALF_WIDTH * (cutoff_line := int(bands.line[top]))))
+    near_lines = slice(max(1, cutoff_line - half_width), cutoff_line + half_width + 1)
+    density = float(
+        np.mean(spectrum.power[:, near_lines] / spectrum.weight[near_lines])
+    )  # more than medians: it peaks
+    if cutoff_line * density > MAX_CUTOFF_POWER * motion:
         return FollowedNoise()
-    power = density * np.sum(spectrum.weight[: last + 1]) / np.sum(spectrum.power.mean(axis=0))
+    power = density * np.sum(spectrum.weight[: cutoff_line + 1]) / np.sum(spectrum.power.mean(axis=0))
     above = frequency[np.argmax(bands.samples <= NO_RISE * density)]
     return FollowedNoise(float(np.sqrt(min(1.0, power))), float(above), float(frequency[top]))
 
 
-def _valleys(bands: _Bands, motion: float) -> tuple[BoolArray, BoolArray]:
+def _valley_masks(bands: _Bands, motion: float) -> tuple[BoolArray, BoolArray]:
     """Return the bands from which on the derivative's density rises while the samples' does not.
 
     Returns:
         Mask of these bands, (bands,), and mask of bands to which the derivative's density descends, (bands,);
         below others, noise hides the motion.
     """
-    here, samples = bands.derivative, bands.samples
-    near = np.lib.stride_tricks.sliding_window_view(np.pad(here, 2, constant_values=np.inf), 5).min(axis=1)
-    above, later = (np.maximum.accumulate(rows[::-1])[::-1] for rows in (here, samples))
-    below = np.maximum(np.maximum.accumulate(here), bands.slowest)
-    beyond = np.cumsum((bands.width * samples)[::-1])[::-1]
-    descends: BoolArray = below >= RISE * here
-    begins = descends | (beyond <= SMALL * motion)
-    found: BoolArray = (here <= near) & begins & (above >= RISE * here) & (later <= NO_RISE * samples)
-    return found, descends
+    density, samples = bands.derivative, bands.samples
+    lowest_nearby = np.lib.stride_tricks.sliding_window_view(
+        np.pad(density, 2, constant_values=np.inf), 5
+    ).min(axis=1)
+    max_above, max_samples_above = (np.maximum.accumulate(rows[::-1])[::-1] for rows in (density, samples))
+    max_below = np.maximum(np.maximum.accumulate(density), bands.slowest)
+    power_above = np.cumsum((bands.width * samples)[::-1])[::-1]
+    is_descending: BoolArray = max_below >= RISE * density
+    may_begin = is_descending | (power_above <= SMALL * motion)
+    is_valley: BoolArray = (
+        (density <= lowest_nearby)
+        & may_begin
+        & (max_above >= RISE * density)
+        & (max_samples_above <= NO_RISE * samples)
+    )
+    return is_valley, is_descending
 
 
 def _medians(spectrum: _Spectrum, bands: _Bands, first: int, last: int) -> FloatArray:
@@ -331,18 +346,18 @@ def _medians(spectrum: _Spectrum, bands: _Bands, first: int, last: int) -> Float
 
 def _end_of_motion(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> float:
     """Return the frequency, Hz, of a valley, or of a later line of motion, which medians ignore."""
-    first, last = int(bands.line[valley]), _before_edge(bands, top) + 1
+    first, last = int(bands.line[valley]), _last_line_before_edge(bands, top) + 1
     power = spectrum.power[:, first:last].mean(axis=0)
     lines = np.flatnonzero(power > LINE_RATIO * _medians(spectrum, bands, first, last))
     return float(spectrum.frequency[first + (int(lines[-1]) if lines.size else 0)])
 
 
-def _before_edge(bands: _Bands, top: int) -> int:
+def _last_line_before_edge(bands: _Bands, top: int) -> int:
     """Return the last line of a hump, or the last before the edge of a steep filter that ends it."""
     line = int(bands.line[top])
-    beyond = int(np.searchsorted(bands.line, BEYOND_EDGE * line))
-    steep = beyond < len(bands.line) and bands.samples[beyond] < EDGE * bands.samples[top]
-    return int(BEFORE_EDGE * line) if steep else line
+    band_beyond = int(np.searchsorted(bands.line, BEYOND_EDGE * line))
+    is_steep = band_beyond < len(bands.line) and bands.samples[band_beyond] < EDGE * bands.samples[top]
+    return int(BEFORE_EDGE * line) if is_steep else line
 
 
 def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool:
@@ -350,12 +365,12 @@ def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool
     density = bands.derivative
     motion = np.max(density[:valley], initial=0.0)
     rise = density[top] / density[valley]
-    high = rise > (HIGH if motion > RISE * density[valley] else HIGH**2)
-    first, last = int(bands.line[valley]), _before_edge(bands, top)
+    is_high = rise > (HIGH if motion > RISE * density[valley] else HIGH**2)
+    first, last = int(bands.line[valley]), _last_line_before_edge(bands, top)
     if last == bands.line[top] or last - first < LEAST_LINES:
-        chosen = np.flatnonzero(density[valley:] >= HUMP * density[top]) + valley
-        first, last = int(bands.line[chosen[0]]), int(bands.line[chosen[-1]]) + 1
-        if (last - first) * len(spectrum.power) < (FEW_LINES if high else FEWEST_LINES):
+        hump_bands = np.flatnonzero(density[valley:] >= HUMP * density[top]) + valley
+        first, last = int(bands.line[hump_bands[0]]), int(bands.line[hump_bands[-1]]) + 1
+        if (last - first) * len(spectrum.power) < (FEW_LINES if is_high else FEWEST_LINES):
             return False
     power = spectrum.power[:, first:last]
     medians = _medians(spectrum, bands, first, last)
@@ -364,29 +379,31 @@ def _is_noise(spectrum: _Spectrum, bands: _Bands, valley: int, top: int) -> bool
         return False
     lines = np.zeros_like(spectrum.lines)
     lines[:, first:last] = spectrum.lines[:, first:last]
-    ends = max(1, spectrum.samples // TAPERED)
-    window = np.hanning(spectrum.samples)[ends:-ends]
-    course = np.fft.irfft(lines, spectrum.samples)[:, ends:-ends] / window
-    return bool(np.mean(course**4) < (RESTING if high else BURSTS) * np.mean(course**2) ** 2)
+    taper = max(1, spectrum.samples // TAPERED)
+    window = np.hanning(spectrum.samples)[taper:-taper]
+    hump_over_time = np.fft.irfft(lines, spectrum.samples)[:, taper:-taper] / window
+    return bool(
+        np.mean(hump_over_time**4) < (RESTING if is_high else BURSTS) * np.mean(hump_over_time**2) ** 2
+    )
 
 
 PROBES = 8192
 """Number of times at which a derivative is evaluated."""
 
-HIGHER = 3.0
+MIN_RINGING_RATIO = 3.0
 """Smallest peak of an end that rings, over the largest derivative in the middle half. The fourth derivative
 of a polynomial of degree 7 from rest to rest has 2.7."""
 
-HIGHEST = 9.0
+MIN_SHORT_RINGING_RATIO = 9.0
 """The same for an end that may be longer, or turn less; those of a sweep from 0.2 to 4 Hz have 4."""
 
-TURNS = 3
+MIN_SIGN_CHANGES = 3
 """Fewest changes of sign of an end that rings; a motion that starts at once has less."""
 
-LONGEST = 0.75
+MAX_RINGING_SHARE = 0.75
 """Longest end that rings, in quarters of a recording; a sweep fills the last one."""
 
-DECAYED = 0.5
+MAX_DECAY_RATIO = 0.5
 """Largest peak in the last quarter of an end that rings, over its peak; a motion from rest to rest ends as it
 begins."""
 
@@ -401,19 +418,25 @@ def ringing_ends(spline: BSpline[np.float64], inside: tuple[float, float], order
     """
     time = np.linspace(*inside, PROBES)
     derivatives = [spline(time, nu=near)[:, 0] for near in (order - 1, order, order + 1)]
-    probes = max(_ringing(inward) for row in derivatives for inward in (row, row[::-1]))
+    probes = max(_ringing_probes(inward) for row in derivatives for inward in (row, row[::-1]))
     return (probes * float(time[1] - time[0]),) * 2
 
 
-def _ringing(inward: FloatArray) -> int:
+def _ringing_probes(inward: FloatArray) -> int:
     """Return the number of probes of a derivative, from the first on, that ring."""
-    usual = float(np.abs(inward[PROBES // 4 : -PROBES // 4]).max())
-    beyond = np.flatnonzero(np.abs(inward[: PROBES // 4]) > usual)
-    if not beyond.size:
+    middle_peak = float(np.abs(inward[PROBES // 4 : -PROBES // 4]).max())
+    large_indices = np.flatnonzero(np.abs(inward[: PROBES // 4]) > middle_peak)
+    if not large_indices.size:
         return 0
-    end = inward[: int(beyond[-1]) + 1]
-    size, turns = np.abs(end), np.count_nonzero(np.diff(np.sign(end)))
-    decays = size[-len(end) // 4 :].max() < DECAYED * size.max()
-    high = turns >= TURNS - 1 and size.max() > HIGHEST * usual
-    rings = turns >= TURNS and size.max() > HIGHER * usual and len(end) < LONGEST * PROBES / 4
-    return len(end) if decays and (high or rings) else 0
+    end_values = inward[: int(large_indices[-1]) + 1]
+    magnitudes, sign_changes = np.abs(end_values), np.count_nonzero(np.diff(np.sign(end_values)))
+    is_decaying = magnitudes[-len(end_values) // 4 :].max() < MAX_DECAY_RATIO * magnitudes.max()
+    is_large = (
+        sign_changes >= MIN_SIGN_CHANGES - 1 and magnitudes.max() > MIN_SHORT_RINGING_RATIO * middle_peak
+    )
+    is_ringing = (
+        sign_changes >= MIN_SIGN_CHANGES
+        and magnitudes.max() > MIN_RINGING_RATIO * middle_peak
+        and len(end_values) < MAX_RINGING_SHARE * PROBES / 4
+    )
+    return len(end_values) if is_decaying and (is_large or is_ringing) else 0

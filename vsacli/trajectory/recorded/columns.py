@@ -96,7 +96,7 @@ class ColumnNames:
         near_names = {
             name: successor(name, self.possible) or probable_column(name, missing) for name in unknown
         }
-        return {name: near for name, near in near_names.items() if near is not None}
+        return {name: intended for name, intended in near_names.items() if intended is not None}
 
     @cached_property
     def unknown_names(self) -> list[str]:
@@ -140,22 +140,28 @@ class ColumnNames:
         """
         accounted = self.accounted_names
         yield from self.missing_time_problems(RATE_INSTEAD)
-        renamed = TIME not in accounted and bool(self.unknown_names)
+        may_be_renamed = TIME not in accounted and bool(self.unknown_names)
         for name, columns in naming.items():
-            absent = {index: column for index, column in columns.items() if column not in accounted}
-            if not absent:
+            missing_columns = {index: column for index, column in columns.items() if column not in accounted}
+            if not missing_columns:
                 continue
-            whole = len(absent) == len(columns)
-            if name in needed and not (name in COMMANDED and whole):
-                renamed = True
-                meaning = self._describe_joints_without_column(name, absent)
-                yield f"{_describe_missing_columns(absent)}{meaning}; {self._advise_other_name(len(absent))}"
+            all_missing = len(missing_columns) == len(columns)
+            if name in needed and not (name in COMMANDED and all_missing):
+                may_be_renamed = True
+                meaning = self._describe_joints_without_column(name, missing_columns)
+                yield (
+                    f"{_describe_missing_columns(missing_columns)}{meaning}; "
+                    f"{self._advise_other_name(len(missing_columns))}"
+                )
             elif name in needed:
-                yield f"{_describe_missing_columns(absent)}; {self._advise_combination(name)}"
-            elif not whole:
-                every = "axes" if _is_of_wrench(name) else "joints"
-                yield f"{_describe_missing_columns(absent)}; {name} is given for all {every} or for none"
-        if not renamed:
+                yield f"{_describe_missing_columns(missing_columns)}; {self._advise_combination(name)}"
+            elif not all_missing:
+                members = "axes" if _is_of_wrench(name) else "joints"
+                yield (
+                    f"{_describe_missing_columns(missing_columns)}; {name} is given for all {members} "
+                    "or for none"
+                )
+        if not may_be_renamed:
             yield from self.unknown_column_problems()
 
     def _advise_other_name(self, missing: int) -> str:
@@ -172,12 +178,15 @@ class ColumnNames:
         motion = f"position: {{type: csv, file: {self.file}}}"
         return f"a YAML trajectory can combine the motion of this file ({motion}) with a {signal}"
 
-    def _describe_joints_without_column(self, name: str, absent: Mapping[int, str]) -> str:
+    def _describe_joints_without_column(self, name: str, missing_columns: Mapping[int, str]) -> str:
         """Return the meaning of missing columns in parentheses; empty for those of a wrench."""
         if _is_of_wrench(name):
             return ""
         key = POSITION.key if name in POSITION.names else name
-        return f" ({key} of joint{'s'[: len(absent) > 1]} {together(list(absent), self.joint_names)})"
+        return (
+            f" ({key} of joint{'s'[: len(missing_columns) > 1]} "
+            f"{together(list(missing_columns), self.joint_names)})"
+        )
 
 
 def _is_of_wrench(quantity: str) -> bool:
@@ -194,27 +203,27 @@ def probable_column(column: str, missing: Sequence[str]) -> str | None:
     missing_parts = [each.partition(".") for each in missing]
     if not dot or not any(separator for _, separator, _ in missing_parts):
         return nearest(column, missing)
-    near = nearest(quantity, [each for name, _, each in missing_parts if name == joint])
-    if near is not None:
-        return f"{joint}.{near}"
-    near = nearest(joint, [name for name, _, each in missing_parts if each == quantity])
-    return None if near is None else f"{near}.{quantity}"
+    nearest_name = nearest(quantity, [each for name, _, each in missing_parts if name == joint])
+    if nearest_name is not None:
+        return f"{joint}.{nearest_name}"
+    nearest_name = nearest(joint, [name for name, _, each in missing_parts if each == quantity])
+    return None if nearest_name is None else f"{nearest_name}.{quantity}"
 
 
 def misspellings(intended_columns: Mapping[str, str]) -> Iterator[str]:
     """Yield one problem for all columns with the same mistake, in the joint or in the quantity."""
     groups: dict[tuple[str, ...], list[str]] = {}
-    for column, near in intended_columns.items():
-        parts = zip(column.split("."), near.split("."), strict=False)
+    for column, intended in intended_columns.items():
+        parts = zip(column.split("."), intended.split("."), strict=False)
         mistake = [part for pair in parts if pair[0] != pair[1] for part in pair]
         groups.setdefault(tuple(mistake), []).append(column)
     for columns in groups.values():
-        right = [intended_columns[each] for each in columns]
-        if successor(columns[0], right) is None:
-            yield f"{_describe_unknown_columns(columns)}; did you mean {_quote_columns(right)}?"
+        intended_names = [intended_columns[each] for each in columns]
+        if successor(columns[0], intended_names) is None:
+            yield f"{_describe_unknown_columns(columns)}; did you mean {_quote_columns(intended_names)}?"
         else:
             verb = "it is" if len(columns) == 1 else "they are"
-            yield f"{_describe_unknown_columns(columns)}; {verb} now {_quote_columns(right)}"
+            yield f"{_describe_unknown_columns(columns)}; {verb} now {_quote_columns(intended_names)}"
 
 
 def _describe_unknown_columns(columns: Sequence[str]) -> str:
@@ -226,9 +235,9 @@ def _quote_columns(columns: Sequence[str]) -> str:
     return repr(columns[0]) if len(columns) == 1 else listed(columns, MOST_NAMED)
 
 
-def _describe_missing_columns(absent: Mapping[int, str]) -> str:
-    words = "the column {} is missing" if len(absent) == 1 else "the columns {} are missing"
-    return words.format(", ".join(absent.values()))
+def _describe_missing_columns(missing_columns: Mapping[int, str]) -> str:
+    words = "the column {} is missing" if len(missing_columns) == 1 else "the columns {} are missing"
+    return words.format(", ".join(missing_columns.values()))
 
 
 Naming = dict[str, dict[int, str]]
@@ -285,7 +294,7 @@ def _namings_of_all_joints(joints: CommandedJoints) -> list[Naming]:
 def column_layout(
     header: Sequence[str],
     joints: CommandedJoints,
-    wanted: Sequence[Signal],
+    required_signals: Sequence[Signal],
     file: str,
     line: int = 1,
 ) -> ColumnLayout:
@@ -298,7 +307,7 @@ def column_layout(
         header: names of all columns, without duplicates.
         joints: commanded joints. Each must have a column of each quantity that any joint has, except of
             signals that do not command it; such columns are allowed, but not in the layout.
-        wanted: signals whose values are required; their derivatives are optional.
+        required_signals: signals whose values are required; their derivatives are optional.
         file: path of the file, for messages.
         line: line of the header, for messages.
 
@@ -308,9 +317,11 @@ def column_layout(
     headings = [split_heading(text) for text in header]
     names = [name for name, _ in headings]
     namings = [_name_columns(pattern, joints) for pattern in NAMINGS]
-    used = [naming for naming in namings if any(column in names for column in _names_in_naming(naming))]
-    naming = used[0] if used else namings[0]
-    wrenches = (name for signal in wanted if signal.is_wrench for name in signal.names)
+    used_namings = [
+        naming for naming in namings if any(column in names for column in _names_in_naming(naming))
+    ]
+    naming = used_namings[0] if used_namings else namings[0]
+    wrenches = (name for signal in required_signals if signal.is_wrench for name in signal.names)
     expected = [
         TIME,
         *_names_in_naming(naming),
@@ -330,43 +341,45 @@ def column_layout(
         raise InputError.one(message, file, line)
     problems = list(column_names.naming_problems())
     naming = naming | _name_wrench_columns(joints)
-    if len(used) == len(namings):
+    if len(used_namings) == len(namings):
         examples = " and ".join(
             repr(next(column for column in names if column in _names_in_naming(naming))) for naming in namings
         )
         problems.append(f"columns are named both by joint and by number ({examples}); use one way")
         problems += column_names.unknown_column_problems()
     else:
-        problems += column_names.missing_column_problems(naming, {signal.names[0] for signal in wanted})
+        problems += column_names.missing_column_problems(
+            naming, {signal.names[0] for signal in required_signals}
+        )
     factors = unit_factors(headings, _column_units(naming, joints), problems)
-    columns = {names[place]: SignalColumn(place, names[place], factor) for place, factor in factors.items()}
+    columns = {names[index]: SignalColumn(index, names[index], factor) for index, factor in factors.items()}
     if problems:
         raise InputError(Problem(file, line, problem) for problem in problems)
-    of_all_joints = _namings_of_all_joints(joints)
-    of_signals = {
-        key: {column for each in of_all_joints for name in signal.names for column in each[name].values()}
+    all_namings = _namings_of_all_joints(joints)
+    columns_by_signal = {
+        key: {column for each in all_namings for name in signal.names for column in each[name].values()}
         for key, signal in COMMANDED.items()
     }
-    return _assemble_layout(names, columns, naming, of_signals)
+    return _assemble_layout(names, columns, naming, columns_by_signal)
 
 
 def _assemble_layout(
     names: Sequence[str],
     columns: Mapping[str, SignalColumn],
     naming: Naming,
-    of_signals: Mapping[str, Collection[str]],
+    columns_by_signal: Mapping[str, Collection[str]],
 ) -> ColumnLayout:
     """Return the columns of quantities of which no column is missing."""
     return ColumnLayout(
         time=columns[TIME],
         quantities={
-            name: {index: columns[column] for index, column in of_joints.items()}
-            for name, of_joints in naming.items()
-            if all(column in columns for column in of_joints.values())
+            name: {index: columns[column] for index, column in joint_columns.items()}
+            for name, joint_columns in naming.items()
+            if all(column in columns for column in joint_columns.values())
         },
         unused={
-            key: [column for column in names if column in of_signal and column not in columns]
-            for key, of_signal in of_signals.items()
+            key: [column for column in names if column in signal_columns and column not in columns]
+            for key, signal_columns in columns_by_signal.items()
         },
     )
 
@@ -376,9 +389,9 @@ def _name_columns(pattern: str, joints: CommandedJoints) -> Naming:
     return {
         name: {
             index: pattern.format(name=name, joint=joint, number=index + 1, ending="")
-            for index, joint in of_signal
+            for index, joint in joints_of_signal
         }
-        for signal, of_signal in commanded
+        for signal, joints_of_signal in commanded
         for name in signal.names
     }
 
@@ -414,12 +427,12 @@ def unit_factors(
         problems: list to which units that cannot be converted are added.
     """
     factors: dict[int, float] = {}
-    refused: list[tuple[str, str]] = []
-    for place, (name, unit) in enumerate(headings):
+    unit_problems: list[tuple[str, str]] = []
+    for index, (name, unit) in enumerate(headings):
         if name in units:
             try:
-                factors[place] = 1.0 if unit is None else conversion_factor(unit, units[name])
+                factors[index] = 1.0 if unit is None else conversion_factor(unit, units[name])
             except InputError as error:
-                refused.append((name, str(error)))
-    problems.extend(group_column_problems(refused))
+                unit_problems.append((name, str(error)))
+    problems.extend(group_column_problems(unit_problems))
     return factors

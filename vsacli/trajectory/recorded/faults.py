@@ -81,8 +81,10 @@ class Quantization:
         differences, quantum = _divided_differences(time, values), _quantum(values)
         blocks = np.maximum(np.arange(len(values)) - ORDER // 2, 0) // BLOCK
         noise = _noise_of_blocks(differences)
-        near = noise[np.minimum(blocks, len(noise) - 1)]
-        return cls(differences, quantum, noise, np.maximum(NOISE_DEVIATIONS * near, QUANTA * quantum))
+        noise_near_sample = noise[np.minimum(blocks, len(noise) - 1)]
+        return cls(
+            differences, quantum, noise, np.maximum(NOISE_DEVIATIONS * noise_near_sample, QUANTA * quantum)
+        )
 
 
 def _noise_of_blocks(differences: FloatArray) -> FloatArray:
@@ -91,10 +93,10 @@ def _noise_of_blocks(differences: FloatArray) -> FloatArray:
     Outliers do not change the medians. The largest of three blocks counts, since noise may begin with a
     motion.
     """
-    whole = len(differences) // BLOCK * BLOCK
-    rows = differences[:whole].reshape(-1, BLOCK) if whole else differences[None]
-    near = np.pad(np.median(np.abs(rows), axis=1) / NORMAL_MEDIAN, 1, mode="edge")
-    return np.maximum(np.maximum(near[:-2], near[1:-1]), near[2:])
+    full_block_samples = len(differences) // BLOCK * BLOCK
+    rows = differences[:full_block_samples].reshape(-1, BLOCK) if full_block_samples else differences[None]
+    padded_deviations = np.pad(np.median(np.abs(rows), axis=1) / NORMAL_MEDIAN, 1, mode="edge")
+    return np.maximum(np.maximum(padded_deviations[:-2], padded_deviations[1:-1]), padded_deviations[2:])
 
 
 def _divided_differences(time: FloatArray, values: FloatArray) -> FloatArray:
@@ -105,25 +107,25 @@ def _divided_differences(time: FloatArray, values: FloatArray) -> FloatArray:
         stop = min(start + CHUNK, count)
         nodes = [time[start + i : stop + i] for i in range(ORDER + 1)]
         span = nodes[-1] - nodes[0]
-        total, size = np.zeros(stop - start), np.zeros(stop - start)
+        difference_sums, squared_weights = np.zeros(stop - start), np.zeros(stop - start)
         for i, node in enumerate(nodes):
             weight = np.ones(stop - start)
             for other_node in (*nodes[:i], *nodes[i + 1 :]):
                 weight *= span / (node - other_node)
-            total += weight * values[start + i : stop + i]
-            size += weight**2
-        differences[start:stop] = total / np.sqrt(size)
+            difference_sums += weight * values[start + i : stop + i]
+            squared_weights += weight**2
+        differences[start:stop] = difference_sums / np.sqrt(squared_weights)
     return differences
 
 
 def _quantum(values: FloatArray) -> float:
     """Return the smallest typical change between samples above rounding and the resolution of sensors."""
-    largest = float(np.abs(values).max())
+    max_magnitude = float(np.abs(values).max())
     changes = np.abs(np.diff(values, n=2))
-    changes = changes[changes > ROUNDING * largest]
-    place = int(FINEST * len(changes))
-    change = float(np.partition(changes, place)[place]) if len(changes) else 0.0
-    return max(change, UNRESOLVED * largest)
+    changes = changes[changes > ROUNDING * max_magnitude]
+    quantile_index = int(FINEST * len(changes))
+    change = float(np.partition(changes, quantile_index)[quantile_index]) if len(changes) else 0.0
+    return max(change, UNRESOLVED * max_magnitude)
 
 
 END_WEIGHTS = np.append(1.0, -np.vander([0.0], 4) @ np.linalg.pinv(np.vander(np.arange(1.0, 11.0), 4)))
@@ -170,12 +172,12 @@ class Outliers(Faults):
 
     curve: FloatArray
 
-    def except_for(self, excepted: BoolArray) -> Outliers | None:
+    def except_for(self, is_excepted: BoolArray) -> Outliers | None:
         """Return the outliers except some, by a mask, (outliers,); None if none are left."""
-        kept = ~excepted
-        if not kept.any():
+        is_kept = ~is_excepted
+        if not is_kept.any():
             return None
-        return Outliers(self.first[kept], self.last[kept], self.sizes[kept], self.curve[kept])
+        return Outliers(self.first[is_kept], self.last[is_kept], self.sizes[is_kept], self.curve[is_kept])
 
     def smoothed(self, values: FloatArray) -> FloatArray:
         """Return a copy of the column, (samples,), with the curve instead of the outliers."""
@@ -186,10 +188,10 @@ class Outliers(Faults):
 
 def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -> Outliers | None:
     """Return samples, up to three together, that are far off a smooth curve through their neighbors."""
-    size = np.abs(quantization.differences)
-    centers = np.arange(len(size)) + ORDER // 2
-    off = size > quantization.noticeable[centers]
-    events = _largest_disturbances(centers[off], size[off])
+    magnitudes = np.abs(quantization.differences)
+    centers = np.arange(len(magnitudes)) + ORDER // 2
+    is_noticeable = magnitudes > quantization.noticeable[centers]
+    events = _largest_disturbances(centers[is_noticeable], magnitudes[is_noticeable])
     isolated = [_isolated_outliers(time, values, event, quantization) for event in events]
     error_of_sample = dict(_outliers_at_ends(values, quantization))
     for event, samples in zip(events, isolated, strict=True):
@@ -202,9 +204,9 @@ def outliers(time: FloatArray, values: FloatArray, quantization: Quantization) -
             error_of_sample.update(samples)
     if not error_of_sample:
         return None
-    where = np.array(sorted(error_of_sample))
-    errors = np.array([error_of_sample[sample] for sample in where.tolist()])
-    return Outliers(where, where, np.abs(errors), values[where] - errors)
+    indices = np.array(sorted(error_of_sample))
+    errors = np.array([error_of_sample[sample] for sample in indices.tolist()])
+    return Outliers(indices, indices, np.abs(errors), values[indices] - errors)
 
 
 def derivative_outliers(
@@ -221,13 +223,17 @@ def derivative_outliers(
         values: derivative, (samples,).
         quantization: its resolution.
     """
-    if lower is None or (off := outliers(time, values, quantization)) is None:
+    if lower is None or (candidates := outliers(time, values, quantization)) is None:
         return None
-    at = np.clip(off.first, 1, len(time) - 2)
-    spans = [(at - 1, at), (at, at + 1), (at - 1, at + 1)]
+    indices = np.clip(candidates.first, 1, len(time) - 2)
+    spans = [(indices - 1, indices), (indices, indices + 1), (indices - 1, indices + 1)]
     slopes = np.array([_speed(time, lower, *span) for span in spans])
-    of_value, of_curve = (np.abs(slopes - row).min(axis=0) for row in (values[off.first], off.curve))
-    return off.except_for(of_value <= np.maximum(of_curve, DIFFERENCED * off.sizes))
+    value_distances, curve_distances = (
+        np.abs(slopes - row).min(axis=0) for row in (values[candidates.first], candidates.curve)
+    )
+    return candidates.except_for(
+        value_distances <= np.maximum(curve_distances, DIFFERENCED * candidates.sizes)
+    )
 
 
 class _Disturbance(NamedTuple):
@@ -244,10 +250,13 @@ def _largest_disturbances(centers: IndexArray, size: FloatArray) -> list[_Distur
         return []
     starts = np.flatnonzero(np.append(True, np.diff(centers) > ORDER))
     stops = np.append(starts[1:], len(centers)) - 1
-    largest = np.maximum.reduceat(size, starts)
-    chosen = np.argsort(-largest, kind="stable")[:MOST_EVENTS]
-    firsts, lasts = centers[starts[chosen]] - ORDER // 2, centers[stops[chosen]] + ORDER // 2
-    return list(map(_Disturbance, firsts.tolist(), lasts.tolist(), largest[chosen].tolist()))
+    peak_sizes = np.maximum.reduceat(size, starts)
+    largest_indices = np.argsort(-peak_sizes, kind="stable")[:MOST_EVENTS]
+    firsts, lasts = (
+        centers[starts[largest_indices]] - ORDER // 2,
+        centers[stops[largest_indices]] + ORDER // 2,
+    )
+    return list(map(_Disturbance, firsts.tolist(), lasts.tolist(), peak_sizes[largest_indices].tolist()))
 
 
 def _outliers_at_ends(values: FloatArray, quantization: Quantization) -> Iterator[tuple[int, float]]:
@@ -255,10 +264,10 @@ def _outliers_at_ends(values: FloatArray, quantization: Quantization) -> Iterato
     for end, inward in ((0, values), (len(values) - 1, values[::-1])):
         if len(values) < 2 * END_SAMPLES:
             continue
-        near = sliding_window_view(inward[: END_SAMPLES + len(END_WEIGHTS)], len(END_WEIGHTS))
-        error, *other_errors = near @ END_WEIGHTS
-        least = float(quantization.noticeable[end]) * float(np.linalg.norm(END_WEIGHTS))
-        if abs(error) > max(END_SHARE * np.abs(other_errors).max(), least):
+        windows = sliding_window_view(inward[: END_SAMPLES + len(END_WEIGHTS)], len(END_WEIGHTS))
+        error, *other_errors = windows @ END_WEIGHTS
+        min_error = float(quantization.noticeable[end]) * float(np.linalg.norm(END_WEIGHTS))
+        if abs(error) > max(END_SHARE * np.abs(other_errors).max(), min_error):
             yield end, float(error)
 
 
@@ -269,31 +278,31 @@ def _isolated_outliers(
     if event.last - event.first > 2 * (ORDER + MOST_TOGETHER):
         return []
     first, last = max(0, event.first - MARGIN), min(len(values) - 1, event.last + MARGIN)
-    near, kept = values[first : last + 1], np.ones(last + 1 - first, dtype=bool)
-    least = float(quantization.noticeable[event.first])
-    place = time[first : last + 1] - time[first]
-    powers = np.vander(2 * place / place[-1] - 1, POLYNOMIAL + 1)
+    neighbor_values, is_kept = values[first : last + 1], np.ones(last + 1 - first, dtype=bool)
+    min_error = float(quantization.noticeable[event.first])
+    elapsed = time[first : last + 1] - time[first]
+    powers = np.vander(2 * elapsed / elapsed[-1] - 1, POLYNOMIAL + 1)
     errors_of_samples: list[tuple[int, float]] = []
-    for _ in range(min(MOST_TOGETHER, len(near) - POLYNOMIAL - 3)):
-        residual, leverage = _residuals_and_leverages(powers, near, kept)
+    for _ in range(min(MOST_TOGETHER, len(neighbor_values) - POLYNOMIAL - 3)):
+        residual, leverage = _residuals_and_leverages(powers, neighbor_values, is_kept)
         studentized = np.abs(residual) / np.sqrt(np.maximum(1 - leverage, 1e-9))
-        kept[int(np.argmax(np.where(kept, studentized, 0.0)))] = False
-        residual, leverage = _residuals_and_leverages(powers, near, kept)
-        rest = np.sqrt(np.sum(residual[kept] ** 2) / (kept.sum() - POLYNOMIAL - 1))
-        sure = max(FIT_DEVIATIONS * rest, least) * np.sqrt(1 + leverage)
-        if np.all(np.abs(residual) >= sure, where=~kept):
-            samples = first + np.flatnonzero(~kept)
-            errors_of_samples = list(zip(samples.tolist(), residual[~kept].tolist(), strict=True))
+        is_kept[int(np.argmax(np.where(is_kept, studentized, 0.0)))] = False
+        residual, leverage = _residuals_and_leverages(powers, neighbor_values, is_kept)
+        residual_deviation = np.sqrt(np.sum(residual[is_kept] ** 2) / (is_kept.sum() - POLYNOMIAL - 1))
+        outlier_bound = max(FIT_DEVIATIONS * residual_deviation, min_error) * np.sqrt(1 + leverage)
+        if np.all(np.abs(residual) >= outlier_bound, where=~is_kept):
+            samples = first + np.flatnonzero(~is_kept)
+            errors_of_samples = list(zip(samples.tolist(), residual[~is_kept].tolist(), strict=True))
     unconfirmed = {0, len(values) - 1}  # the ends have neighbors on one side only
     return [] if unconfirmed & dict(errors_of_samples).keys() else errors_of_samples
 
 
 def _residuals_and_leverages(
-    powers: FloatArray, values: FloatArray, kept: BoolArray
+    powers: FloatArray, values: FloatArray, is_kept: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return values minus the polynomial fitted to those kept, and leverages: variance per noise variance."""
-    inverse = np.linalg.pinv(powers[kept])
-    return values - powers @ (inverse @ values[kept]), np.sum((powers @ inverse) ** 2, axis=1)
+    inverse = np.linalg.pinv(powers[is_kept])
+    return values - powers @ (inverse @ values[is_kept]), np.sum((powers @ inverse) ** 2, axis=1)
 
 
 def rows_per_value(values: FloatArray, quantization: Quantization) -> int:

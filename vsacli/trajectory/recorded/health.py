@@ -44,22 +44,24 @@ from vsacli.trajectory.recorded.thresholds import (
 def stamp_faults(stamps: FloatArray) -> Iterator[SampleProblem]:
     """Yield the faults of ascending stamps, (samples,), s."""
     steps = np.diff(stamps)
-    usual = float(np.median(steps))
-    if len(stamps) >= ENOUGH_ROWS and not SHORTEST_STEP <= usual <= LONGEST_STEP:
-        yield SampleProblem("time", _suspect_unit(usual, float(stamps[-1] - stamps[0])))
+    median_step = float(np.median(steps))
+    if len(stamps) >= ENOUGH_ROWS and not SHORTEST_STEP <= median_step <= LONGEST_STEP:
+        yield SampleProblem("time", _suspect_unit(median_step, float(stamps[-1] - stamps[0])))
         return
-    long = np.flatnonzero(steps > GAP_STEPS * usual)
-    if long.size:
-        worst = long[np.argmax(steps[long])]
-        gaps = "a gap" if len(long) == 1 else f"{len(long)} gaps, the longest"
+    long_indices = np.flatnonzero(steps > GAP_STEPS * median_step)
+    if long_indices.size:
+        longest_index = long_indices[np.argmax(steps[long_indices])]
+        gaps = "a gap" if len(long_indices) == 1 else f"{len(long_indices)} gaps, the longest"
         yield SampleProblem(
             "time",
-            f"has {gaps} of {step_text(float(steps[worst]))} from t = {time_text(float(stamps[worst]))} on;"
-            f" rows are usually {step_text(usual)} apart. Motion and torques meanwhile are a guess of the"
+            f"has {gaps} of {step_text(float(steps[longest_index]))} from t = "
+            f"{time_text(float(stamps[longest_index]))} on;"
+            f" rows are usually {step_text(median_step)} apart. Motion and torques meanwhile are "
+            "a guess of the"
             " spline: cut the recording there, or record again",
-            sample=int(worst) + 1,
+            sample=int(longest_index) + 1,
         )
-    jitter = _jitter(stamps, steps, usual)
+    jitter = _jitter(stamps, steps, median_step)
     if jitter > JITTER_SHARE:
         rate = mean_rate(stamps)
         yield SampleProblem(
@@ -82,21 +84,21 @@ def step_text(step: float) -> str:
     return f"{size:.3g} {unit}"
 
 
-def _suspect_unit(usual: float, duration: float) -> str:
-    rows = f"rows are {usual:.4g} s apart, and the recording lasts {float(f'{duration:.4g}'):g} s"
-    unit = unit_of_steps(usual)
+def _suspect_unit(median_step: float, duration: float) -> str:
+    rows = f"rows are {median_step:.4g} s apart, and the recording lasts {float(f'{duration:.4g}'):g} s"
+    unit = unit_of_steps(median_step)
     if unit is None:
         return f"is hardly in seconds: {rows}; write its unit in the header, e.g. time[ms]"
-    apart = step_text(usual * UNITS[unit])
-    return f"looks like {unit}: {rows}; if rows are {apart} apart, write time[{unit}] in the header"
+    interval_text = step_text(median_step * UNITS[unit])
+    return f"looks like {unit}: {rows}; if rows are {interval_text} apart, write time[{unit}] in the header"
 
 
-def _jitter(stamps: FloatArray, steps: FloatArray, usual: float) -> float:
+def _jitter(stamps: FloatArray, steps: FloatArray, median_step: float) -> float:
     """Return the median change of successive intervals, in intervals, beyond that due to their resolution."""
     if len(steps) < 2:
         return 0.0
     change = float(np.median(np.abs(np.diff(steps))))
-    return max(0.0, change - 2 * stamp_resolution(stamps)) / usual
+    return max(0.0, change - 2 * stamp_resolution(stamps)) / median_step
 
 
 class CheckedSignals(NamedTuple):
@@ -141,15 +143,19 @@ def check_health(
             for component in np.flatnonzero(record.has_values).tolist():
                 row, unit = columns[name][component], _format_unit(quantity, component, types)
                 if lower is None:
-                    angle = record.signal is POSITION
+                    is_angle = record.signal is POSITION
                     ends = LEFT_OUT if measured else USED
-                    off, sentences = _check_values(stamps, record.time, row, unit, ends, angle=angle)
+                    column_outliers, sentences = _check_values(
+                        stamps, record.time, row, unit, ends, angle=is_angle
+                    )
                 else:
-                    below = columns.get(lower)
-                    below = None if below is None else below[component]
-                    off, sentences = _check_derivative(stamps, record.time, below, row, unit)
-                if off is not None and measured:
-                    row[:] = off.smoothed(row)
+                    lower_values = columns.get(lower)
+                    lower_values = None if lower_values is None else lower_values[component]
+                    column_outliers, sentences = _check_derivative(
+                        stamps, record.time, lower_values, row, unit
+                    )
+                if column_outliers is not None and measured:
+                    row[:] = column_outliers.smoothed(row)
                 checked.problems.extend(
                     SampleProblem(name, sentence, component, first) for first, sentence in sentences
                 )
@@ -166,15 +172,15 @@ def unit_doubts(records: Sequence[SignalSamples], types: Mapping[int, str]) -> I
     """
     for record in records:
         for index, kind in types.items() if record.signal is POSITION else ():
-            name, largest = POSITION.names[0], float(np.abs(record.values[index]).max())
-            if kind == "revolute" and largest > LARGEST_ANGLE:
-                extent = f"{largest:.4g} rad, {largest / (2 * np.pi):.3g} turns"
+            name, max_magnitude = POSITION.names[0], float(np.abs(record.values[index]).max())
+            if kind == "revolute" and max_magnitude > LARGEST_ANGLE:
+                extent = f"{max_magnitude:.4g} rad, {max_magnitude / (2 * np.pi):.3g} turns"
                 yield SampleProblem(
                     name, f"goes to {extent}; are these degrees? {_advise_unit('deg')}", index
                 )
-            elif kind == "prismatic" and largest > LARGEST_TRAVEL:
+            elif kind == "prismatic" and max_magnitude > LARGEST_TRAVEL:
                 yield SampleProblem(
-                    name, f"goes to {largest:.4g} m; are these mm? {_advise_unit('mm')}", index
+                    name, f"goes to {max_magnitude:.4g} m; are these mm? {_advise_unit('mm')}", index
                 )
 
 
@@ -227,13 +233,15 @@ def _check_values(
         return None, []
     quantization = Quantization.of(time, values)
     if (rows := rows_per_value(values, quantization)) > 1:
-        slow = f"has each value in {rows} rows: its sensor is slower than the stamps; keep one row in {rows}"
-        return None, [(0, slow)]
-    off = outliers(time, values, quantization)
-    smooth = values if off is None else off.smoothed(values)
-    return off, [
-        *_outlier_sentences(off, stamps, unit, ends),
-        *_stretch_faults(stamps, time, smooth, quantization, unit, angle=angle),
+        sensor_sentence = (
+            f"has each value in {rows} rows: its sensor is slower than the stamps; keep one row in {rows}"
+        )
+        return None, [(0, sensor_sentence)]
+    column_outliers = outliers(time, values, quantization)
+    smoothed = values if column_outliers is None else column_outliers.smoothed(values)
+    return column_outliers, [
+        *_outlier_sentences(column_outliers, stamps, unit, ends),
+        *_stretch_faults(stamps, time, smoothed, quantization, unit, angle=angle),
     ]
 
 
@@ -243,19 +251,22 @@ def _check_derivative(
     """Check a column of a given derivative, which may rest, saturate or be held while the values move."""
     if np.ptp(values) == 0:
         return None, []
-    off = derivative_outliers(time, lower, values, Quantization.of(time, values))
-    return off, list(_outlier_sentences(off, stamps, unit, LEFT_OUT))
+    column_outliers = derivative_outliers(time, lower, values, Quantization.of(time, values))
+    return column_outliers, list(_outlier_sentences(column_outliers, stamps, unit, LEFT_OUT))
 
 
 def _outlier_sentences(
-    off: Outliers | None, stamps: FloatArray, unit: str, ends: tuple[str, str]
+    column_outliers: Outliers | None, stamps: FloatArray, unit: str, ends: tuple[str, str]
 ) -> Iterator[tuple[int, str]]:
-    if off is not None:
-        extent = _format_worst(off, stamps, [f"{size:.3g}{unit}" for size in off.sizes.tolist()])
+    if column_outliers is not None:
+        extent = _format_worst(
+            column_outliers, stamps, [f"{size:.3g}{unit}" for size in column_outliers.sizes.tolist()]
+        )
         yield (
-            off.at,
-            f"is off {_format_occasions(off, stamps)}, by {extent} from a smooth curve, amid samples that"
-            f" are on it: {ends[off.count > 1]}",
+            column_outliers.at,
+            f"is off {_format_occasions(column_outliers, stamps)}, by {extent} from a smooth "
+            "curve, amid samples that"
+            f" are on it: {ends[column_outliers.count > 1]}",
         )
 
 
@@ -268,18 +279,19 @@ def _stretch_faults(
     *,
     angle: bool,
 ) -> Iterator[tuple[int, str]]:
-    if stuck := frozen_stretches(time, values, quantization):
+    if frozen := frozen_stretches(time, values, quantization):
         yield (
-            stuck.at,
-            f"is frozen {_format_occasions(stuck, stamps)}, for {_format_longest(stuck, stamps)},"
-            f" {_count_equal_samples(stuck)}, while the motion goes on: these samples were lost;"
-            f" {_advise_frozen_rows(stuck, stamps)}, or record again",
+            frozen.at,
+            f"is frozen {_format_occasions(frozen, stamps)}, for {_format_longest(frozen, stamps)},"
+            f" {_count_equal_samples(frozen)}, while the motion goes on: these samples were lost;"
+            f" {_advise_frozen_rows(frozen, stamps)}, or record again",
         )
-    if cut := saturated_stretches(time, values, quantization):
-        at = f"{values[cut.first[0]]:.4g}{unit}"
+    if saturated := saturated_stretches(time, values, quantization):
+        at = f"{values[saturated.first[0]]:.4g}{unit}"
         yield (
-            cut.at,
-            f"is cut off at {at} {_format_occasions(cut, stamps)}, for {_format_longest(cut, stamps)}"
+            saturated.at,
+            f"is cut off at {at} {_format_occasions(saturated, stamps)}, for "
+            f"{_format_longest(saturated, stamps)}"
             " while the motion goes on: the sensor or the log file has no larger range; record again",
         )
     if angle and (wrapped := angle_wraps(values)):
@@ -311,17 +323,17 @@ def _format_longest(faults: Faults, stamps: FloatArray) -> str:
     return _format_worst(faults, stamps, [step_text(size) for size in faults.sizes.tolist()])
 
 
-def _count_equal_samples(stuck: Faults) -> str:
+def _count_equal_samples(frozen: Faults) -> str:
     """Return the number of equal samples of the longest frozen stretch."""
-    return f"{int(stuck.last[stuck.worst] - stuck.first[stuck.worst]) + 1} equal samples"
+    return f"{int(frozen.last[frozen.worst] - frozen.first[frozen.worst]) + 1} equal samples"
 
 
-def _advise_frozen_rows(stuck: Faults, stamps: FloatArray) -> str:
+def _advise_frozen_rows(frozen: Faults, stamps: FloatArray) -> str:
     """Return what to do with frozen stretches: within a recording, deleting a long one leaves a gap."""
-    inner = (stuck.first > 0) & (stuck.last + 1 < len(stamps))
-    if not inner.any():
+    is_inner = (frozen.first > 0) & (frozen.last + 1 < len(stamps))
+    if not is_inner.any():
         return "delete these rows"
-    gaps = stamps[stuck.last[inner] + 1] - stamps[stuck.first[inner]]
+    gaps = stamps[frozen.last[is_inner] + 1] - stamps[frozen.first[is_inner]]
     if gaps.max() > GAP_STEPS * float(np.median(np.diff(stamps))):
         return "cut the recording in two there"
     return "delete all but the first of these rows"

@@ -29,7 +29,7 @@ AGREEING = 0.05
 peak; and of a lower function at the end of a piece, relative to its largest change over a piece. Smooth
 motions of 0.25 s have 1e-3 at 500 Hz and 0.03 at 100 Hz; second derivatives of six digits 0.2 at 1 kHz."""
 
-LOOKED_AT = 0.25
+MIN_CHECK_INSTANTS = 0.25
 """Place in a piece, as a share, at which the highest derivative is compared: there a wrong change of the
 function from end to end has the largest effect, while half-way it has none."""
 
@@ -130,8 +130,10 @@ def _integration_errors(time: FloatArray, rows: FloatArray) -> FloatArray:
         _evaluate_derivative(coefficients, order, one) / width**order - row[:, 1:]
         for order, row in enumerate(rows[:-MATCHED])
     ]
-    inside = _evaluate_derivative(coefficients, len(rows) - 1, LOOKED_AT * one) / width ** (len(rows) - 1)
-    between = inside - (highest[:, :-1] + LOOKED_AT * np.diff(highest))
+    inside = _evaluate_derivative(coefficients, len(rows) - 1, MIN_CHECK_INSTANTS * one) / width ** (
+        len(rows) - 1
+    )
+    between = inside - (highest[:, :-1] + MIN_CHECK_INSTANTS * np.diff(highest))
     return np.asarray(np.abs(np.stack([*ends, between])).max(axis=2))
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from vsacli.base.arrays import BoolArray, FloatArray, IndexArray
 from vsacli.base.texts import counted
 from vsacli.base.units import time_text
-from vsacli.trajectory.curves.closed_form import LONGEST, SHORTEST
+from vsacli.trajectory.curves.closed_form import MAX_DURATION, MIN_DURATION
 from vsacli.trajectory.recorded.samples import SignalSamples
 
 TICKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of 32-bit counters, s
@@ -57,7 +57,7 @@ def find_disorder(stamps: FloatArray) -> Disorder | None:
     steps = np.diff(stamps) if np.isfinite(stamps).all() else np.ones(1)
     if np.all(steps > 0):
         return None
-    return next(filter(None, _patterns(stamps, steps)))
+    return next(filter(None, _possible_disorders(stamps, steps)))
 
 
 def replace_stamps(stamps: FloatArray, rate: float | None) -> tuple[FloatArray, Disorder | None]:
@@ -68,66 +68,86 @@ def replace_stamps(stamps: FloatArray, rate: float | None) -> tuple[FloatArray, 
     return np.arange(len(stamps)) / rate, disorder
 
 
-def _patterns(stamps: FloatArray, steps: FloatArray) -> Iterator[Disorder | None]:
+def _possible_disorders(stamps: FloatArray, steps: FloatArray) -> Iterator[Disorder | None]:
     failures = np.flatnonzero(~(steps > 0))
-    usual = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    median_step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
     if np.all(steps[failures] < 0):
-        yield _wrap(stamps, steps, usual)
-        yield _restart(stamps, steps, failures)
+        yield _counter_wrap(stamps, steps, median_step)
+        yield _recording_restart(stamps, steps, failures)
     elif np.all(steps[failures] == 0):
-        yield _repeats(stamps, steps, int(failures[0]))
-    first = int(failures[0]) + 1
-    before, after = (f"{value:.9g} s" for value in stamps[first - 1 : first + 1].tolist())
-    cause = f"{before} appears twice" if before == after else f"{after} follows {before}"
+        yield _repeated_stamps(stamps, steps, int(failures[0]))
+    first_failure = int(failures[0]) + 1
+    previous_text, next_text = (
+        f"{value:.9g} s" for value in stamps[first_failure - 1 : first_failure + 1].tolist()
+    )
+    cause = (
+        f"{previous_text} appears twice"
+        if previous_text == next_text
+        else f"{next_text} follows {previous_text}"
+    )
     cause += f" ({len(failures)} such rows)" if len(failures) > 1 else ""
-    rate = rounded_rate(1 / usual) if usual > 0 else math.nan
+    rate = rounded_rate(1 / median_step) if median_step > 0 else math.nan
     advice = f"correct these stamps, or set {_rate_text(rate)} in their place if the rows are equally spaced"
-    yield Disorder(first, cause, advice, rate)
+    yield Disorder(first_failure, cause, advice, rate)
 
 
-def _wrap(stamps: FloatArray, steps: FloatArray, usual: float) -> Disorder | None:
+def _counter_wrap(stamps: FloatArray, steps: FloatArray, median_step: float) -> Disorder | None:
     """Return that a 32-bit counter begins again, if every fall is of its size."""
-    falls = steps < 0
+    is_falling = steps < 0
     for unit, size in TICKS.items():
-        whole = 2.0**32 * size
-        if np.all(np.abs(steps[falls] + whole) <= min(WRAP_STEPS * usual, 0.05 * whole)):
-            rate = rounded_rate(len(steps) / float(steps.sum() + whole * falls.sum()))
-            first = int(np.argmax(falls)) + 1
-            cause = f"falls by 2**32 {unit} after {stamps[first - 1]:.9g} s, as a 32-bit counter that wraps"
-            advice = f"set rate: {rate:g} in place of the stamps, or add {whole:.10g} s from this row on"
-            return Disorder(first, cause, advice, rate)
+        counter_range = 2.0**32 * size
+        if np.all(
+            np.abs(steps[is_falling] + counter_range) <= min(WRAP_STEPS * median_step, 0.05 * counter_range)
+        ):
+            rate = rounded_rate(len(steps) / float(steps.sum() + counter_range * is_falling.sum()))
+            first_fall = int(np.argmax(is_falling)) + 1
+            cause = (
+                f"falls by 2**32 {unit} after {stamps[first_fall - 1]:.9g} s, as a 32-bit counter that wraps"
+            )
+            advice = (
+                f"set rate: {rate:g} in place of the stamps, or add {counter_range:.10g} s from this row on"
+            )
+            return Disorder(first_fall, cause, advice, rate)
     return None
 
 
-def _restart(stamps: FloatArray, steps: FloatArray, failures: IndexArray) -> Disorder | None:
+def _recording_restart(stamps: FloatArray, steps: FloatArray, failures: IndexArray) -> Disorder | None:
     """Return that the recording begins again, if stamps fall rarely, and by about their whole range."""
     starts = np.append(0, failures[:-1] + 1)
     ranges = stamps[failures] - stamps[starts]
-    far = np.all(-steps[failures] >= RESTART_SHARE * ranges) and np.all(failures - starts >= ENOUGH_STEPS)
-    if not far:
+    is_restart = np.all(-steps[failures] >= RESTART_SHARE * ranges) and np.all(
+        failures - starts >= ENOUGH_STEPS
+    )
+    if not is_restart:
         return None
-    first = int(failures[0]) + 1
-    times = "" if len(failures) == 1 else f", and {counted(len(failures) - 1, 'time')} more"
-    cause = f"{stamps[first]:.9g} s follows {stamps[first - 1]:.9g} s{times}: the recording begins again"
-    return Disorder(first, f"{cause}, as in a bag played in a loop", "cut the file in two before this row")
+    first_failure = int(failures[0]) + 1
+    count_text = "" if len(failures) == 1 else f", and {counted(len(failures) - 1, 'time')} more"
+    cause = (
+        f"{stamps[first_failure]:.9g} s follows {stamps[first_failure - 1]:.9g} s{count_text}: the "
+        "recording begins again"
+    )
+    return Disorder(
+        first_failure, f"{cause}, as in a bag played in a loop", "cut the file in two before this row"
+    )
 
 
-def _repeats(stamps: FloatArray, steps: FloatArray, start: int) -> Disorder | None:
+def _repeated_stamps(stamps: FloatArray, steps: FloatArray, start: int) -> Disorder | None:
     """Return that stamps have too few digits, if many repeat and the others are multiples of one step."""
-    coarse = steps[start:]
-    repeated, rises = int(np.count_nonzero(coarse == 0)), coarse[coarse > 0]
-    if not rises.size or repeated < REPEATED_SHARE * len(coarse):
+    later_steps = steps[start:]
+    repeated_count, rises = int(np.count_nonzero(later_steps == 0)), later_steps[later_steps > 0]
+    if not rises.size or repeated_count < REPEATED_SHARE * len(later_steps):
         return None
-    grain = float(rises.min())
-    if np.any(np.abs(rises / grain - np.round(rises / grain)) > 0.2):  # no multiples of one step
+    stamp_step = float(rises.min())
+    if np.any(np.abs(rises / stamp_step - np.round(rises / stamp_step)) > 0.2):  # no multiples of one step
         return None
     first, last = (np.flatnonzero(steps > 0)[[0, -1]] + 1).tolist()  # rows where a stamp begins
-    fine = steps[: max(0, start - 1)]
-    even = fine if len(fine) >= ENOUGH_STEPS else steps[first:last]
-    rate = rounded_rate(len(even) / float(even.sum())) if len(even) else math.nan
+    earlier_steps = steps[: max(0, start - 1)]
+    rate_steps = earlier_steps if len(earlier_steps) >= ENOUGH_STEPS else steps[first:last]
+    rate = rounded_rate(len(rate_steps) / float(rate_steps.sum())) if len(rate_steps) else math.nan
     cause = (
-        f"{counted(repeated, 'row')} from {stamps[start]:.9g} s on repeat the stamp before: stamps with too"
-        f" few digits, in steps of {grain:.3g} s"
+        f"{counted(repeated_count, 'row')} from {stamps[start]:.9g} s on repeat the stamp before: "
+        "stamps with too"
+        f" few digits, in steps of {stamp_step:.3g} s"
     )
     advice = f"the rows are in order: set {_rate_text(rate)} in place of the stamps"
     return Disorder(start + 1, cause, advice, rate)
@@ -139,8 +159,8 @@ def _rate_text(rate: float) -> str:
 
 def rounded_rate(rate: float) -> float:
     """Return a rate, 1/s, with the fewest digits that it needs; with four if these do not suffice."""
-    rounded = [float(f"{rate:.{digits}g}") for digits in (3, 4, 5, 6)]
-    return next((each for each in rounded if abs(each - rate) <= 1e-5 * rate), rounded[1])
+    rounded_rates = [float(f"{rate:.{digits}g}") for digits in (3, 4, 5, 6)]
+    return next((each for each in rounded_rates if abs(each - rate) <= 1e-5 * rate), rounded_rates[1])
 
 
 LARGEST_VALUE = 1e100
@@ -169,18 +189,22 @@ def time_problems(time: FloatArray) -> Iterator[SampleProblem]:
         yield SampleProblem("time", f"must be finite, not {time[sample]}", sample=sample)
     elif (disorder := find_disorder(time)) is not None:
         yield SampleProblem("time", disorder.message, sample=disorder.sample)
-    elif len(time) > 1 and not SHORTEST <= time[-1] - time[0] <= LONGEST:
+    elif len(time) > 1 and not MIN_DURATION <= time[-1] - time[0] <= MAX_DURATION:
         yield SampleProblem(
-            "time", f"must go on for {SHORTEST:g} to {LONGEST:g} s, not {time[-1] - time[0]:g} s"
+            "time", f"must go on for {MIN_DURATION:g} to {MAX_DURATION:g} s, not {time[-1] - time[0]:g} s"
         )
 
 
 def sample_problems(records: Sequence[SignalSamples]) -> Iterator[SampleProblem]:
     """Yield the problems of recorded signals: too few samples, once for all signals, and of their values."""
-    most = max(records, key=lambda each: each.signal.spline_degree, default=None)
-    if most is not None and len(most.time) <= (degree := most.signal.spline_degree):
-        count = counted(len(most.time), "sample")
-        yield SampleProblem(most.signal.names[0], f"has {count}; a trajectory needs at least {degree + 1}")
+    most_demanding = max(records, key=lambda each: each.signal.spline_degree, default=None)
+    if most_demanding is not None and len(most_demanding.time) <= (
+        degree := most_demanding.signal.spline_degree
+    ):
+        count = counted(len(most_demanding.time), "sample")
+        yield SampleProblem(
+            most_demanding.signal.names[0], f"has {count}; a trajectory needs at least {degree + 1}"
+        )
     for record in records:
         yield from _value_problems(record)
 
@@ -193,9 +217,9 @@ def _value_problems(samples: SignalSamples) -> Iterator[SampleProblem]:
     for column, rows in zip(signal.names, (samples.values, *samples.derivatives), strict=True):
         for joint, row in () if rows is None else zip(components, rows[components], strict=True):
             yield from _requirement_problem(column, joint, stamps, row, np.isfinite(row), "finite")
-            small = ~(np.isfinite(row) & (np.abs(row) > LARGEST_VALUE))
+            is_small = ~(np.isfinite(row) & (np.abs(row) > LARGEST_VALUE))
             yield from _requirement_problem(
-                column, joint, stamps, row, small, f"at most {LARGEST_VALUE:g} in size"
+                column, joint, stamps, row, is_small, f"at most {LARGEST_VALUE:g} in size"
             )
     if signal.positive:
         for joint, row in zip(components, samples.values[components], strict=True):
@@ -203,12 +227,12 @@ def _value_problems(samples: SignalSamples) -> Iterator[SampleProblem]:
 
 
 def _requirement_problem(
-    quantity: str, joint: int, time: FloatArray, row: FloatArray, holds: BoolArray, requirement: str
+    quantity: str, joint: int, time: FloatArray, row: FloatArray, is_met: BoolArray, requirement: str
 ) -> Iterator[SampleProblem]:
     """Yield a problem with the first sample that violates a requirement, and the number of such samples."""
-    if holds.all():
+    if is_met.all():
         return
-    first, count = int(np.argmin(holds)), len(holds) - int(np.count_nonzero(holds))
-    message = f"must be {requirement}, not {row[first]:g} (t = {time_text(float(time[first]))}"
+    first_index, count = int(np.argmin(is_met)), len(is_met) - int(np.count_nonzero(is_met))
+    message = f"must be {requirement}, not {row[first_index]:g} (t = {time_text(float(time[first_index]))}"
     message += ")" if count == 1 else f"; {count} such samples)"
-    yield SampleProblem(quantity, message, joint, first)
+    yield SampleProblem(quantity, message, joint, first_index)

@@ -98,10 +98,10 @@ class RecordedSignals:
             InputError: times differ; names the first such row of `other`.
         """
         times, other_times = self.times.time, other.times.time
-        common = min(len(times), len(other_times))
-        differ = times[:common] != other_times[:common]
-        if differ.any():
-            row = int(np.argmax(differ))
+        common_count = min(len(times), len(other_times))
+        differs = times[:common_count] != other_times[:common_count]
+        if differs.any():
+            row = int(np.argmax(differs))
             message = (
                 f"time is {other_times[row]} s, but {times[row]} s in the same row of {self.source.path}"
             )

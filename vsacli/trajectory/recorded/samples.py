@@ -46,33 +46,33 @@ def elapsed_times(stamps: FloatArray) -> FloatArray:
     elapsed = stamps - stamps[:1]
     if len(stamps) < ENOUGH_ROWS or not np.all(np.diff(stamps) > 0):
         return elapsed
-    even, step = _evenly_spaced(elapsed), float(elapsed[-1]) / (len(stamps) - 1)
-    deviation = float(np.abs(even - elapsed).max())
+    even_times, step = _evenly_spaced(elapsed), float(elapsed[-1]) / (len(stamps) - 1)
+    deviation = float(np.abs(even_times - elapsed).max())
     if deviation <= EVEN * step:
         return elapsed
-    digit, rounding = (
+    resolution, rounding = (
         stamp_resolution(stamps),
         _float_spacing(stamps),
     )  # half of each from a stamp, half from both ends
-    if deviation <= rounding or (deviation <= digit + rounding and digit <= COARSEST * step):
-        return even
+    if deviation <= rounding or (deviation <= resolution + rounding and resolution <= COARSEST * step):
+        return even_times
     return elapsed
 
 
 def _evenly_spaced(elapsed: FloatArray) -> FloatArray:
     """Return the nearest multiples of an interval that divides the last time into an integer number."""
     steps = np.diff(elapsed)
-    step = float(np.mean(steps[steps < LOST * np.median(steps)]))
-    places = np.round(elapsed / (elapsed[-1] / np.round(elapsed[-1] / step)))
-    return np.asarray(elapsed[-1] * places / places[-1])
+    interval = float(np.mean(steps[steps < LOST * np.median(steps)]))
+    interval_counts = np.round(elapsed / (elapsed[-1] / np.round(elapsed[-1] / interval)))
+    return np.asarray(elapsed[-1] * interval_counts / interval_counts[-1])
 
 
 def stamp_resolution(stamps: FloatArray) -> float:
     """Return the resolution of stamps, s: their last decimal, or the spacing of floating-point numbers."""
-    few = stamps[:: max(1, len(stamps) // 1000)]
+    sampled_stamps = stamps[:: max(1, len(stamps) // 1000)]
     rounding = _float_spacing(stamps)
     for decimals in range(MOST_DECIMALS + 1):
-        if np.abs(few - np.round(few, decimals)).max() <= 2 * rounding:
+        if np.abs(sampled_stamps - np.round(sampled_stamps, decimals)).max() <= 2 * rounding:
             return max(10.0**-decimals, rounding)
     return rounding
 
@@ -91,20 +91,25 @@ def even_rate(stamps: FloatArray) -> float | None:
     elapsed = elapsed_times(stamps)
     if steps < 1 or np.abs(np.diff(elapsed) * steps / elapsed[-1] - 1).max() > 2 * EVEN:
         return None
-    even = elapsed[-1] * np.arange(steps + 1) / steps
-    off = float(np.abs(stamps - stamps[0] - even).max()) + _float_spacing(stamps)
-    rate, allowed = steps / float(elapsed[-1]), 2 * off / float(elapsed[-1])  # both ends may be off
-    rounded = (float(f"{rate:.{digits}g}") for digits in range(1, DIGITS))
-    return next((each for each in rounded if abs(each - rate) <= allowed * rate), rate)
+    even_times = elapsed[-1] * np.arange(steps + 1) / steps
+    max_deviation = float(np.abs(stamps - stamps[0] - even_times).max()) + _float_spacing(stamps)
+    rate, relative_tolerance = (
+        steps / float(elapsed[-1]),
+        2 * max_deviation / float(elapsed[-1]),
+    )  # both ends may be off
+    rounded_rates = (float(f"{rate:.{digits}g}") for digits in range(1, DIGITS))
+    return next((each for each in rounded_rates if abs(each - rate) <= relative_tolerance * rate), rate)
 
 
 def rounding_notes(stamps: FloatArray) -> tuple[str, ...]:
     """Return a note if rounded stamps were replaced by even ones."""
     elapsed = elapsed_times(stamps)
-    off = float(np.abs(elapsed - (stamps - stamps[:1])).max(initial=0.0))
-    if off == 0:
+    max_deviation = float(np.abs(elapsed - (stamps - stamps[:1])).max(initial=0.0))
+    if max_deviation == 0:
         return ()
-    return (f"stamps are up to {off:.2g} s from even, which is their rounding, and are taken for even",)
+    return (
+        f"stamps are up to {max_deviation:.2g} s from even, which is their rounding, and are taken for even",
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -275,12 +280,14 @@ class SampledProfile:
     def notes(self) -> tuple[str, ...]:
         """Notes on the interpretation of noise, and on given derivatives that are not used."""
         record = self.record
-        of_fit = tuple(fit_notes(record.signal.names[0], record.labels, self.fit)) if self.fitted else ()
+        notes_of_fit = (
+            tuple(fit_notes(record.signal.names[0], record.labels, self.fit)) if self.fitted else ()
+        )
         unused = [name for name in record.signal.names[1:] if name not in record.missing]
         if not self.resampled or not unused:
-            return of_fit
+            return notes_of_fit
         verb = "plays" if len(unused) == 1 else "play"
-        return (*of_fit, f"the given {', '.join(unused)} {verb} no part, since the steps are resampled")
+        return (*notes_of_fit, f"the given {', '.join(unused)} {verb} no part, since the steps are resampled")
 
     @property
     def fitted(self) -> bool:
