@@ -45,7 +45,7 @@ def test_letters_of_an_installed_font_are_drawn_with_it(installed: list[FontEntr
     figure.suptitle("arm ⎷", parse_math=False)  # which the usual font has not
     letters.make_legible(figure)
     assert figure.get_suptitle() == "arm ⎷"
-    assert figure.texts[0].get_fontfamily() == [letters.USUAL, "DejaVu Serif"]
+    assert figure.texts[0].get_fontfamily() == [letters.DEFAULT_FONT, "DejaVu Serif"]
 
 
 def test_a_font_that_cannot_be_read_has_no_letters(tmp_path: Path, installed: list[FontEntry]) -> None:

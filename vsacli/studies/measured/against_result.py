@@ -225,7 +225,7 @@ def _overlap(times: FloatArray, time_offset: float, duration: float, path: str |
     time = times - time_offset
     row_count = int(np.count_nonzero((time >= 0) & (time <= duration)))
     if row_count < FEWEST_SAMPLES:
-        row_text = f"{row_count or 'no'} {'row overlaps' if row_count < 2 else 'row_count overlap'}"
+        row_text = f"{row_count or 'no'} {'row overlaps' if row_count < 2 else 'rows overlap'}"
         raise InputError.one(
             f"with a time offset of {time_offset:.4g} s, {row_text} the result ({duration:.4g} s): "
             "the recording "

@@ -352,7 +352,8 @@ class Verification(NamedTuple):
         joints: findings of the run at each joint.
         refused: instants at which it misses the margin or a limit, as times since the start of the unchanged
             task, s: the worst ones of the run, also between samples, and those of a grid
-            `CHECK_SUBDIVISIONS` times as fine; none if only the self-check fails. None if the motion is confirmed.
+            `CHECK_SUBDIVISIONS` times as fine; none if only the self-check fails. None if the motion is
+            confirmed.
     """
 
     joints: Sequence[JointReport]

@@ -350,7 +350,7 @@ def _tell_damage(journal: Journal, tell: Callable[[str], object]) -> None:
         words = (
             ("lines", "are", "their runs are") if len(journal.damaged) > 1 else ("line", "is", "its run is")
         )
-        line_text = f"{words[0]} {numbers}{f' and {other_count} other_count' if other_count > 0 else ''}"
+        line_text = f"{words[0]} {numbers}{f' and {other_count} more' if other_count > 0 else ''}"
         tell(f"{journal.path}: {line_text} {words[1]} damaged; {words[2]} computed again")
 
 
