@@ -7,12 +7,11 @@ from samples.command_line import REPOSITORY
 from samples.figure_inputs import PLACE as TIME
 from samples.figure_inputs import joint
 
-from vsacli import load_robot, load_trajectory
+from vsacli import Optimum, load_robot, load_trajectory
 from vsacli.cli.optimize_plots import optimum_sheets
 from vsacli.results.charts.chart import ATTAINABLE
 from vsacli.results.charts.optimum import change_sheet, pace_sheet
 from vsacli.results.plots import draw_sheet
-from vsacli.studies.search import Optimum
 
 
 def texts(figure):

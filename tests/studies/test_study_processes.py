@@ -15,10 +15,11 @@ from typing import NoReturn
 import pytest
 from samples.studies import DRAWN, GRID, content, study
 
+from vsacli import run_study
 from vsacli.studies.sweeps.executors import Processes
 from vsacli.studies.sweeps.journal import Journal
 from vsacli.studies.sweeps.rows import Computer, lost
-from vsacli.studies.sweeps.run_study import gather, run_study
+from vsacli.studies.sweeps.run_study import gather
 from vsacli.studies.sweeps.study import load_study
 
 COMMAND = (sys.executable, "-m", "vsacli", "study", "study.yaml")
