@@ -38,7 +38,7 @@ def test_rows_are_those_of_single_runs(tmp_path: Path, engine: str) -> None:
     path, table = study(tmp_path, MIXED), tmp_path / "table.h5"
     run_study(path, table, processes=1, engine=engine).close()
     read, verdicts = load_study(path), column(table, "verdict")
-    assert len(read.varied) == 5  # three masses, an inertia and a limit
+    assert len(read.varied_parameters) == 5  # three masses, an inertia and a limit
     assert len(set(verdicts)) > 1
     for run in range(read.runs):
         report = report_of(read, run)
@@ -81,4 +81,4 @@ def test_runs_are_a_batch_even_if_the_first_one_cannot_be_built(tmp_path: Path) 
     text = "method: random\nsamples: 6\nseed: {}\nvary: {{joints.base.link.mass: {{normal: 100 %}}}}\n"
     drawn = (load_study(study(tmp_path, text.format(seed))) for seed in range(20))
     read = next(each for each in drawn if each.point(0).values["joints.base.link.mass"] < 0)
-    assert [str(number) for number in read.varied] == ["joints.base.link.mass"]
+    assert [str(number) for number in read.varied_parameters] == ["joints.base.link.mass"]

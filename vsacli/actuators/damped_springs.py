@@ -186,7 +186,7 @@ class DampedSprings:
         stiffness = command.commanded[STIFFNESS.key]
         solution = self._actuator.solve(springs.state.tau_e, stiffness, command.q)
         reach = classify_stiffness(stiffness, solution, min_margin)
-        margin = self._margin(springs, stiffness)
+        margin = self._distance_from_extremum(springs, stiffness)
         return (
             solution.lower,
             solution.upper,
@@ -198,7 +198,7 @@ class DampedSprings:
             ),
         )
 
-    def _margin(self, springs: _DampedState, stiffness: FloatArray) -> FloatArray:
+    def _distance_from_extremum(self, springs: _DampedState, stiffness: FloatArray) -> FloatArray:
         """Return the distance of the stiffness from its extremum at the same spread, relative to itself."""
         curvature = springs.state.stiffness_curvature(
             self._coordinate_rates(0 * stiffness, self._rates_at_constant_spread(stiffness))

@@ -18,7 +18,7 @@ from vsacli.cli.command_parts import (
 from vsacli.cli.console import Exit, Talk, say, talk_options
 from vsacli.cli.figure_options import FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
-from vsacli.cli.input_errors import naming_kind, recognized
+from vsacli.cli.input_errors import file_kind_or_none, naming_kind
 from vsacli.cli.option_types import TIME
 
 
@@ -65,7 +65,7 @@ def compare(
     to the other signals, each with its standard error. Exit code 3 if it begins with a warning, for example
     that the recording does not fit the result.
     """
-    if recognized(recording) in ("result", "simulation"):
+    if file_kind_or_none(recording) in ("result", "simulation"):
         for_recordings = {"--time-offset": time_offset, "--columns": columns, "--plot": figures}
         return _compare_results(result, recording, for_recordings, as_json)
     from vsacli.cli.compare_plots import comparison_page, draw_comparison

@@ -137,7 +137,7 @@ def _wrong_kind(argument: str, path: str, expected: tuple[str, ...]) -> str:
 
     if noun := unreadable(path):
         return f"is a {noun}, but {argument} must be {_alternatives(expected)}"
-    kind, usual = recognized(path), expected[0]
+    kind, usual = file_kind_or_none(path), expected[0]
     if kind is None or kind in expected or _better_said(kind, usual):
         return ""
     advice = _ADVICE.get((kind, usual), _KINDS[kind].advice).format(file=shlex.quote(path))
@@ -181,7 +181,7 @@ def in_words(kind: str) -> str:
     return _KINDS[kind].found
 
 
-def recognized(path: str) -> str | None:
+def file_kind_or_none(path: str) -> str | None:
     """Return the kind of a file, as in `FileKind`; None if it is of none that is known, or cannot be read."""
     from vsacli.files.file_kinds import recognize
 

@@ -20,7 +20,7 @@ from vsacli.base.storage import reason
 from vsacli.base.version import __version__
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, OutputClosedError, flush_notes, reporting_stdout_errors, tell
-from vsacli.cli.input_errors import in_words, recognized
+from vsacli.cli.input_errors import file_kind_or_none, in_words
 
 _EPILOG = example("vsacli invdyn robots/vsa_3r.yaml trajectories/rest_to_rest.yaml")
 _EPILOG += """
@@ -202,7 +202,7 @@ def _with_advice(error: click.ClickException) -> click.ClickException:
             words = [error.ctx.command_path, *(each.make_metavar(error.ctx) for each in arguments)]
             return click.UsageError(f"{error.option_name} is no option: write {' '.join(words)}", error.ctx)
     if isinstance(error, click.MissingParameter) and error.ctx and (path := error.ctx.params.get("robot")):
-        kind = recognized(path)
+        kind = file_kind_or_none(path)
         if kind in ("result", "simulation"):
             missing = error.format_message().rstrip(".")
             hint = f"{path} is {in_words(kind)}: vsacli info {path} shows its report"

@@ -16,7 +16,7 @@ from vsacli.cli.command_parts import (
 from vsacli.cli.console import Talk, talk_options
 from vsacli.cli.figure_options import EVERYTHING, PAGE, DrawnPart, FigurePlace, FigureTarget, figure_options
 from vsacli.cli.file_names import FILE
-from vsacli.cli.input_errors import naming_kind, recognized
+from vsacli.cli.input_errors import file_kind_or_none, naming_kind
 from vsacli.cli.option_types import TIME
 
 RECORDED = frozenset({"table", "motor catalog", "trajectory"})
@@ -92,7 +92,7 @@ def plot(
     inputs = [*files, *filter(None, [robot])]
     with naming_kind("FILE", files, DRAWN), Outputs(overwrite=overwrite, inputs=inputs) as outputs:
         target = FigurePlace(figures, outputs)
-        kinds = set(map(recognized, files))
+        kinds = set(map(file_kind_or_none, files))
         if "robot" in kinds:
             from vsacli.cli.plot_robot import draw_robot, write_robot_page
 

@@ -10,7 +10,7 @@ import click
 from vsacli.cli.command_parts import example
 from vsacli.cli.console import Exit, Talk, talk_options
 from vsacli.cli.file_names import FILE
-from vsacli.cli.input_errors import in_words, recognized
+from vsacli.cli.input_errors import file_kind_or_none, in_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -66,7 +66,7 @@ def _check_recomputable(files: Sequence[str]) -> None:
     Raises:
         click.UsageError: with the kind of a file.
     """
-    kinds = [recognized(file) for file in files]
+    kinds = [file_kind_or_none(file) for file in files]
     if all(kind not in (None, "result", "simulation") for kind in kinds):
         file, kind = files[0], kinds[0] or ""
         raise click.UsageError(f"--recompute is for results; {file} is {in_words(kind)}")

@@ -331,13 +331,13 @@ def passed_power(joint: Joint, variables: JointVariables) -> tuple[FloatArray, F
     dampings = [motor.damping for motor in joint.actuator.motors]
     motor_damping = stack_constants([*dampings, *[np.nan] * (SIDES - len(dampings))])
     torque = motor_damping * dtheta + variables.tau_transmission
-    rate = motor_damping * ddtheta
-    absent = np.full_like(variables.q, np.nan)
-    rate = rate + np.stack([*_transmission_rates(joint.actuator, variables), absent][:SIDES])
+    torque_rate = motor_damping * ddtheta
+    no_motor = np.full_like(variables.q, np.nan)
+    torque_rate = torque_rate + np.stack([*_transmission_rates(joint.actuator, variables), no_motor][:SIDES])
     if joint.damper_at("transmission"):
         damper_torque, damper_rate = parallel_damper_torques(joint, variables)
-        torque, rate = torque + damper_torque, rate + damper_rate
-    return torque * dtheta, rate * dtheta + torque * ddtheta
+        torque, torque_rate = torque + damper_torque, torque_rate + damper_rate
+    return torque * dtheta, torque_rate * dtheta + torque * ddtheta
 
 
 def _transmission_rates(actuator: Actuator, variables: JointVariables) -> Sequence[FloatArray]:

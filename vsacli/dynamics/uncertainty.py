@@ -243,16 +243,16 @@ def _propagate(
         for component, rows in zip(components[signal], deviation, strict=True)
         for name, row in zip(signal.variables, rows, strict=True)
     ]
-    values, gradients = _values_and_gradients(variables, motion, shifts)
+    values, changes = _values_and_changes(variables, motion, shifts)
     deviations_by_name, unstated = {}, {}
     is_unstated = np.array([not shift.stated for shift in shifts])
     for name, value in values.items():
-        unstated[name] = np.any(gradients[name][is_unstated] != 0, axis=(0, 1))
+        unstated[name] = np.any(changes[name][is_unstated] != 0, axis=(0, 1))
         variance, start = np.zeros_like(value), 0
         for signal, covariance in covariances.items():
-            gradient = gradients[name][start : start + len(covariance) * signal.orders]
-            variance += _variance(gradient, _correlations(covariance, deviations[signal]))
-            start += len(gradient)
+            change = changes[name][start : start + len(covariance) * signal.orders]
+            variance += _variance(change, _correlations(covariance, deviations[signal]))
+            start += len(change)
         deviation = np.sqrt(np.maximum(variance, 0))  # below zero by rounding only
         deviations_by_name[name] = np.where(
             np.isnan(value), np.nan, np.nan_to_num(deviation, nan=np.inf, posinf=np.inf)
@@ -302,18 +302,18 @@ def _correlations(covariance: FloatArray, deviation: FloatArray) -> FloatArray:
     return np.divide(covariance, product, out=np.zeros_like(covariance), where=product > 0)
 
 
-def _values_and_gradients(
-    variables: _Variables, motion: Motion, shifts: Sequence[_Shift]
+def _values_and_changes(
+    compute_variables: _Variables, motion: Motion, shifts: Sequence[_Shift]
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Return variables by name, (times, joints[, 2]), and changes by the shifts, (shifts, times, ...)."""
-    values, gradients = {}, {}
-    for name, array in variables(_shifted_motions(motion, shifts)).items():
+    values, changes = {}, {}
+    for name, array in compute_variables(_shifted_motions(motion, shifts)).items():
         batches = array.reshape(1 + 2 * len(shifts), len(motion.time), *array.shape[1:])
         values[name], forward, backward = batches[0], batches[1::2], batches[2::2]
         one_sided = np.where(np.isnan(forward), batches[0] - backward, forward - batches[0])
         central = (forward - backward) / 2
-        gradients[name] = np.where(np.isnan(central), one_sided, central)
-    return values, gradients
+        changes[name] = np.where(np.isnan(central), one_sided, central)
+    return values, changes
 
 
 def _without_inner_dampers(robot: Robot) -> Robot:

@@ -158,10 +158,10 @@ def _measure_stiffness_limits(checked: CheckedRobot) -> Iterator[Measured]:
     for index, joint, attainable in _joints_with_commanded_stiffness(checked):
         beside = {"lower": f"{attainable.lower:.4g}", "unit": _stiffness_unit(joint)}
         for side, limit in enumerate(joint.limits.stiffness):
-            size = ratio_or_nan(limit, attainable.lower)
-            if math.isfinite(limit) and (side or limit > attainable.upper or size > 1):
+            ratio = ratio_or_nan(limit, attainable.lower)
+            if math.isfinite(limit) and (side or limit > attainable.upper or ratio > 1):
                 path = joint_path(index, joint, "limits", "stiffness", PathIndex(side))
-                yield Measured(path, limit, _stiffness_unit(joint), size, beside)
+                yield Measured(path, limit, _stiffness_unit(joint), ratio, beside)
 
 
 def _least_stiffness(joint: Joint, attainable: UnloadedStiffnessRange | None) -> float:

@@ -156,7 +156,7 @@ GRID, CONSTANT_TOLERANCE = 33, 1e-6
 """Constants that are compared at once, and the relative width of their range at which the search ends."""
 
 
-def best_of_constants(
+def best_constant_stiffness(
     motion: FixedMotion, low: float, high: float, instants: IndexArray
 ) -> tuple[float, float] | None:
     """Return the best constant between two and its cost, with limits at some instants; None if there is none.

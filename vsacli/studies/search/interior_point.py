@@ -77,10 +77,10 @@ class Point(Protocol):
 class Problem(Protocol):
     """A cost, and bounds that must not be positive, at several places at once."""
 
-    def values(self, places: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
+    def costs_and_bounds(self, unknowns: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
         """Return cost and bounds for each array of unknowns; they are not finite where they are undefined."""
 
-    def at(self, places: Sequence[FloatArray]) -> Sequence[Point]:
+    def at(self, unknowns: Sequence[FloatArray]) -> Sequence[Point]:
         """Return cost and bounds with derivatives for each array of unknowns."""
 
 
@@ -156,7 +156,7 @@ def _run_searches(problem: Problem, searches: Sequence[_Search]) -> list[Minimum
         derivatives = all(request.derivatives for request in requests.values())
         search_indices = [index for index, request in requests.items() if request.derivatives == derivatives]
         unknowns = [requests[index].unknowns for index in search_indices]
-        answers: Sequence[Any] = problem.at(unknowns) if derivatives else problem.values(unknowns)
+        answers: Sequence[Any] = problem.at(unknowns) if derivatives else problem.costs_and_bounds(unknowns)
         for index, answer in zip(search_indices, answers, strict=True):
             try:
                 requests[index] = searches[index].send(answer)

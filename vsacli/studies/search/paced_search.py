@@ -341,7 +341,7 @@ class CheapestPaceSearch(PacedSearch):
 
     def _keeps_bounds(self, spaces: PacedSpaces, unknowns: FloatArray) -> bool:
         problem = SeparableProblem(self._groups(spaces, np.arange(len(self._s))))
-        ((_, bounds),) = problem.values([unknowns])
+        ((_, bounds),) = problem.costs_and_bounds([unknowns])
         return bool(np.all(bounds < 0))
 
     def _append_level(self, spaces: PacedSpaces, unknowns: FloatArray) -> FloatArray:
@@ -364,5 +364,5 @@ class CheapestPaceSearch(PacedSearch):
         return [smoothed_minimum(problem, start, gap, self._joints) for start in starts]
 
     def _accepted(self, _spaces: PacedSpaces, every: Sequence[Group], found: Minimum) -> Minimum | None:
-        ((_, bounds),) = SeparableProblem(every).values([found.unknowns])
+        ((_, bounds),) = SeparableProblem(every).costs_and_bounds([found.unknowns])
         return found if np.all(bounds <= CLEARANCE / 2) else None

@@ -97,7 +97,7 @@ class Group:
         """Basis with the axes (instants, rows, own unknowns)."""
         return np.ascontiguousarray(self.basis.transpose(1, 0, 2))
 
-    def values(self, points: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
+    def costs_and_bounds(self, points: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
         """Return the cost and the existing bounds at each of several unknowns."""
         rows = np.concatenate([self.rows(unknowns) for unknowns in points], axis=1)
         integrands, bounds = self.functions(rows, np.tile(self.instants, len(points)))
@@ -262,9 +262,9 @@ class SeparableProblem:
 
     groups: Sequence[Group]
 
-    def values(self, points: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
-        """See `Problem.values`."""
-        by_group = [group.values(points) for group in self.groups]
+    def costs_and_bounds(self, points: Sequence[FloatArray]) -> list[tuple[float, FloatArray]]:
+        """See `Problem.costs_and_bounds`."""
+        by_group = [group.costs_and_bounds(points) for group in self.groups]
         return [
             (sum(cost for cost, _ in found), np.concatenate([bounds for _, bounds in found]))
             for found in zip(*by_group, strict=True)
@@ -288,7 +288,7 @@ def interior(
     feasible = None
     for share in INTERIOR_SHARES:
         shifted = target if interior_point is None else target + share * (interior_point - target)
-        ((_, bounds),) = problem.values([shifted])
+        ((_, bounds),) = problem.costs_and_bounds([shifted])
         largest_bound = bounds.max(initial=-1.0) if np.isfinite(bounds).all() else np.inf
         feasible = shifted if largest_bound < 0 else feasible
         if largest_bound < -MIN_CLEARANCE:

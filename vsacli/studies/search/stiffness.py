@@ -21,7 +21,7 @@ from vsacli.studies.search.criteria import ROUGH_GAP, Criterion, Scale, rough_mi
 from vsacli.studies.search.fixed_motion import (
     CLEARANCE,
     FixedMotion,
-    best_of_constants,
+    best_constant_stiffness,
     nearest_profile,
     targets,
 )
@@ -179,7 +179,7 @@ class StiffnessSearch:
         full_group = self._group(space, np.arange(len(self._load.time)))
         instants = evenly(len(self._load.time), INSTANTS_PER_PIECE * FIRST_PIECES + 1)
         for _ in range(MAX_ROUNDS):
-            found = best_of_constants(self._motion, min_constant, max_constant, instants)
+            found = best_constant_stiffness(self._motion, min_constant, max_constant, instants)
             self._progress()
             if found is None:
                 return None

@@ -162,7 +162,7 @@ class TimingSearch(PacedSearch):
         pace_direction -= base_unknowns  # unknowns that make the pace faster by one
 
         def kept(factor: float) -> bool:
-            ((_, bounds),) = problem.values([base_unknowns + (factor - 1) * pace_direction])
+            ((_, bounds),) = problem.costs_and_bounds([base_unknowns + (factor - 1) * pace_direction])
             return bool(np.all(bounds < 0))
 
         factors = MIN_PACE * STRIDE ** np.arange(
@@ -192,7 +192,7 @@ class TimingSearch(PacedSearch):
         """Return the minimum, slowed down by a share of `FINAL_SLOW_DOWNS` that keeps all bounds, or None."""
         for share in FINAL_SLOW_DOWNS:
             unknowns = spaces.slowed(minimum.unknowns, share)
-            ((cost, bounds),) = SeparableProblem(full_groups).values([unknowns])
+            ((cost, bounds),) = SeparableProblem(full_groups).costs_and_bounds([unknowns])
             if np.all(bounds <= CLEARANCE / 2):
                 return replace(minimum, unknowns=unknowns, cost=cost)
         return None

@@ -122,7 +122,9 @@ class Computer:
                     yield prepared_or_row
                 else:
                     prepared.append(prepared_or_row)
-            for variants, members in batches([each.inputs for each in prepared], self._study.varied):
+            for variants, members in batches(
+                [each.inputs for each in prepared], self._study.varied_parameters
+            ):
                 yield from self._batch_rows(variants, [prepared[index] for index in members])
 
     def _prepare(self, run: int) -> _Prepared | Row:

@@ -142,7 +142,7 @@ class Study:
         return None if is_single else PreparedRun(robot, trajectory)
 
     @cached_property
-    def varied(self) -> tuple[Parameter, ...]:
+    def varied_parameters(self) -> tuple[Parameter, ...]:
         """Numbers of the robot that are rows of the kernel.
 
         They depend on the study alone, so that a row does not depend on the runs that are computed with it.
@@ -173,7 +173,7 @@ class Study:
         """Return whether a dimension is of the motion, or of numbers that are rows of the kernel."""
         if not divide_changes_by_file({dimension.path: None}).robot:
             return True
-        paths = {str(parameter) for parameter in self.varied}
+        paths = {str(parameter) for parameter in self.varied_parameters}
         matching_paths = [str(parameter) for parameter in _numbers_matched_by(self.robot, dimension)]
         return dimension.numeric and bool(matching_paths) and paths.issuperset(matching_paths)
 
@@ -186,7 +186,9 @@ class Study:
         check_engine(name)
         if name == "numpy":
             return self
-        kernel = Variants((self.robot,), self.robot, self.varied).kernel(InverseDynamics(self.robot))
+        kernel = Variants((self.robot,), self.robot, self.varied_parameters).kernel(
+            InverseDynamics(self.robot)
+        )
         engine_choice = settle_engine(name, kernel, self.samples_of_kernel if name == "auto" else 0)
         return replace(self, engine=engine_choice.name, compiler=engine_choice.compiler)
 

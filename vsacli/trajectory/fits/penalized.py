@@ -158,7 +158,9 @@ class Model:
     def noise_variance(self) -> float:
         """Variance of a whitened mean: known, or else of maximum likelihood."""
         known_variance = self.whitened.variance
-        return self._factor.rest / _freedom(self.bins) if known_variance is None else known_variance
+        return (
+            self._factor.rest / _degrees_of_freedom(self.bins) if known_variance is None else known_variance
+        )
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -268,15 +270,15 @@ class Evidence(NamedTuple):
     """The terms of the restricted likelihood for a recording or a stretch of it.
 
     Attributes:
-        rest: residual sum of squares, penalties included.
-        volume: logarithm of the determinants.
-        freedom: number of means minus that of coefficients of the polynomial without penalty.
+        residual_squares: residual sum of squares, penalties included.
+        log_determinant: logarithm of the determinants.
+        degrees_of_freedom: number of means minus that of coefficients of the polynomial without penalty.
         variance: variance of a whitened mean; None if unknown.
     """
 
-    rest: float
-    volume: float
-    freedom: int
+    residual_squares: float
+    log_determinant: float
+    degrees_of_freedom: int
     variance: float | None
 
 
@@ -285,19 +287,24 @@ def evidence(
 ) -> Evidence:
     """Return the evidence for penalties, (differences,)."""
     factor = factor or _factor(bins, whitened, penalties)
-    volume = factor.log_determinant - float(np.sum(np.log(penalties))) - whitened.log_scale
-    return Evidence(factor.rest, volume, _freedom(bins), whitened.variance)
+    log_determinant = factor.log_determinant - float(np.sum(np.log(penalties))) - whitened.log_scale
+    return Evidence(factor.rest, log_determinant, _degrees_of_freedom(bins), whitened.variance)
 
 
-def deviance(stretches: Sequence[Evidence]) -> float:
-    """Return minus twice the log restricted likelihood of all stretches together."""
-    rest = sum(each.rest for each in stretches)
-    freedom, variance = sum(each.freedom for each in stretches), stretches[0].variance
+def deviance(segments: Sequence[Evidence]) -> float:
+    """Return minus twice the log restricted likelihood of all segments together."""
+    residual_squares = sum(segment.residual_squares for segment in segments)
+    degrees_of_freedom, variance = (
+        sum(segment.degrees_of_freedom for segment in segments),
+        segments[0].variance,
+    )
     if variance is None:
-        deviance_value = freedom * math.log(max(rest, np.finfo(float).tiny) / freedom)
+        deviance_value = degrees_of_freedom * math.log(
+            max(residual_squares, np.finfo(float).tiny) / degrees_of_freedom
+        )
     else:
-        deviance_value = freedom * (math.log(variance) - 1) + rest / variance
-    return deviance_value + sum(each.volume for each in stretches)
+        deviance_value = degrees_of_freedom * (math.log(variance) - 1) + residual_squares / variance
+    return deviance_value + sum(segment.log_determinant for segment in segments)
 
 
 def _factor(bins: Bins, whitened: Whitened, penalties: FloatArray) -> BandedFactor:
@@ -309,7 +316,7 @@ def _factor(bins: Bins, whitened: Whitened, penalties: FloatArray) -> BandedFact
     return factor._replace(rest=factor.rest + sample_factor.rest)
 
 
-def _freedom(bins: Bins) -> int:
+def _degrees_of_freedom(bins: Bins) -> int:
     return len(bins.means) - bins.degree
 
 
