@@ -42,7 +42,7 @@ MOST_CLASS_NAMES_TWICE, MOST_FUNCTION_NAMES_TWICE, LARGEST_SHARE_OF_EMPTY_WORDS 
 not; and the share of names that are a word without content. Like the counts above, they are lowered, or
 raised with a reason."""
 
-MOST_RETURNS = {"robot file": 106, "trajectory file": 906, "block": 251, "recording": 238}
+MOST_RETURNS = {"robot file": 106, "trajectory file": 915, "block": 251, "recording": 238}
 """How often reading a robot or a trajectory, and computing a block, come back to a module they have left."""
 
 HEADLESS = re.compile(
@@ -123,7 +123,7 @@ def test_the_package_grows_only_on_purpose() -> None:
     names = Counter(source.name for source in SOURCES if not is_folder(source))
     assert len(SOURCES) <= MOST_FILES
     statements = (isinstance(node, ast.stmt) for source in SOURCES for node in ast.walk(parsed(source)))
-    assert sum(statements) <= MOST_STATEMENTS
+    assert sum(statements) <= MOST_STATEMENTS, "raise MOST_STATEMENTS if the package is to grow"
     assert sum(count > 1 for count in names.values()) <= MOST_SHARED_NAMES
 
 
