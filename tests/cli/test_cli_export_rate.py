@@ -70,6 +70,7 @@ def recorded(folder):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_fractions_of_the_rate_at_which_a_recording_was_resampled(tmp_path, vsacli):
     """No whole number of periods of 200 Hz lasts as long as the recording: the rate is 199.99 Hz."""
     result, part, whole = (tmp_path / name for name in ("r.h5", "part.csv", "whole.csv"))
@@ -81,6 +82,7 @@ def test_fractions_of_the_rate_at_which_a_recording_was_resampled(tmp_path, vsac
     assert "use 50 or 100 Hz, or run invdyn with --set rate=70, then export without --rate" in done.err
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_the_way_to_another_rate_is_named_and_works(tmp_path, vsacli):
     result, table = tmp_path / "r.h5", tmp_path / "torques.csv"

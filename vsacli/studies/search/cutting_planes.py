@@ -54,7 +54,7 @@ SCAN_STRIDE = 0.01
 
 ROWS_AT_ONCE = 10_000
 """Samples evaluated in one call, which costs hardly more than that of a few. With one number a call, fixes of
-a motion with a motor that no constant helps took 4 times as long."""
+motions with a motor that no constant helps took 4 to 25 times as long."""
 
 MAX_STIFFNESS_RATIO = 100
 """Largest ratio by which an offset may change the stiffness of a joint if nothing else bounds it."""
