@@ -90,9 +90,9 @@ def test_the_key_names_the_compiler(tmp_path: Path, folder: Path, monkeypatch: p
         script.chmod(0o755)
         monkeypatch.setenv("CC", str(script))
         monkeypatch.setenv("PATH", f"{tmp_path}{len(text)}", prepend=":")  # as in another process
-        assert choose_engine("c", KERNEL, 1).reason.startswith("compiled now")
+        assert choose_engine("c", KERNEL, 1).reason.startswith("C code computes, compiled now")
     monkeypatch.delenv("CC")
-    assert choose_engine("c", KERNEL, 1).reason.startswith("compiled now")
+    assert choose_engine("c", KERNEL, 1).reason.startswith("C code computes, compiled now")
     assert len(list(folder.rglob(LIBRARY))) == 3
     _loaded_libraries.clear()
     assert choose_engine("c", KERNEL, 1).reason.startswith("C code computes, compiled before")

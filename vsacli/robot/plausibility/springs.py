@@ -34,6 +34,12 @@ NEWTON_MILLIMETERS = OtherUnit("N mm/rad", 1e-3, instead_of="N m/rad")
 TOO_STIFF = (NEWTON_MILLIMETERS, OtherUnit("N mm/deg", 0.18 / math.pi, instead_of="N m/rad"))
 """Units in which a stiffness is a smaller number (`TOO_SOFT`) or a larger one than in the expected unit."""
 
+SLACK_DEFLECTION = 0.3
+"""Deflection at which springs without stiffness at rest are judged if nothing bounds it, rad (of the reach).
+
+Where a robot is stiff by preload, its springs are deflected that far: `vsacli new` writes quadratic ones with
+47 times the torque of the load there, and with 500 times at 1 rad."""
+
 
 def _stiffness_unit(joint: Joint) -> str:
     return units.STIFFNESS.unit(joint.type)
@@ -133,13 +139,13 @@ def _measure_deflection_limits(checked: CheckedRobot) -> Iterator[Measured]:
 def _measure_largest_deflections(checked: CheckedRobot) -> Iterator[Measured]:
     """Yield the torque of springs at their largest deflection, over the largest of load and motors.
 
-    Of springs without stiffness at rest, of which nothing else tells how stiff they are, it may be 1 rad.
-    Only springs of joints with commanded stiffness.
+    Of springs without stiffness at rest, of which nothing else tells how stiff they are, it may be
+    `SLACK_DEFLECTION`. Only springs of joints with commanded stiffness.
     """
     for joint, path, law in _springs_in_file(checked):
         end = min(law.max_deflection, law.domain[1] if law.sources else math.inf)
         if math.isinf(min(end, law.domain[1])) and not law.stiffness(np.zeros(1)).any():
-            end = _reference_travel(checked, joint)
+            end = SLACK_DEFLECTION * _reference_travel(checked, joint)
         if math.isfinite(end) and "stiffness" in joint.actuator.commanded:
             torque, unit = float(law.torque(np.array([end]))[0]), units.TORQUE.unit(joint.type)
             motors = [motor.at_joint.max_torque for _, motor in motors_in_file(joint)]
@@ -192,8 +198,8 @@ SPRING_RULES: tuple[Rule[CheckedRobot], ...] = (
         finding="is a deflection of more than half a turn (than the reach)",
         units=(DEGREES, MILLIMETERS), in_angles=True),
     Rule("springs at their largest deflection", "`spring`", _measure_largest_deflections,
-        size="torque at `max_deflection`, the end of a table or, of springs without stiffness at rest, 1 rad "
-        "(reach), over the largest of load and motor", high=150,
+        size="torque at `max_deflection`, the end of a table or, of springs without stiffness at rest, 0.3 "
+        "rad (of the reach), over the largest of load and motor", high=150,
         usual=1, reason="bundled robots: 1 to 25; no motor would deflect them so far",
         finding="has {torque} at {end}, {size} times the {asked} that load or motor can ask of it",
         units=TOO_STIFF, advice="check the units of its constants and of its largest deflection",
