@@ -55,7 +55,7 @@ TASKS = {
     "invdyn --plot": Task(
         ("invdyn", "-q", ROBOT, TRAJECTORY, "--plot", "figures"),
         ("studies", "control", "files", "trajectory.fits", "trajectory.recorded"),
-        31_100,
+        32_000,
     ),
     "check-feasibility": Task(
         ("check-feasibility", ROBOT, TRAJECTORY),

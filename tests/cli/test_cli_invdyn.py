@@ -47,7 +47,7 @@ def test_installed_command_does_the_shipped_example(tmp_path):
     assert done.returncode == 0
     assert done.stderr == "wrote vsa_3r-rest_to_rest.h5\n"
     headline, *lines = done.stdout.splitlines()
-    assert headline == "OK  vsa-3r"
+    assert headline == "OK  vsa-3r, rest-to-rest: 4001 samples, 4 s"
     assert [line.split()[0] for line in lines[1:6]] == ["joint", "N", "base", "shoulder", "elbow"]
     assert lines[-1].startswith("self-check passed")
     attributes = root_attributes(tmp_path / "vsa_3r-rest_to_rest.h5")

@@ -158,9 +158,7 @@ def test_jittering_stamps_recommend_a_rate_also_where_torques_are_exported(vsacl
     assert "set rate: 500 in a trajectory file" in done.out
     refused = vsacli("export", "late.h5", "--rate", "250")
     assert refused.code == 2
-    assert (
-        "set rate: 500 in the trajectory file and run invdyn again, or export without --rate" in refused.err
-    )
+    assert "run invdyn with --set rate=250, then export without --rate" in refused.err
 
 
 def test_computed_samples_are_used_as_they_are(vsacli, tmp_path):

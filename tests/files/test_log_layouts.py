@@ -359,7 +359,7 @@ def test_numbered_columns_of_the_format_for_named_joints(vsacli: Command, tmp_pa
     vsacli("invdyn", ROBOT, "recorded.yaml", "-o", "r.h5")
     compared = vsacli("compare", "r.h5", "log.csv", "--columns", "columns.yaml", "--time-offset", "0").out
     assert "shoulder.q" in compared
-    assert "dq" not in compared
+    assert not [line for line in compared.splitlines() if re.match(r"(shoulder|elbow)\.dq", line)]
 
 
 @pytest.mark.slow

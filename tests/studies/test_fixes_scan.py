@@ -24,8 +24,9 @@ def smallest(thresholds, numbers=(*STRIDES, 99)):
     """The smallest number that is at least the threshold of each sample, if it is below their end."""
     low, high = np.array(thresholds).T
 
-    def refuse(number, samples):
-        return (number < low[samples]) | (number > high[samples])
+    def refuse(tried, samples):
+        for number in tried:
+            yield ((number < low[samples]) | (number > high[samples]))[np.newaxis]
 
     return smallest_accepted(refuse, len(low), numbers)
 

@@ -266,7 +266,7 @@ def _under_weight(measured: Measured, joint: Joint, load: float) -> Measured:
     Springs that harden like an exponential function are a thousand times as stiff under their load.
     """
     least = float(joint.actuator.solve(np.array([load]), np.ones(1), np.zeros(1)).lower[0])
-    if not (measured.size > 1 and measured.value / least < measured.size):
+    if not (measured.size > 1 and measured.value < measured.size * least):
         return measured
     of_weight = {"lower": f"{least:.4g}", "load": "under the weight of the stretched arm"}
     return measured._replace(size=max(1.0, measured.value / least), beside={**measured.beside, **of_weight})
