@@ -94,7 +94,7 @@ def assert_equal_reports(one: JsonObject, other: JsonObject) -> None:
         assert one == other
 
 
-@pytest.mark.cases(8)
+@pytest.mark.cases(4)
 @pytest.mark.parametrize("seed", slow_but([1, 2], range(40)))
 def test_a_batch_gives_what_each_run_gives(seed: int) -> None:
     robot, trajectory = drawn_run(seed)

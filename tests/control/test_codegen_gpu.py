@@ -108,7 +108,7 @@ def test_kernels_are_the_functions_to_the_bit(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.cases(3)
+@pytest.mark.cases(1)
 @pytest.mark.parametrize("seed", range(21))
 def test_kernels_of_random_robots(seed: int, tmp_path: Path) -> None:
     """Without springs, and with branches and every kind of actuator."""
