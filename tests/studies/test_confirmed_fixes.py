@@ -15,16 +15,16 @@ from vsacli.studies.search.fix_report import in_order
 def test_every_fix_is_confirmed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """In 0.2 s, profiles of the 3R fall short between the samples several times."""
     confirmed, short = [], []
-    verify_fixes = fix_search.verify_fixes
+    verify_fix = fix_search.verify_fix
 
-    def noted(acceptance, candidates):
-        for fix, refused in verify_fixes(acceptance, candidates):
-            (confirmed if refused is None else short).append(fix)
-            yield fix, refused
+    def noted(acceptance, candidate):
+        fix, refused = verify_fix(acceptance, candidate)
+        (confirmed if refused is None else short).append(fix)
+        return fix, refused
 
     robot = load_robot(ROBOT)
     motion = load_trajectory(REST_TO_REST, robot, {"duration": 0.2})
-    monkeypatch.setattr(fix_search, "verify_fixes", noted)
+    monkeypatch.setattr(fix_search, "verify_fix", noted)
     chosen = fixes(robot, motion).fixes
     assert len(short) > 1
     assert {id(each) for each in chosen} == {id(each) for each in confirmed}

@@ -13,7 +13,7 @@ from vsacli import InputError, StorageError, Trajectory, inverse_dynamics, load_
 from vsacli.base.outputs import Outputs
 from vsacli.base.signals import POSITION, WRENCH
 from vsacli.studies.search import Fix, check_fixed_target
-from vsacli.studies.search.acceptance import Acceptance, verify_fixes
+from vsacli.studies.search.acceptance import Acceptance, verify_fix
 from vsacli.studies.search.changed_motion import with_changed_stiffness
 from vsacli.studies.search.task import AS_IT_IS, Task
 from vsacli.trajectory.curves import ConstantProfile, RestToRest
@@ -64,7 +64,7 @@ def fixed(trajectory):
     task = Task(Acceptance(vsa_3r(), 0.01), trajectory)
     for _ in range(6):
         fix = task.with_profiles(AS_IT_IS)
-        ((_, short),) = verify_fixes(task.acceptance, [fix])
+        _, short = verify_fix(task.acceptance, fix)
         if short is None:
             return fix
         task = replace(

@@ -417,8 +417,7 @@ def _refused_instants_between(acceptance: Acceptance, run: PreparedRun, factor: 
     return refused[evenly(len(refused), MAX_REFUSED_INSTANTS)]
 
 
-def verify_fixes(acceptance: Acceptance, fixes: Sequence[Fix]) -> Iterator[tuple[Fix, FloatArray | None]]:
-    """Yield fixes with the findings of their runs, and the instants that refuse them; see `Verification`."""
-    for fix in fixes:
-        joints, refused = verify(acceptance, PreparedRun(fix.robot, fix.trajectory), 1 + fix.longer)
-        yield replace(fix, joints=joints), refused
+def verify_fix(acceptance: Acceptance, fix: Fix) -> tuple[Fix, FloatArray | None]:
+    """Return a fix with the findings of its run, and the instants that refuse it; see `Verification`."""
+    joints, refused = verify(acceptance, PreparedRun(fix.robot, fix.trajectory), 1 + fix.longer)
+    return replace(fix, joints=joints), refused

@@ -181,8 +181,7 @@ def _offset_bounds(acceptance: Acceptance, joint: Joint, load: Load) -> tuple[fl
         raise ImpossibleError(
             f"none takes {joint.name} from {commanded_stiffness[rise_index]:.6g} to at least "
             f"{significant(admissible.low[rise_index], toward=math.inf)} {unit} at t = "
-            f"{load.time[rise_index]:.3f} s "
-            f"and from {commanded_stiffness[fall_index]:.6g} to at most "
+            f"{load.time[rise_index]:.3f} s and from {commanded_stiffness[fall_index]:.6g} to at most "
             f"{significant(admissible.high[fall_index], toward=-math.inf)} {unit} at t = "
             f"{load.time[fall_index]:.3f} s"
         )

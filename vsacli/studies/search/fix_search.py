@@ -26,7 +26,7 @@ from vsacli.dynamics.inverse import adapt_trajectory
 from vsacli.dynamics.limits import Finding
 from vsacli.robot.joint import Joint
 from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, verify, verify_fixes
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, verify, verify_fix
 from vsacli.studies.search.combined import CombinedSearch, least_change, smallest_slow_down
 from vsacli.studies.search.cutting_planes import lowest_offset, smallest_offset, transitions_between_levels
 from vsacli.studies.search.fix_report import NOT_CONFIRMED, SIMILAR, Fix, Fixes, NotPossible, in_order
@@ -141,7 +141,7 @@ class _CandidateFixes:
         """Run the chosen fixes; return the instants at which some were refused, or None if none was."""
         instants: list[FloatArray] = []
         while pending := [fix for fix in self.chosen if fix not in self.confirmed]:
-            for fix, refused in verify_fixes(acceptance, pending):
+            for fix, refused in (verify_fix(acceptance, fix) for fix in pending):
                 (self.confirmed if refused is None else self.refused).append(fix)
                 instants += [] if refused is None else [refused]
         return np.concatenate(instants) if instants else None
@@ -298,12 +298,12 @@ def _constant_fix_text(task: Task, index: int, load: Load) -> str:
     joint, commanded_stiffness = task.acceptance.robot.joints[index], load.command.commanded["stiffness"]
     offset = fixes_alone[0].stiffness_offset.by_joint[joint.name]
     if commanded_stiffness.min() == commanded_stiffness.max():
-        remedy = (
+        change_text = (
             f"a stiffness of {'at least' if offset > 0 else 'at most'} {commanded_stiffness[0] + offset:.10g}"
         )
     else:
-        remedy = f"{'an increase' if offset > 0 else 'a decrease'} of {abs(offset):.10g}"
-    return f"no slower motion helps, {remedy} {STIFFNESS.unit(joint.type)} does"
+        change_text = f"{'an increase' if offset > 0 else 'a decrease'} of {abs(offset):.10g}"
+    return f"no slower motion helps, {change_text} {STIFFNESS.unit(joint.type)} does"
 
 
 def _limit_clause(acceptance: Acceptance, joint: Joint, rest_load: Load) -> str:

@@ -7,7 +7,7 @@ Here no such profile is known, and none exists where bounds touch; in return, th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
@@ -301,15 +301,15 @@ def nearest_change(
     _check_possible(acceptance, joint, load)
     first_factors, *other_factors = product(MARGIN_FACTORS, SMOOTHING_FACTORS)
     change = _change_with_margins(acceptance, joint, load, *first_factors)
-    candidates = [change]
+    accepted = _accepted(acceptance, joint, load, [change])
+    candidates: list[Change | None] = []
     with suppress(ImpossibleError):
         candidates.append(Change.constant(load.time, smallest_offset(acceptance, joint, judged(load))))
-    if not _is_accepted(acceptance, joint, load, change):
+    if not accepted:
         candidates += [_change_with_margins(acceptance, joint, load, *factors) for factors in other_factors]
-        candidates += _changes_within_limits(acceptance, joint, load)
-    accepted = [
-        each for each in candidates if each is not None and _is_accepted(acceptance, joint, load, each)
-    ]
+    accepted += _accepted(acceptance, joint, load, candidates)
+    if change not in accepted:
+        accepted += _change_within_limits(acceptance, joint, load)
     if not accepted:
         raise ImpossibleError(_refusal_reason(acceptance, joint, load, change))
     return min(accepted, key=lambda each: each.rms)
@@ -359,21 +359,22 @@ def _change_within(admissible: Range, joint: Joint, load: Load, smoothing_factor
     return Change(load.time, np.stack([spline(load.time, nu=order) for order in range(STIFFNESS.orders)]))
 
 
-def _changes_within_limits(acceptance: Acceptance, joint: Joint, load: Load) -> Iterator[Change]:
-    """Yield changes within the stiffness that each instant accepts at the rates of the change before."""
-    rates, reserved_acceptance = (
-        np.zeros((2, len(load.time))),
-        replace(acceptance, reserve=acceptance.reserve + RATES_RESERVE),
-    )
+def _change_within_limits(acceptance: Acceptance, joint: Joint, load: Load) -> list[Change]:
+    """Return the accepted change within the stiffness that each instant accepts, if one is found.
+
+    Each is found at the rates of the one before.
+    """
+    reserved_acceptance = replace(acceptance, reserve=acceptance.reserve + RATES_RESERVE)
+    rates = np.zeros((2, len(load.time)))
     for _ in range(MAX_CHANGES):
         admissible = _accepted_stiffness(reserved_acceptance, joint, load, rates)
         change = None if admissible is None else _change_within(admissible, joint, load, 1)
         if change is None:
-            return
-        yield change
-        if _is_accepted(acceptance, joint, load, change):
-            return
+            break
+        if accepted := _accepted(acceptance, joint, load, [change]):
+            return accepted
         rates = change.rows[1:]
+    return []
 
 
 def _accepted_stiffness(acceptance: Acceptance, joint: Joint, load: Load, rates: FloatArray) -> Range | None:
@@ -440,8 +441,15 @@ def _smoothing_time(joint: Joint, load: Load) -> float:
     )
 
 
-def _is_accepted(acceptance: Acceptance, joint: Joint, load: Load, change: Change | None) -> bool:
-    return change is not None and not acceptance.refused_steps(joint, load.changed(*change.rows)).any()
+def _accepted(
+    acceptance: Acceptance, joint: Joint, load: Load, changes: Sequence[Change | None]
+) -> list[Change]:
+    """Return the changes after which every instant is accepted."""
+    return [
+        change
+        for change in changes
+        if change is not None and not acceptance.refused_steps(joint, load.changed(*change.rows)).any()
+    ]
 
 
 def _refusal_reason(acceptance: Acceptance, joint: Joint, load: Load, change: Change | None) -> str:

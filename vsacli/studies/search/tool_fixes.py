@@ -23,7 +23,7 @@ from vsacli.dynamics.internal_motion import refuse_damped_transmissions
 from vsacli.dynamics.inverse import usual_block
 from vsacli.robot.compliance import HeldPose, coupled_joints, softest_direction
 from vsacli.robot.model import Robot
-from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range, verify_fixes
+from vsacli.studies.search.acceptance import Acceptance, ImpossibleError, checked_range, verify_fix
 from vsacli.studies.search.changed_motion import with_scaled_stiffness
 from vsacli.studies.search.fix_report import (
     NOT_CONFIRMED,
@@ -101,7 +101,7 @@ def _confirmed_fixes(acceptance: Acceptance, candidates: Sequence[Fix]) -> tuple
         reasons_by_fix.append(too_soft)
         replaced = any(stiffened_fix.kinds >= simpler.kinds for simpler in confirmed_fixes)
         if stiffened_fix.kinds and not too_soft and not replaced:
-            ((confirmed, refused),) = verify_fixes(acceptance, [stiffened_fix])
+            confirmed, refused = verify_fix(acceptance, stiffened_fix)
             confirmed_fixes += [confirmed] if refused is None else []
     reasons = {} if confirmed_fixes else reasons_by_fix[0]
     return confirmed_fixes, {
