@@ -15,7 +15,7 @@ from samples.marks import slow_but
 from vsacli import InputError, Robot, inverse_dynamics, load_robot, load_trajectory
 from vsacli.actuators.kinds import ACTUATORS, mechanisms_of
 from vsacli.files.device_actuators import DEVICES
-from vsacli.files.examples import example_tables, examples
+from vsacli.files.examples import examples, tables_named_in
 from vsacli.files.robot_template import LinkSizes, robot_template
 from vsacli.files.templates import trajectory_template
 
@@ -127,9 +127,9 @@ def test_sizes_on_the_command_line(vsacli: Any) -> None:
 
 
 def test_numbers_of_tables_stay(tmp_path: Path) -> None:
-    for table in example_tables():
-        shutil.copy(table, tmp_path)
     text = robot_template("RR", "antagonistic:table", sizes=FINGER)
+    for table in tables_named_in(text):
+        shutil.copy(table, tmp_path)
     assert load_taken_for_real(text, tmp_path).joints[0].dh.a == 0.045
 
 

@@ -32,7 +32,7 @@ from vsacli.actuators.kinds import ACTUATORS, TENDONS, mechanisms_of
 from vsacli.cli.new import new
 from vsacli.documents.fields import declared_fields
 from vsacli.files.device_actuators import DEVICES
-from vsacli.files.examples import example_tables
+from vsacli.files.examples import tables_named_in
 from vsacli.files.robot_template import SOURCES, robot_template
 from vsacli.files.templates import trajectory_template
 
@@ -55,9 +55,10 @@ ON_NO_SLIDE = {
 
 def verdict_of(joints: str, actuators: str | tuple[str, ...], folder: Path) -> str:
     """The verdict of a new trajectory of a new robot, whose tables are copied next to it."""
-    for table in example_tables():
+    text = robot_template(joints, actuators)
+    for table in tables_named_in(text):
         shutil.copy(table, folder)
-    (folder / "arm.yaml").write_text(robot_template(joints, actuators))
+    (folder / "arm.yaml").write_text(text)
     robot = load_robot(folder / "arm.yaml")
     (folder / "move.yaml").write_text(trajectory_template(robot).replace("rate: 1000", "rate: 50  "))
     return str(inverse_dynamics(robot, load_trajectory(folder / "move.yaml", robot)).report.verdict)

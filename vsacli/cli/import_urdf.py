@@ -167,7 +167,7 @@ def import_urdf(
     motors and springs: the robot file has placeholders, marked as such, which are sized to the load of each
     joint, or those of the devices named by --actuator.
     """
-    from vsacli.files.examples import example_tables
+    from vsacli.files.examples import tables_named_in
     from vsacli.robot import urdf as conversions
 
     if srdf is None and group is not None:
@@ -190,7 +190,7 @@ def import_urdf(
             conversion = _with_devices(conversion, word, words)
         text = conversions.converted_robot_text(conversion)
         file.write_text(text)
-        for table in (table for table in example_tables() if table.name in text):
+        for table in tables_named_in(text):
             outputs.file(path.parent / table.name).write_bytes(table.read_bytes())
     click.echo(str(conversion))
     talk.wrote(outputs)

@@ -183,7 +183,7 @@ def robot(
     has a comment where it occurs first, also on where to find its value, and optional keys are commented
     out. Reports mark its springs and motors as placeholders until the key `placeholder` is removed.
     """
-    from vsacli.files.examples import example_tables
+    from vsacli.files.examples import tables_named_in
     from vsacli.files.robot_template import LinkSizes, load_template, robot_template
 
     letters = _letters(joints, actuator, chosen)
@@ -198,9 +198,7 @@ def robot(
             [joint_option.name for joint_option in chosen],
             sizes=LinkSizes(lengths or (), masses or ()),
         )
-    _write_template(
-        text, output, overwrite, talk, tables=[path for path in example_tables() if path.name in text]
-    )
+    _write_template(text, output, overwrite, talk, tables=tables_named_in(text))
     if lengths or masses:  # the first warning is about these, others about what was computed from them
         located = (problem for problem in load_template(text).located_warnings if problem.line)
         for problem in itertools.islice(located, 1):

@@ -307,10 +307,10 @@ def _warnings_by_rule(
         of_unit = groups.setdefault(index if other is None else other, {})
         of_unit.setdefault(_name_of_path(_path_to_report(number.path, other)), warning)
     for group in groups.values():
-        first, *likewise = group.values()
+        first, *further = group.values()
         places = [
             f"{name} (line {each.line})" if each.line != first.line else name
-            for name, each in zip([*group][1:], likewise, strict=True)
+            for name, each in zip([*group][1:], further, strict=True)
         ]
         also = f" Also {listed(places, MOST_NAMED)}" if places else ""
         yield first._replace(message=first.message + also)

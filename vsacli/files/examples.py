@@ -120,9 +120,10 @@ def copy_examples(names: Iterable[str], folder: str | Path, outputs: Outputs) ->
     return list(copies.values())
 
 
-def example_tables() -> list[Path]:
-    """Return the tables of bundled robots, such as measured springs and profiles of cams."""
-    return sorted((examples_root() / "robots").rglob("*.csv"))
+def tables_named_in(text: str) -> list[Path]:
+    """Return the tables of bundled robots, such as profiles of cams, that the text of a robot file names."""
+    tables = sorted((examples_root() / "robots").rglob("*.csv"))
+    return [table for table in tables if table.name in text]
 
 
 def opening_comment(path: Path) -> str:

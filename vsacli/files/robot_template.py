@@ -20,7 +20,7 @@ from vsacli.documents.number import BOOLEANS
 from vsacli.documents.record_values import PathIndex
 from vsacli.documents.source import Problems
 from vsacli.files.device_actuators import DEVICES, OF_DEVICE, check_drives
-from vsacli.files.examples import example_tables, examples
+from vsacli.files.examples import examples, tables_named_in
 from vsacli.robot import file as robot_file
 from vsacli.robot.model import Robot
 
@@ -161,9 +161,8 @@ def load_template(text: str) -> Robot:
         path = folder / "starter.yaml"
         with reporting_temporary_errors():
             path.write_text(text, encoding="utf-8")
-            for table in example_tables():
-                if table.name in text:
-                    (folder / table.name).write_bytes(table.read_bytes())
+            for table in tables_named_in(text):
+                (folder / table.name).write_bytes(table.read_bytes())
         return robot_file.load_robot(path)
 
 

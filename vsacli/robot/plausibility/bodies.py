@@ -88,7 +88,8 @@ UNIT_SYSTEMS = {
 
 PROPER = next(iter(UNIT_SYSTEMS))
 UNLIKELY = 4.0
-"""Misfit that each field in another unit has to save; common systems count as one field."""
+"""Squared distance from usual sizes that each field in another unit has to save; common systems
+count as one field."""
 
 POWERS = np.array([(1, 0, 0), (-3, 1, 0), (1, 0.5, -0.5), (0, 2.5, -1.5), (-1, -0.5, 0.5)])
 """Powers of length, mass and inertia of reach, mass over reach cubed, and the sizes of three rules."""
@@ -98,7 +99,8 @@ USUAL, SPREADS = np.array([-0.1, 1.4, 2.45]), np.array([0.5, 0.8, 0.6])
 links, of half of the bundled and real robots; few are as small as fingers, so a spread of 0.35 became 0.5."""
 
 MOST, LONG = 0.6, 8.0
-"""Share of the lengths that are more than so many gyrations if all of them have another unit, not a few."""
+"""Share of the lengths that are longer than this number of gyrations if all of them have another
+unit, not a few."""
 
 Measure: TypeAlias = Callable[[CheckedRobot], Iterator[Measured]]
 
@@ -261,7 +263,7 @@ def _guess_system(checked: CheckedRobot) -> tuple[str, ...]:
     ranges = [(0.0, math.inf), (3e-3, 2e4), *((rule.low, rule.high) for rule in rules)]
     if _are_plausible(sizes, ranges, PROPER):
         return PROPER
-    units = min(UNIT_SYSTEMS, key=lambda units: _misfit(sizes, units))
+    units = min(UNIT_SYSTEMS, key=lambda units: _distance_from_usual(sizes, units))
     length, mass, inertia = UNIT_SYSTEMS[units]
     shortest = np.quantile(sizes[2], 1 - MOST, method="lower") * math.sqrt(mass / inertia)
     return units if (length == 1 or shortest > LONG) and _are_plausible(sizes, ranges, units) else PROPER
@@ -277,7 +279,7 @@ def _are_plausible(
     )
 
 
-def _misfit(sizes: list[FloatArray], units: tuple[str, ...]) -> float:
+def _distance_from_usual(sizes: list[FloatArray], units: tuple[str, ...]) -> float:
     """Return the sum of squares of the deviations from usual sizes, and a charge for each field."""
     changes = 1 if units in COMMON_SYSTEMS else np.count_nonzero(UNIT_SYSTEMS[units] != 1)
     logarithms = np.log10([np.median(size) for size in sizes]) + POWERS @ np.log10(UNIT_SYSTEMS[units])

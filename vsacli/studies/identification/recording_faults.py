@@ -260,8 +260,7 @@ def _position_clauses(column: RecordedColumn, robot: Robot) -> Iterator[str]:
         likely_unit, file_unit = ("deg", "rad") if is_revolute else ("mm", "m")
         yield (
             f"goes to {max_magnitude:.4g} {file_unit}; is it in {likely_unit}? Write "
-            f"[{likely_unit}] after its name in the header, "
-            f"or [{file_unit}] if it is right"
+            f"[{likely_unit}] after its name in the header, or [{file_unit}] if it is right"
         )
 
 
@@ -280,8 +279,8 @@ def _constant_column_sentences(columns: Sequence[RecordedColumn], joints: Sequen
         for column in constant_columns:
             yield (
                 f"column {column.name!r} is {column.values[0]:.6g} throughout, while "
-                f"{changing_columns[0].name!r} "
-                "changes: a sensor that is not connected, or a column that was not filled in"
+                f"{changing_columns[0].name!r} changes: a sensor that is not connected, or a column that was "
+                "not filled in"
             )
     if resting_joints:
         verb, them = ("joint {} does", "its") if len(resting_joints) == 1 else ("joints {} do", "their")
@@ -314,6 +313,5 @@ def _saturation_clauses(column: RecordedColumn) -> Iterator[str]:
             when = time_text(float(column.time[np.argmax(is_extreme)]))
             yield (
                 f"is cut off at {extreme:.4g}, {is_extreme.sum()} times, first at t = {when}: the "
-                "drive or the sensor "
-                "goes no further; leave that part out, or move with less torque"
+                "drive or the sensor goes no further; leave that part out, or move with less torque"
             )

@@ -228,8 +228,8 @@ def _overlap(times: FloatArray, time_offset: float, duration: float, path: str |
         row_text = f"{row_count or 'no'} {'row overlaps' if row_count < 2 else 'rows overlap'}"
         raise InputError.one(
             f"with a time offset of {time_offset:.4g} s, {row_text} the result ({duration:.4g} s): "
-            "the recording "
-            f"spans {time[0]:.4g} to {time[-1]:.4g} s of it; at least {FEWEST_SAMPLES} rows must overlap",
+            f"the recording spans {time[0]:.4g} to {time[-1]:.4g} s of it; at least {FEWEST_SAMPLES} rows "
+            "must overlap",
             path,
         )
     return Overlap(min(float(time[-1]), duration) - max(float(time[0]), 0.0), row_count, duration)

@@ -244,8 +244,7 @@ def _unknown_joints_sentence(header: ColumnNames, places: Mapping[str, Place], r
     location = f"not in {robot} ({listed(header.joint_names, MAX_LISTED_JOINTS)})"
     return (
         f"{joint_noun} {', '.join(map(repr, joints))} {verb} {location}: is this the recording of "
-        "another robot? If"
-        f" not, map or ignore {them} columns with --columns"
+        f"another robot? If not, map or ignore {them} columns with --columns"
     )
 
 

@@ -326,8 +326,7 @@ def run_study(
     if lost_rows:
         tell(
             f"runs lost with their processes: {len(lost_rows)}; all others are in {journal.path}, "
-            "and the same "
-            "command with --overwrite tries these again"
+            "and the same command with --overwrite tries these again"
         )
     else:
         journal.remove()
